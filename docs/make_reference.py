@@ -16,13 +16,14 @@ from pydantic import BaseModel
 
 from executive.mission.file.schema import MissionFile, mission_json_schema
 from executive.mission.knowledge import Knowledge
+from executive.mission.scenario_file import ScenarioFile
 from executive.testing.skill_test import SkillTestFile
 from executive.tree.registry import built_in_skills
 from executive.tree.types import describe_type, field_types
 from plant.worlds.world import SeedRules
 from skills.api import Skill
+from skills.faults.kinds import STANDARD_FAULTS
 from skills.stack import SLOTS, components, skill_options, stack_schema
-from skills.testing.fault_kinds import STANDARD_FAULTS
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from make_api import api_page
@@ -68,6 +69,16 @@ SCHEMA_PAGES = (
         "directives), names and places in `knowledge.yaml`. [Make your own world](../how-to/own-world.md) begins here.",
         SeedRules,
         "plant/worlds/flat/objects.yaml",
+    ),
+    SchemaPage(
+        "scenario",
+        "Scenario files",
+        "A scenario: `errand run --scenario FILE`, also `evaluate`. Times are those "
+        "of the robot's clock, in seconds from the beginning of the run. A door waits for who is in the doorway; a "
+        "person passes through a closed one. What a gripper holds is not moved. The robot learns of none of it but by "
+        "its sensors. [Faults by name](faults.md) lists the faults.",
+        ScenarioFile,
+        "missions/scenarios/busy_flat.yaml",
     ),
     SchemaPage(
         "skill-test",
@@ -264,13 +275,19 @@ def _paragraph(kind: type[Any]) -> str:
 
 def faults_page() -> str:
     """The page on the faults that can be injected by name."""
-    rows = "\n".join(f"| `{kind.example}` | {kind.meaning} |" for kind in STANDARD_FAULTS)
+    rows = "\n".join(
+        f"| `{kind.example}` | {kind.meaning} | {'yes' if kind.random else ''} |" for kind in STANDARD_FAULTS
+    )
     words = (
         "A fault is the words of its kind and, if it is not always on, a time: `at 3 s` or `from 3 s` (from then on), "
-        "`from 3 s to 5 s`, or `after 4 calls`. Verbs have their names in `skills/robot.py`, or camera, lidar, arm, "
-        "gripper, base and body."
+        "`from 3 s to 5 s`, `2 s at 3 s` (for so long), or `after 4 calls`. Verbs have their names in "
+        "`skills/robot.py`, or camera, lidar, arm, gripper, base and body. A colon may follow the verb, and one of "
+        "several cameras is named after a dot: `camera.hand: is black 2 s at 3 s`.\n\n"
+        "The same words inject faults in [skill tests](skill-test.md), by `skill_bench.inject` in pytest, and in whole "
+        "missions by `errand run --fault` and [scenario files](scenario.md), where times are those of the robot's "
+        "clock. `--random-faults N` draws among the kinds marked as random, by the run's seed."
     )
-    return f"{NOTE}# Faults by name\n\n{words}\n\n| example | effect |\n|---|---|\n{rows}\n"
+    return f"{NOTE}# Faults by name\n\n{words}\n\n| example | effect | random |\n|---|---|---|\n{rows}\n"
 
 
 def stack_schema_text() -> str:

@@ -25,10 +25,12 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, ModelInstanceIndex, PlanarJoint, RigidBody
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
+from plant.happenings.doors import add_panel
 from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.scene import Scene
 from plant.scenery import add_model, add_scenery
 from plant.spot.model import SpotModel
+from plant.worlds.world import DoorRule
 
 TIME_STEP_S = 0.0125
 NEAR_RIGID = 0.1
@@ -84,6 +86,7 @@ def build_diagram(
     directives: Path | None,
     models: Sequence[LooseModel],
     robot_names: Sequence[str],
+    doors: Sequence[DoorRule] = (),
     visuals: bool = True,
     carried: bool = True,
     locomotion: FloatingBaseLimits | None = None,
@@ -95,6 +98,7 @@ def build_diagram(
 
     SAP contact at `TIME_STEP_S`; sampled outputs, which would double the cost of a step, are off, so that evaluating
     contact results solves once more. Positions of the models are defaults, the robots' are set by the caller.
+    `doors` have panels, which are models, too.
     `renderer_parameters` set light and sky; `meshcat` shows the world there.
     `visuals` draws Spot with meshes where they are installed; `render` makes the scene for cameras. `locomotion` limits
     what bears the robots.
@@ -104,6 +108,7 @@ def build_diagram(
         directives=directives,
         models=models,
         robot_names=robot_names,
+        doors=doors,
         visuals=visuals,
         carried=carried,
         locomotion=locomotion,
@@ -118,6 +123,7 @@ def build_diagram(
     parser = parser_of(plant)
     scenery = {} if directives is None else add_scenery(plant, directives, parser_of)
     instances = {model.name: _add_model(plant, parser, model) for model in models}
+    panels = {door.name: add_panel(plant, door) for door in doors}
     trays = {model.name: _add_tray(plant, parser, model) for model in models if model.receives}
     robots = {
         name: SpotModel(plant, name, visuals=visuals, carried=carried, limits=locomotion)
@@ -132,7 +138,7 @@ def build_diagram(
     floor = GeometrySet(_floor_geometries(plant, scene_graph))
     for robot in robots.values():
         robot.filter_collisions(filters, floor)
-    moved = [instances[model.name] for model in models if model.slides]
+    moved = [*panels.values(), *(instances[model.name] for model in models if model.slides)]
     moved += [tray.model_instance() for tray in trays.values()]
     prescribed, anchored = GeometrySet([*_shapes_of(plant, moved)]), GeometrySet([*_anchored_shapes(plant)])
     filters.Apply(CollisionFilterDeclaration().ExcludeWithin(prescribed).ExcludeBetween(prescribed, anchored))
@@ -145,7 +151,7 @@ def build_diagram(
         plant,
         scene_graph,
         robots,
-        instances,
+        {**instances, **panels},
         trays,
         scenery,
         scene,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -16,6 +16,8 @@ from pydrake.systems.framework import Context
 
 from plant.carried import Carried
 from plant.diagram import TIME_STEP_S, LooseModel, WorldDiagram, build_diagram
+from plant.happenings.doors import Doors
+from plant.happenings.moves import Moves
 from plant.live_scene import LiveScene
 from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.people.receivers import Receivers
@@ -26,19 +28,23 @@ from plant.sleeping import Sleepers
 from plant.snapshot.file import read_snapshot
 from plant.snapshot.values import State
 from plant.snapshot.writer import SnapshotWriter, restore
+from plant.spot.capabilities import spot_capabilities
 from plant.spot.model import SpotModel
 from plant.spot.robot import SpotRobot
 from plant.spot.sensing import HAND_LINK, SpotSensors
 from plant.worlds.lights import render_parameters
 from plant.worlds.placement import Placement, Receiving, place_objects, place_people
 from plant.worlds.route import Route
-from plant.worlds.world import World
+from plant.worlds.world import DoorRule, World
 from skills.robot import FloatArray, Pose2D, Robot
 
 CONTROL_STEPS = 2
 SLEEP_PERIOD_STEPS = 4
 REFEREE_PERIOD_STEPS = 4
 SETTLING_S = 1.5
+_SQUARE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+HAND_OUTLINE_M, PERSON_OUTLINE_M = 0.15 * _SQUARE, 0.25 * _SQUARE
+"""What a door sees of a hand, and of a person."""
 
 
 class Engine:
@@ -54,12 +60,13 @@ class Engine:
         charge: float = 1.0,
         routes: Mapping[str, Route] = MappingProxyType({}),
         receiving: Mapping[str, Receiving] = MappingProxyType({}),
+        doors: Sequence[DoorRule] = (),
     ) -> None:
         """`starts`: where each robot stands at time 0, in the world frame; `seed` gives the sensors' noise.
 
         Batteries begin at `charge` (0 to 1) and charge at `dock`. `routes` are those of people who walk, by the names
-        of their models; `receiving` says how those with a tray take what is held out to them. Raises WorldError: a
-        route leads through what stands fast.
+        of their models; `receiving` says how those with a tray take what is held out to them; `doors` are those of the
+        Diagram. Raises WorldError: a route leads through what stands fast.
         """
         self.world, self._dock, self._charge = world, dock, charge
         self._simulator = Simulator(world.diagram)
@@ -79,6 +86,9 @@ class Engine:
         self._carried = Carried(plant, self.context, loose)
         self._hands = {name: plant.GetBodyByName(HAND_LINK, model.instance) for name, model in world.robots.items()}
         self.receivers = Receivers(world, self.context, receiving)
+        self._happened: list[tuple[float, str]] = []
+        self.doors = Doors(plant, self.context, doors, self._outlines_W, self.note)
+        self.moves: Moves | None = None
         self._steps = 0
         self._observers: list[tuple[int, Callable[[float], None]]] = []
         self._after_advance: list[Callable[[], None]] = []
@@ -101,6 +111,11 @@ class Engine:
     def robots(self) -> Mapping[str, Robot]:
         """The robots by name."""
         return self._spots
+
+    @property
+    def happened(self) -> Sequence[tuple[float, str]]:
+        """What doors did, and what somebody moved: the time (s) and a sentence each."""
+        return self._happened
 
     @property
     def asleep(self) -> frozenset[str]:
@@ -126,6 +141,9 @@ class Engine:
             holding = [name for name, spot in self._spots.items() if spot.gripper().holding]
             self.walkers.before_step(TIME_STEP_S, standing=self.receivers.busy)
             self.receivers.before_step(self.now(), TIME_STEP_S, holding)
+            self.doors.before_step(self.now(), TIME_STEP_S)
+            if self.moves is not None:
+                self.moves.before_step(self.now(), self._hands_W, holding)
             self._steps += 1
             self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
             for name in holding:
@@ -147,7 +165,8 @@ class Engine:
         """Time, what the robots keep, how far the people have walked, and what they are about to take."""
         robots = {name: spot.state() for name, spot in self._spots.items()}
         people = {"walkers": self.walkers.state(), "receivers": self.receivers.state()}
-        return {"steps": self._steps, "robots": robots, **people}
+        moves = None if self.moves is None else self.moves.state()
+        return {"steps": self._steps, "robots": robots, **people, "doors": self.doors.state(), "moves": moves}
 
     def world_state(self) -> Mapping[str, FloatArray]:
         """Positions and velocities of all that moves."""
@@ -169,10 +188,31 @@ class Engine:
         for group, values in world.items():
             self.root_context.get_mutable_discrete_state(int(group)).SetFromVector(values)
         self.receivers.restore(state["receivers"])
+        self.doors.restore(state["doors"])
+        if self.moves is not None and state["moves"] is not None:
+            self.moves.restore(state["moves"])
         for name, spot in self._spots.items():
             spot.restore(state["robots"][name], self.now())
         self._command_robots()
         self._simulator.Initialize()
+
+    def note(self, sentence: str) -> None:
+        """Note what happens now."""
+        self._happened.append((round(self.now(), 6), sentence))
+
+    def _hands_W(self) -> Mapping[str, FloatArray]:
+        poses = {name: self.world.plant.EvalBodyPoseInWorld(self.context, hand) for name, hand in self._hands.items()}
+        return {name: np.array(X_WH.translation()) for name, X_WH in poses.items()}
+
+    def _outlines_W(self) -> Iterator[FloatArray]:
+        """The outlines (K, 2) of robots, their hands and people, from above."""
+        outline_B = np.array(spot_capabilities().footprint_m)
+        corners_B = np.column_stack([outline_B, np.zeros(len(outline_B))])
+        for robot in self.world.robots.values():
+            X_WB = self.world.plant.EvalBodyPoseInWorld(self.context, robot.body)
+            yield X_WB.multiply(corners_B.T).T[:, :2]
+        yield from (p_W[:2] + HAND_OUTLINE_M for p_W in self._hands_W().values())
+        yield from (np.array(place_W) + PERSON_OUTLINE_M for place_W in self.walkers.places_W())
 
     def _command_robots(self) -> None:
         for spot in self._spots.values():
@@ -212,6 +252,7 @@ class Simulation:
                 *extra_models,
             ],
             robot_names=robot_names,
+            doors=world.doors,
             visuals=visuals,
             locomotion=locomotion,
             renderer_parameters=render_parameters(),
@@ -224,7 +265,12 @@ class Simulation:
             charge=charge,
             routes={each.name: each.route for each in people if each.route is not None},
             receiving={each.name: each.receiving for each in people if each.receiving is not None},
+            doors=world.doors,
         )
+        if world.moves:
+            moves = Moves(built.plant, self.engine.context, world, things, seed=seed, tell=self.engine.note)
+            moves.listen(self._moved)
+            self.engine.moves = moves
         self.referee = Referee(
             built.plant,
             [*things, *people],
@@ -240,6 +286,9 @@ class Simulation:
         self.engine.observe(self._referee_looks, every=REFEREE_PERIOD_STEPS)
         if self.recorder is not None:
             self.engine.observe(self.recorder)
+
+    def _moved(self, name: str) -> None:
+        self.referee.moved_by_others(name, self.engine.context, self.engine.now())
 
     def _referee_looks(self, now_s: float) -> None:
         self.referee.observe(self.engine.context, now_s, asleep=self.engine.asleep)

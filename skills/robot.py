@@ -351,7 +351,10 @@ class Robot(Protocol):
         """Latest LiDAR revolution, None before the first."""
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        """Take a picture with depth now, or only one of the two; may block. Raises ValueError: no such source."""
+        """Take a picture with depth now, or only one of the two; may block.
+
+        Raises ValueError: no such source. Raises NoImageError: the camera gives none just now.
+        """
 
     def joints(self) -> Joints:
         """Latest joint state."""
@@ -397,6 +400,10 @@ class Robot(Protocol):
 
     def return_lease(self, lease: Lease) -> None:
         """Give the lease back; the robot stops. A lease that was taken away is ignored."""
+
+
+class NoImageError(RuntimeError):
+    """A camera gives no picture just now; it may do so again."""
 
 
 class LeaseError(RuntimeError):

@@ -11,7 +11,10 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 OURS = ("executive", "skills", "plant")
-WORDS = ("command", "errors", "geometry", "knowledge", "yaml_source")
+WORDS = (
+    *("command", "condition", "errors", "expression", "file.blocks", "file.model", "geometry", "knowledge"),
+    "yaml_source",
+)
 HOMES = (
     (*(f"executive.mission.{name}" for name in WORDS), "executive.record.profile", "executive.record.work"),
     ("executive.language",),

@@ -3,7 +3,8 @@ the way walked from above."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import base64
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -12,6 +13,7 @@ import cv2
 import numpy as np
 
 from executive.record.messages import DESTINATION_TOPIC
+from executive.record.reader import Event
 from executive.record.schemas import TRANSITIONS
 from executive.store.resuming import told_before
 from executive.tree.behaviours.answer import ANSWER_TOPIC
@@ -21,7 +23,10 @@ from skills.api import Publish
 from skills.robot import Picture
 
 DETECTIONS: Final = "detections"
+MOST_BYTES: Final = 1_500_000
 _MARGIN_M: Final = 0.3
+_WIDEST_PX: Final = 720
+_JPEG_QUALITY: Final = 78
 _MOST_LOOKS: Final = 12
 _SMALL_PX: Final = (320, 240)
 _ROW: Final = 4
@@ -31,7 +36,11 @@ _AHEAD_M: Final[Mapping[str, float]] = MappingProxyType({"hand_over": 0.4})
 
 
 class Artifacts:
-    """Passes messages on to the log and remembers what is worth a picture."""
+    """Passes messages on to the log and remembers what is worth a picture.
+
+    `pictures` are small JPEG files for the answers, and `numbers` says which goes with the answer of a node (path id)
+    at a time (s); once they have `MOST_BYTES`, no more are kept. `drawn` are the files that were written, by name.
+    """
 
     def __init__(self, publish: Publish) -> None:
         self._publish = publish
@@ -40,6 +49,9 @@ class Artifacts:
         self._looked: list[Mapping[str, Any]] = []
         self.detection: Mapping[str, Any] | None = None
         self.answer: Picture | None = None
+        self.pictures: list[bytes] = []
+        self.numbers: dict[tuple[str, float], int] = {}
+        self.drawn: dict[str, Path] = {}
         self.moments: dict[str, float] = {}
 
     def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
@@ -58,12 +70,34 @@ class Artifacts:
 
     def _shown(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """The answer with a picture: of what was found, or of all that was looked at in vain."""
+        looked, self._looked = self._looked, []
+        if not looked:
+            return message
         if message["answer"] and self._confirmed is not None:
-            self.answer = _detection(self._confirmed)
-        elif self._looked:
-            self.answer = _sheet([_detection(each) for each in self._looked[-_MOST_LOOKS:]])
-        self._looked = []
-        return message if self.answer is None else {**message, "image": self.answer}
+            self.answer = detection_picture(self._confirmed)
+        else:
+            self.answer = _sheet([detection_picture(each) for each in looked[-_MOST_LOOKS:]])
+        self._keep(message, self.answer)
+        return {**message, "image": self.answer}
+
+    def recall(self, events: Iterable[Event]) -> None:
+        """Keep the pictures of answers that were logged before a restart."""
+        for event in events:
+            if event.topic == ANSWER_TOPIC and event.data.get("format") == "jpeg" and "t" in event.data:
+                data = np.frombuffer(base64.b64decode(event.data["data"]), np.uint8)
+                picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
+                if picture is not None:
+                    self._keep(event.data, np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8))
+
+    def _keep(self, message: Mapping[str, Any], picture: Picture) -> None:
+        """Keep the small picture of an answer, once, as long as there is room."""
+        key = str(message["node"]), float(message.get("t", 0.0))
+        if key in self.numbers or sum(map(len, self.pictures)) >= MOST_BYTES:
+            return
+        small = to_jpeg(picture)
+        if sum(map(len, self.pictures)) + len(small) <= MOST_BYTES:
+            self.numbers[key] = len(self.pictures)
+            self.pictures.append(small)
 
     def _note(self, path_id: str, time_s: float) -> None:
         name = _MOMENTS.get(path_id.rsplit("/", 1)[-1])
@@ -78,13 +112,14 @@ def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robot_name: str
     """
     pictures = {"map": _map(simulation, robot_name)}
     if artifacts.detection is not None:
-        pictures["detection"] = _detection(artifacts.detection)
+        pictures["detection"] = detection_picture(artifacts.detection)
     begun_s = simulation.recorder.at(0.0).time_s if simulation.recorder is not None else 0.0
     last = simulation.referee.lifts(robot_name)[-1:]
     lifts = [("grasp", lift.time_s) for lift in last if lift.time_s >= begun_s]
     for name, time_s in (*lifts, *artifacts.moments.items()):
         pictures[name] = _view(simulation, robot_name, time_s, _AHEAD_M.get(name, 0.0))
     paths = [folder / f"{name}.png" for name in pictures]
+    artifacts.drawn.update(zip(pictures, paths, strict=True))
     for path, picture in zip(paths, pictures.values(), strict=True):
         save_png(path, picture)
     return paths
@@ -99,6 +134,16 @@ def draw_answer(artifacts: Artifacts, folder: Path) -> Path | None:
     return path
 
 
+def to_jpeg(picture: Picture) -> bytes:
+    """A picture as a JPEG file for a page, at most 720 pixels wide."""
+    height, width = picture.shape[:2]
+    scale = min(1.0, _WIDEST_PX / width)
+    size = (round(width * scale), max(1, round(height * scale)))
+    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA) if scale < 1.0 else picture
+    bgr = cv2.cvtColor(small, cv2.COLOR_RGB2BGR) if small.ndim == 3 else small
+    return cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes()
+
+
 def _sheet(pictures: Sequence[Picture]) -> Picture:
     """Pictures side by side, smaller, in rows."""
     small = [np.asarray(cv2.resize(each, _SMALL_PX, interpolation=cv2.INTER_AREA), np.uint8) for each in pictures]
@@ -107,7 +152,8 @@ def _sheet(pictures: Sequence[Picture]) -> Picture:
     return np.vstack([np.hstack(small[k : k + columns]) for k in range(0, len(small), columns)])
 
 
-def _detection(message: Mapping[str, Any]) -> Picture:
+def detection_picture(message: Mapping[str, Any]) -> Picture:
+    """A logged picture with its detections drawn on it."""
     picture: Picture = message["image"]
     if picture.ndim == 2:
         picture = np.repeat(picture[..., None], 3, axis=2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -43,6 +43,9 @@ class Backend(Protocol):
         Raises:
             InputError: there is no such robot, or something that it needs cannot be read.
         """
+
+    def happened(self) -> Sequence[tuple[float, str]]:
+        """What has happened in the world by the run's scenario: times (s) and sentences; none of a real one."""
 
     def work(self) -> Mapping[str, int]:
         """What the backend itself computed, as counters by name; empty for a real robot."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -13,6 +13,8 @@ from executive.cli.report import RunReport
 from executive.cli.requests import Prepared, prepare, replacing
 from executive.mission.errors import InputError, disk_is_full
 from executive.mission.request import Request
+from executive.record.reader import Event, read_events
+from executive.record.schemas import RUN
 from executive.store.database import full_disk
 from executive.store.journal import StoreJournal
 from executive.store.missions import MissionState, MissionStore, StoredMission
@@ -21,6 +23,7 @@ from executive.store.resuming import resumed_tree
 from skills.robot import Pose2D
 
 STORE: Final = "missions.sqlite"
+_MOST_STARTS: Final = 1000
 
 
 def run_arguments(asked: Request, prepared: Prepared) -> list[str]:
@@ -35,6 +38,9 @@ def run_arguments(asked: Request, prepared: Prepared) -> list[str]:
     arguments += [] if asked.start is None else [f"--start={asked.start}"]
     arguments += [f"--set={name}={json.dumps(value)}" for name, value in asked.given.items()]
     arguments += ["--map", str(asked.map)] if asked.map else []
+    arguments += [f"--fault={words}" for words in asked.scenario.faults]
+    arguments += [f"--random-faults={asked.scenario.random}"] if asked.scenario.random else []
+    arguments += [f"--scenario={path}" for path in asked.scenario_files]
     if asked.file is None:
         return arguments
     arguments += [part for answer in asked.answers for part in ("--answer", answer)]
@@ -81,7 +87,8 @@ def next_run(store: MissionStore, mission: StoredMission, before: StoredMission)
 def same_world(one: StoredMission, other: StoredMission) -> bool:
     """Whether two missions are to be done by one robot in one world."""
     a, b = one.request, other.request
-    return (a.world, a.world_name, a.seed, a.robot) == (b.world, b.world_name, b.seed, b.robot)
+    same = (a.world, a.world_name, a.seed, a.robot) == (b.world, b.world_name, b.seed, b.robot)
+    return same and a.scenario == b.scenario
 
 
 @dataclass(frozen=True)
@@ -107,10 +114,35 @@ def take_up(store: MissionStore, mission: StoredMission) -> TakenUp:
     memory = store.memory(mission.id)
     resumed, recollection = resumed_tree(prepared.tree, memory)
     journal = _journal(store, mission).remembering(recollection)
-    log = f"log-{mission.starts + 1}.mcap"
+    log = _log_name(mission.starts + 1)
     label = str(mission.id)
     durable = Durable(plant_file(store), journal, label, True, label, memory.pose, log)
     return TakenUp(replace(prepared, tree=resumed), durable, recollection)
+
+
+def _log_name(start: int) -> str:
+    """The name of the log of a mission's first start, second start, and so on."""
+    return "log.mcap" if start == 1 else f"log-{start}.mcap"
+
+
+def mission_events(log: Path) -> tuple[Event, ...]:
+    """The events of a log, after those of the earlier starts of the mission, as far as their logs can still be read.
+
+    Raises InputError: the log itself cannot be read.
+    """
+    events, before = read_events(log), list[Event]()
+    for name in (_log_name(start) for start in range(1, _MOST_STARTS)):
+        if name == log.name:
+            break
+        with suppress(InputError):
+            earlier = read_events(log.with_name(name))
+            before += earlier if _facts(earlier) == _facts(events) else ()
+    return (*before, *events)
+
+
+def _facts(events: Sequence[Event]) -> object:
+    """What a log says at its beginning: the commands, the world, the seed."""
+    return next((event.data for event in events if event.topic == RUN), None)
 
 
 def as_it_was(mission: StoredMission, store: Path) -> Request:

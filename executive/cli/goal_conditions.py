@@ -12,6 +12,7 @@ from executive.mission.goal import Area, GoalCondition
 from executive.run.outcome import Outcome, RobotResult
 from executive.tree.compiler import CompiledTree, StepPart
 from plant import referee
+from skills.speak.skill import Speak
 
 
 def verdict_of(
@@ -48,19 +49,23 @@ def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.Goal
         if part.goal is None:
             continue
         below = f"{part.path_id}/"
-        answers = (answer for path, answer in result.answers.items() if f"{path}/".startswith(below))
-        condition = condition_of(part.goal, robot=tree.robot_name, answer=next(answers, None))
+        path = next((path for path in result.answers if f"{path}/".startswith(below)), "")
+        times_s = [finding.t_s for finding in result.findings if finding.path_id == path]
+        condition = condition_of(part.goal, robot=tree.robot_name, answer=result.answers.get(path))
+        condition = replace(condition, answered_s=times_s[-1] if times_s else None)
         found.append(replace(condition, passing=any(later.goal is None for later in parts[n + 1 :])))
     return tuple(found)
 
 
 def _done(tree: CompiledTree, result: RobotResult) -> list[StepPart]:
     """The parts that were done. Of a mission that succeeded, what failed or was not begun was not called for: it was
-    skipped, stands in a branch that was not taken, or something else was done in its place."""
+    skipped, stands in a branch that was not taken, or something else was done in its place. What was only said leaves
+    nothing in the world to judge."""
+    parts = [part for part in tree.parts if part.skill is not Speak]
     if result.outcome is not Outcome.SUCCESS:
-        return list(tree.parts)
+        return parts
     statuses = {path: state.status for path, state in result.states.items()}
-    return [part for part in tree.parts if statuses.get(part.node or part.path_id) is Status.SUCCESS]
+    return [part for part in parts if statuses.get(part.node or part.path_id) is Status.SUCCESS]
 
 
 def _joined(*sentences: str) -> str:

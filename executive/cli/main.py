@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -19,15 +19,37 @@ from executive.cli.mission_run import Finished
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.page_view import PageView, queueing
 from executive.cli.requests import Prepared, prepare
-from executive.cli.run_options import SET, START_OR_UNKNOWN
-from executive.cli.shown import control_for, show_files, show_run
+from executive.cli.run_options import (
+    FAULT,
+    RANDOM_FAULTS,
+    SCENARIO,
+    SET,
+    START_OR_UNKNOWN,
+    TIME_LIMIT,
+    TIME_OF_DAY,
+    time_limit_s,
+    time_of_day,
+)
+from executive.cli.shown import control_for, show_files, show_run, voice_for
 from executive.cli.simulated import run_simulated
 from executive.cli.stack_command import STACK
-from executive.cli.sweep import rows, seed_range, sweep, totals
+from executive.cli.sweep import (
+    COUNTS,
+    condition_rows,
+    condition_totals,
+    conditions,
+    folders,
+    rows,
+    seed_range,
+    sweep,
+    totals,
+)
 from executive.language.questions import QuestionPolicy
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
+from executive.mission.scenario import Scenario
 from executive.record.profile import Profile, lines
+from executive.speech.voice import Voice
 from executive.store.missions import MissionStore
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
@@ -73,7 +95,13 @@ def run(
     stack: STACK = None,
     own_map: OwnMap = None,
     start: START_OR_UNKNOWN = None,
+    fault: FAULT = None,
+    random_faults: RANDOM_FAULTS = 0,
+    scenario: SCENARIO = None,
+    day_time: TIME_OF_DAY = None,
+    time_limit: TIME_LIMIT = None,
     anyway: Anyway = False,
+    aloud: Annotated[bool, typer.Option("--voice", help="Say aloud what the robot says, by espeak-ng.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
     view_for: Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")] = None,
     view_port: Annotated[int, typer.Option(min=0, max=65535, help="The page's port; 0 takes a free one.")] = 0,
@@ -88,12 +116,14 @@ def run(
         later = queueing(prepared, store=kept_in, out=out)
         return PageView(prepared, console, port=view_port, later=later) if wants_page else None
 
-    with refusals():
+    with refusals(), voice_for(aloud) as voice:
         if listen_to is not None:
             say = hear_request(listen_to, file or say, world=world, require_wake=wake is not False, console=console)
         at = None if start is None else Start.of(start)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
         asked = replace(asked, given=given_values(given or ()), start=at, map=own_map)
+        asked = replace(asked, time_of_day=time_of_day(day_time), time_limit_s=time_limit_s(time_limit))
+        asked = _disturbed(asked, fault, random_faults, scenario)
         finished, page = _run_kept(
             asked,
             kept_in,
@@ -103,6 +133,7 @@ def run(
             console=console,
             page=page_of,
             profile=timing,
+            voice=voice,
         )
     if timing is not None:
         for line in lines(timing.table()):
@@ -128,32 +159,60 @@ def evaluate(
     stack: STACK = None,
     own_map: OwnMap = None,
     start: START_OR_UNKNOWN = None,
+    fault: FAULT = None,
+    random_faults: RANDOM_FAULTS = 0,
+    scenario: SCENARIO = None,
+    each_fault: Annotated[
+        bool, typer.Option("--each-fault", help="Without any, then with each fault and scenario alone.")
+    ] = False,
     anyway: Anyway = False,
     out: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("out/evaluate"),
     as_json: AsJson = False,
 ) -> None:
-    """Run a mission at many seeds and count what the trees claim and what the referee saw."""
+    """Run a mission at many seeds and count what the trees claim and what the referee saw.
+
+    Faults and scenarios are all in each run, unless each is to be tried alone.
+    """
     with refusals():
         chosen = seed_range(seeds)
         at = None if start is None else Start.of(start)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, stack=stack, start=at, map=own_map)
         asked = replace(asked, given=given_values(given or ()))
+        asked = _disturbed(asked, fault, random_faults, scenario)
         prepared = _prepared(asked, anyway=anyway)
-        arguments = run_arguments(asked, prepared)
+        tried = [(name, run_arguments(each, prepared)) for name, each in conditions(asked, each=each_fault)]
     console = console_for(as_json)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as bar:
-        task = bar.add_task("seeds", total=len(chosen))
-        reports = sweep(arguments, chosen, jobs=jobs, out=out, done=lambda report: bar.advance(task))
+        task = bar.add_task("runs", total=len(chosen) * len(tried))
+        found = [
+            (name, sweep(arguments, chosen, jobs=jobs, out=folder, done=lambda report: bar.advance(task)))
+            for (name, arguments), folder in zip(tried, folders(out, [name for name, _ in tried]), strict=True)
+        ]
     header = ("seed", "tree", "referee", "collisions", "drops", "sim s", "x real", "message")
-    show_table(console, header, rows(reports))
+    reports = [report for _, each in found for report in each]
+    for name, runs in found:
+        if each_fault:
+            console.print(f"\n{name}", style="bold", markup=False)
+        show_table(console, header, rows(runs))
     result = totals(reports)
-    counts = ", ".join(f"{result[key]} {key.replace('_', ' ')}" for key in _COUNTS)
+    if each_fault:
+        console.print()
+        show_table(console, ("condition", "runs", "tree", "referee", "false claims"), condition_rows(found))
+        result["conditions"] = condition_totals(found)
+    counts = ", ".join(f"{result[key]} {key.replace('_', ' ')}" for key in COUNTS)
     console.print(f"{len(reports)} runs: {counts}")
     if as_json:
         print_json(result)
     if not all(report.achieved for report in reports):
         raise typer.Exit(NOT_ACHIEVED)
+
+
+def _disturbed(
+    asked: Request, faults: Sequence[str] | None, random_faults: int, files: Sequence[Path] | None
+) -> Request:
+    """The request with what is to go wrong and to happen."""
+    return replace(asked, scenario=Scenario(tuple(faults or ()), random_faults), scenario_files=tuple(files or ()))
 
 
 def _prepared(asked: Request, *, anyway: bool) -> Prepared:
@@ -174,6 +233,7 @@ def _run_kept(
     console: Console,
     page: PageOf,
     profile: Profile | None,
+    voice: Voice,
 ) -> tuple[Finished, PageView | None]:
     """Run it, shown, and kept in the store so that another process can take it up."""
     prepared = _prepared(asked, anyway=anyway)
@@ -190,11 +250,15 @@ def _run_kept(
             start = partial(run_simulated, prepared, page=shown, durable=durable, profile=profile)
             talk = None if shown is None else shown.conversation
             finished = show_run(
-                start, prepared, console, control=control, quiet=quiet, whole_tree=whole_tree, conversation=talk
+                start,
+                prepared,
+                console,
+                control=control,
+                quiet=quiet,
+                whole_tree=whole_tree,
+                conversation=talk,
+                voice=voice,
             )
             ended(finished.report)
     show_files(asked.out, console)
     return finished, shown
-
-
-_COUNTS: Final = ("successes", "referee_successes", "false_claims")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,13 @@ from rich.console import Console
 
 from executive.cli.backend import Scene
 from executive.cli.feasibility import refuse_impossible
+from executive.cli.missions_command import shipped_missions
 from executive.cli.replay_command import served, wait
 from executive.cli.requests import Prepared, prepare
 from executive.cli.talk import conversation_of, load_ahead
 from executive.conversation import ReplyKind
 from executive.mission.errors import InputError
+from executive.mission.file.parameters import given_values
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.record.schemas import MAP
@@ -105,11 +108,17 @@ def said(do: Callable[[str], str]) -> Action:
 
 
 def queueing(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], str]:
-    """Keeps a sentence in a store, as `errand queue add` does, for the world and the seed of a request."""
+    """Keeps a sentence in a store, as `errand queue add` does, for the world and the seed of a request.
+
+    The name of a mission, as `errand missions` lists it, may stand in its place, with NAME=VALUE for its parameters.
+    """
     before = prepared.request
 
-    def later(sentence: str) -> str:
-        asked = Request(sentence, world=before.world or before.world_name, seed=before.seed, out=out)
+    def later(text: str) -> str:
+        named, *settings = text.split()
+        asked = Request(text, world=before.world or before.world_name, seed=before.seed, out=out)
+        if named in shipped_missions():
+            asked = replace(asked, sentence=None, file=Path(named), given=given_values(settings))
         prepared = prepare(asked)
         refuse_impossible(prepared)
         request = prepared.request.from_anywhere()

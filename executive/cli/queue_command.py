@@ -1,7 +1,10 @@
-"""`errand queue`: missions kept in a store, to be run one after another."""
+"""`errand queue`: missions kept in a store, to be run one after another, or whenever a trigger fires."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from contextlib import nullcontext
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,11 +14,17 @@ from executive.cli.durable import STORE
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.requests import prepare
 from executive.cli.run_options import SET
+from executive.cli.serve_command import AsJson, Out, Store, serve
 from executive.cli.stack_command import STACK
+from executive.mission.errors import InputError
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
-from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.store.missions import MissionState, MissionStore, StoredMission, utc_now
+from executive.store.standing import StandingMission, StandingMissions
+from executive.store.trigger_source import refuse_missing_source
+from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, local, schedule_of
+from executive.store.wakeup import wake_server
 
 __all__ = ["queue"]
 
@@ -26,10 +35,22 @@ queue = typer.Typer(
     rich_markup_mode=None,
 )
 
-Out = Annotated[Path, typer.Option(help="Folder for logs; each mission gets one of its own in it.")]
-Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
 Number = Annotated[int, typer.Argument(metavar="NUMBER", help="The mission's number, as `errand queue list` shows it.")]
-AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
+At = Annotated[
+    str | None,
+    typer.Option(metavar="TIME", help='Queue it at these times, as in "every weekday 09:00" or "2026-12-01 09:00".'),
+]
+EveryPeriod = Annotated[
+    str | None, typer.Option("--every", metavar="PERIOD", help="Queue it again and again, as in 30m, 2h or 90s.")
+]
+On = Annotated[
+    str | None,
+    typer.Option(metavar="EVENT", help='Queue it on "battery full", "battery 80%", "call NAME" or "topic KIND:TOPIC".'),
+]
+WhenMissed = Annotated[
+    Missed | None,
+    typer.Option(help="What passes while nothing serves, or a mission runs: skip it (default), or queue once for all."),
+]
 
 
 @queue.command()
@@ -50,10 +71,15 @@ def add(
     store: Store = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
     anyway: Annotated[bool, typer.Option("--anyway", help="Queue it although `errand check` would refuse it.")] = False,
+    at: At = None,
+    every: EveryPeriod = None,
+    on: On = None,
+    missed: WhenMissed = None,
     as_json: AsJson = False,
 ) -> None:
-    """Queue a sentence or a mission file, checked."""
+    """Queue a sentence or a mission file, checked; with a trigger, `errand queue serve` queues it each time."""
     with refusals():
+        trigger = _trigger(at, every, on, missed)
         load_stack(stack)
         values = given_values(given or ())
         asked = Request(say, file, world, wake, seed=seed, out=out, record=not no_record, stack=stack, given=values)
@@ -64,10 +90,16 @@ def add(
             refuse_impossible(prepared)
         request = prepared.request.from_anywhere()
         with MissionStore(store or out / STORE) as missions:
-            mission = missions.add(request, queued=True)
-    console_for(as_json).print(f"Mission {mission.id} is queued: {request.name}", markup=False)
+            if trigger is None:
+                mission, standing = missions.add(request, queued=True), {}
+            else:
+                added = StandingMissions(missions).add(request, trigger, missed or Missed.SKIP)
+                mission, standing = missions.mission(added.id), {added.id: added}
+        wake_server(store or out / STORE)
+    said = "is queued" if trigger is None else f"stands, to be queued by `errand queue serve` ({trigger})"
+    console_for(as_json).print(f"Mission {mission.id} {said}: {request.name}", markup=False)
     if as_json:
-        print_json(_told(mission))
+        print_json(_told(mission, standing))
 
 
 @queue.command(name="list")
@@ -75,17 +107,21 @@ def show(out: Out = Path("out"), store: Store = None, as_json: AsJson = False) -
     """Show all missions of the store and how far each is."""
     with refusals(), MissionStore(store or out / STORE, create=False) as missions:
         known = missions.missions()
-    header = ("mission", "state", "name", "world", "seed", "commands", "message")
-    show_table(console_for(as_json), header, map(_row, known))
+        standing = {each.id: each for each in StandingMissions(missions).missions()}
+    header = ("mission", "state", "name", "world", "seed", "commands", "message", "trigger")
+    show_table(console_for(as_json), header, [_row(each, standing) for each in known])
     if as_json:
-        print_json({"missions": [_told(each) for each in known]})
+        print_json({"missions": [_told(each, standing) for each in known]})
 
 
 @queue.command()
 def remove(number: Number, out: Out = Path("out"), store: Store = None) -> None:
-    """Forget a mission."""
-    with refusals(), MissionStore(store or out / STORE, create=False) as missions, missions.claimed():
-        missions.remove(number)
+    """Forget a mission; one that stands can be removed while a server runs."""
+    with refusals(), MissionStore(store or out / STORE, create=False) as missions:
+        stands = missions.mission(number).state is MissionState.STANDING
+        with nullcontext() if stands else missions.claimed():
+            missions.remove(number)
+        wake_server(missions.path)
     console_for(False).print(f"Mission {number} is removed.")
 
 
@@ -109,16 +145,60 @@ def run(
         raise typer.Exit(NOT_ACHIEVED)
 
 
+queue.command()(serve)
+
+
 def _state(mission: StoredMission) -> str:
     return "running or broken off" if mission.state is MissionState.RUNNING else mission.state.value
 
 
-def _row(mission: StoredMission) -> tuple[str, ...]:
+def _row(mission: StoredMission, standing: Mapping[int, StandingMission]) -> tuple[str, ...]:
     asked, commands = mission.request, "\n".join(mission.request.commands)
-    return str(mission.id), _state(mission), asked.name, asked.world_name, str(asked.seed), commands, mission.message
+    trigger = f"{mission.standing}: {mission.why}" if mission.why else ""
+    if (stands := standing.get(mission.id)) is not None:
+        due = _due(stands)
+        timed = isinstance(stands.trigger, Timed)
+        trigger = f"{stands.trigger}{f', next {due:%a %Y-%m-%d %H:%M}' if due else ', over' if timed else ''}"
+    told = (asked.name, asked.world_name, str(asked.seed), commands, mission.message, trigger)
+    return str(mission.id), _state(mission), *told
 
 
-def _told(mission: StoredMission) -> dict[str, Any]:
+def _told(mission: StoredMission, standing: Mapping[int, StandingMission]) -> dict[str, Any]:
     asked = mission.request
-    told = {"mission": mission.id, "state": mission.state.value, "name": asked.name, "world": asked.world_name}
-    return {**told, "seed": asked.seed, "commands": list(asked.commands), "message": mission.message}
+    told: dict[str, Any] = {
+        "mission": mission.id,
+        "state": mission.state.value,
+        "name": asked.name,
+        "world": asked.world_name,
+    }
+    told |= {"seed": asked.seed, "commands": list(asked.commands), "message": mission.message}
+    if (stands := standing.get(mission.id)) is not None:
+        due = _due(stands)
+        told |= {"trigger": str(stands.trigger), "next": None if due is None else due.isoformat()}
+        told |= {} if isinstance(stands.trigger, OnCall | OnTopic) else {"missed": stands.missed.value}
+    return {**told, "standing": mission.standing, "why": mission.why} if mission.why else told
+
+
+def _due(standing: StandingMission) -> datetime | None:
+    """When it is due next, in local time."""
+    due = standing.due_next(utc_now(), None)
+    return None if due is None else local(due, None)
+
+
+def _trigger(at: str | None, every: str | None, on: str | None, missed: Missed | None) -> Trigger | None:
+    """The trigger of the options; None where there is none. Raises InputError."""
+    given: list[Trigger] = [schedule_of(at)] if at is not None else []
+    given += [Every.of(every)] if every is not None else []
+    given += [event_of(on)] if on is not None else []
+    if len(given) > 1:
+        raise InputError("--at, --every and --on are one trigger each", hint="queue the mission once for each of them")
+    trigger = given[0] if given else None
+    if missed is not None and (trigger is None or isinstance(trigger, OnCall | OnTopic)):
+        what = "without a trigger" if trigger is None else f"for '{trigger}'"
+        hint = "leave it out: calls and messages are queued as they come, and only while `errand queue serve` runs"
+        raise InputError(
+            f"--missed says nothing {what}", hint=hint if trigger else "give --at, --every or --on as well"
+        )
+    if isinstance(trigger, OnTopic):
+        refuse_missing_source(trigger.kind)
+    return trigger

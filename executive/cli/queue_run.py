@@ -8,11 +8,12 @@ from typing import Any, Final
 
 from rich.console import Console
 
-from executive.cli.durable import Durable, as_it_was, kept, new_run, next_run, plant_file, same_world
+from executive.cli.durable import Durable, as_it_was, kept, new_run, next_run, plant_file, same_world, take_up
 from executive.cli.requests import Prepared, prepare
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.simulated import run_simulated
 from executive.mission.errors import InputError
+from executive.run.control import Control
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.tree.compiling.builder import slug
 
@@ -28,31 +29,69 @@ def run_queue(missions: MissionStore, console: Console, *, quiet: bool) -> list[
     results: list[dict[str, Any]] = []
     broken = missions.missions(MissionState.RUNNING)
     if broken:
-        what = f"mission {broken[-1].id} ({broken[-1].request.name}) was broken off"
-        raise InputError(what, hint="`errand resume` goes on with it and then with the queue", file=missions.path)
-    while queued := [each for each in missions.missions(MissionState.QUEUED) if each.queued]:
-        results.append(start_of(missions, queued[0], console, quiet=quiet))
+        raise broken_off(missions, broken[-1])
+    while (mission := next_queued(missions)) is not None:
+        results.append(start_of(missions, mission, console, quiet=quiet))
         if results[-1]["outcome"] == MissionState.CANCELLED.value:
             break
     return results
 
 
-def start_of(missions: MissionStore, mission: StoredMission, console: Console, *, quiet: bool) -> dict[str, Any]:
+def broken_off(missions: MissionStore, mission: StoredMission) -> InputError:
+    """Why nothing else is run before a mission that was broken off."""
+    what = f"mission {mission.id} ({mission.request.name}) was broken off"
+    return InputError(what, hint="`errand resume` goes on with it and then with the queue", file=missions.path)
+
+
+def next_queued(missions: MissionStore) -> StoredMission | None:
+    """The mission that is run next; None where nothing is queued."""
+    return next((each for each in missions.missions(MissionState.QUEUED) if each.queued), None)
+
+
+def go_on(
+    missions: MissionStore, mission: StoredMission, console: Console, *, quiet: bool, control: Control | None = None
+) -> dict[str, Any]:
+    """Go on with a mission that was broken off or cancelled; its report with what was done with its past.
+
+    Raises:
+        InputError: as `take_up` and `start_of`.
+    """
+    name = mission.request.name
+    if not missions.has_steps(mission.id):
+        console.print(f"Mission {mission.id} ({name}) had not begun; it begins now.", markup=False)
+        return start_of(missions, mission, console, quiet=quiet, control=control)
+    taken = take_up(missions, mission)
+    console.print(f"Mission {mission.id} ({name}) goes on.", markup=False)
+    prepared = _in_its_folder(mission, taken.prepared)
+    result = run_kept(missions, mission, prepared, taken.durable, console, quiet=quiet, control=control)
+    told = list(taken.recollection.told)
+    console.print("\n  ".join(["What became of its past:", *told]), markup=False)
+    show_files(prepared.request.out, console)
+    return {**result, "resumed": told}
+
+
+def start_of(
+    missions: MissionStore, mission: StoredMission, console: Console, *, quiet: bool, control: Control | None = None
+) -> dict[str, Any]:
     """Run one mission of the store from its beginning; its report.
 
     Raises:
         InputError: its file, its world or the plant's state cannot be used.
     """
-    prepared = prepare(as_it_was(mission, missions.path))
-    asked = mission.request
-    out = asked.out / f"{mission.id:03d}-{slug(asked.name)}" if mission.queued else asked.out
-    prepared = replace(prepared, request=replace(prepared.request, out=out))
+    prepared = _in_its_folder(mission, prepare(as_it_was(mission, missions.path)))
     before = _before(missions, mission) if mission.queued else None
     durable = new_run(missions, mission) if before is None else next_run(missions, mission, before)
-    console.print(f"Mission {mission.id}: {asked.name}", markup=False, style="bold")
-    result = run_kept(missions, mission, prepared, durable, console, quiet=quiet)
-    show_files(out, console)
+    console.print(f"Mission {mission.id}: {mission.request.name}", markup=False, style="bold")
+    result = run_kept(missions, mission, prepared, durable, console, quiet=quiet, control=control)
+    show_files(prepared.request.out, console)
     return result
+
+
+def _in_its_folder(mission: StoredMission, prepared: Prepared) -> Prepared:
+    """With the folder for its files: each mission of a queue has its own."""
+    asked = mission.request
+    out = asked.out / f"{mission.id:03d}-{slug(asked.name)}" if mission.queued else asked.out
+    return replace(prepared, request=replace(prepared.request, out=out))
 
 
 def run_kept(
@@ -63,11 +102,16 @@ def run_kept(
     console: Console,
     *,
     quiet: bool,
+    control: Control | None = None,
 ) -> dict[str, Any]:
-    """Run a mission of the store, shown on the console, and note there how it ended; its report."""
+    """Run a mission of the store, shown on the console, and note there how it ended; its report.
+
+    `control` is one that somebody else has, too.
+    """
+    control = control or control_for(console, quiet=quiet)
     with kept(missions, mission) as ended:
         start = partial(run_simulated, prepared, durable=durable)
-        finished = show_run(start, prepared, console, control=control_for(console, quiet=quiet), quiet=quiet)
+        finished = show_run(start, prepared, console, control=control, quiet=quiet)
         ended(finished.report)
     return {**finished.report.to_json(), "mission": mission.id, "achieved": finished.report.achieved}
 

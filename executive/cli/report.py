@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Final
 
 from rich.markup import escape
+
+from executive.run.findings import Said
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,32 @@ class RefereeReport:
     events: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class ReportedAnswer:
+    """An answer that the mission gave, or was given, when (s), and about which place where that is known.
+
+    `picture` is the number of its picture among those of the run, from 0, where there is one.
+    """
+
+    question: str
+    answer: bool | str | float | None
+    sentence: str
+    t_s: float
+    place: str | None = None
+    picture: int | None = None
+
+
+@dataclass(frozen=True)
+class ReportedObject:
+    """An object that was seen on the way: where (position in the world frame, m), and when last (s)."""
+
+    name: str
+    surface: str | None
+    place: str | None
+    position_W: tuple[float, float, float]
+    t_s: float
+
+
 NOT_JUDGED: Final = RefereeReport(None, "there is no referee", 0, 0)
 VERDICTS: Final[Mapping[bool | None, str]] = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
 
@@ -35,7 +63,8 @@ class RunReport:
     """One run, with the keys that scripts rely on.
 
     Times in seconds; `log` is the event log's path, `work` what was computed, as counters by name. `referee` is None
-    where nobody but the robot saw what happened.
+    where nobody but the robot saw what happened. `answers` has all answers in order, `said` what the robot said,
+    `seen_objects` what it is sure to have seen. `scenario` tells what went wrong and happened by intention.
     """
 
     outcome: str
@@ -51,6 +80,10 @@ class RunReport:
     ticks: int
     log: str
     work: Mapping[str, int] = field(default_factory=dict)
+    answers: tuple[ReportedAnswer, ...] = ()
+    said: tuple[Said, ...] = ()
+    seen_objects: tuple[ReportedObject, ...] = ()
+    scenario: tuple[str, ...] = ()
 
     @property
     def claimed(self) -> bool:
@@ -74,7 +107,11 @@ class RunReport:
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values; the referee's events are for people only."""
-        values = {**asdict(replace(self, work={})), "commands": list(self.commands), "work": dict(self.work)}
+        values = {**asdict(replace(self, work={})), "work": dict(self.work)}
+        lists = {name: list(values[name]) for name in ("commands", "answers", "said", "seen_objects", "scenario")}
+        values = {**values, **lists}
+        if not self.scenario:
+            del values["scenario"]
         if self.referee is not None:
             del values["referee"]["events"]
         return values
@@ -82,9 +119,17 @@ class RunReport:
     @staticmethod
     def from_json(values: Mapping[str, Any]) -> RunReport:
         """A report that another process has printed."""
-        fields = {key: values[key] for key in RunReport.__dataclass_fields__}
+        values = {"scenario": (), **values}
+        own = {each.name: values[each.name] for each in fields(RunReport)}
         referee = None if values["referee"] is None else RefereeReport(**values["referee"])
-        return RunReport(**{**fields, "referee": referee, "commands": tuple(values["commands"])})
+        lists = {
+            "commands": tuple(values["commands"]),
+            "answers": tuple(ReportedAnswer(**each) for each in values["answers"]),
+            "said": tuple(Said(**each) for each in values["said"]),
+            "seen_objects": tuple(_reported_object(each) for each in values["seen_objects"]),
+            "scenario": tuple(values["scenario"]),
+        }
+        return RunReport(**{**own, "referee": referee, **lists})
 
     def lines(self) -> tuple[str, ...]:
         """The two verdicts and the figures, with rich markup."""
@@ -100,12 +145,17 @@ class RunReport:
         return (
             claims,
             f"[bold]The referee saw:[/bold] {verdict}: {escape(self.referee.why)}",
-            f"{_counts(self.referee)}; {figures}",
+            f"{counts_text(self.referee)}; {figures}",
             *(escape(f"  {event}") for event in self.referee.events),
         )
 
 
-def _counts(referee: RefereeReport) -> str:
+def _reported_object(values: Mapping[str, Any]) -> ReportedObject:
+    x_m, y_m, z_m = values["position_W"]
+    return ReportedObject(**{**values, "position_W": (x_m, y_m, z_m)})
+
+
+def counts_text(referee: RefereeReport) -> str:
     """The counts; those with people where there were any."""
     people = f" ({referee.people_hit} with people)" if referee.people_hit else ""
     walked_in = f"{referee.hit_by_people} times somebody walked into the robot" if referee.hit_by_people else ""

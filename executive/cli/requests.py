@@ -155,6 +155,11 @@ def _commanded(request: Request, world: World) -> Mission:
 def _prepared(
     request: Request, mission: Mission, world: World, knowledge: Knowledge, meant: Understanding | None = None
 ) -> Prepared:
+    if request.scenario or request.scenario_files:
+        from executive.cli.scenarios import with_happenings, with_scenario
+
+        request = with_scenario(request, world, knowledge)
+        world = with_happenings(world, request.scenario)
     tree = compile_mission(mission, knowledge=knowledge, registry=usable_skills())
     compiled = _of_tree(replace(request, world_name=world.name, robot=mission.robot_name), tree)
     return Prepared(compiled, mission, world, knowledge, tree, meant)

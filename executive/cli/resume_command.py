@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import typer
-from rich.console import Console
 
-from executive.cli.durable import STORE, take_up
+from executive.cli.durable import STORE
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
-from executive.cli.queue_run import run_kept, run_queue, start_of
-from executive.cli.shown import show_files
+from executive.cli.queue_run import go_on, run_queue
 from executive.mission.errors import InputError, listing
 from executive.store.missions import MissionState, MissionStore, StoredMission
 
@@ -32,7 +30,7 @@ def resume(
     console = console_for(as_json)
     with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
         chosen = _broken_off(missions, mission)
-        results = [_go_on(missions, chosen, console, quiet=quiet)]
+        results = [go_on(missions, chosen, console, quiet=quiet)]
         if chosen.queued:
             results += run_queue(missions, console, quiet=quiet)
     if as_json:
@@ -62,18 +60,3 @@ def _broken_off(missions: MissionStore, number: int | None) -> StoredMission:
             f"mission {number} is {chosen.state.value}", hint=f"name one that is {known}", file=missions.path
         )
     return chosen
-
-
-def _go_on(missions: MissionStore, mission: StoredMission, console: Console, *, quiet: bool) -> dict[str, Any]:
-    """Go on with one mission; its report with what was done with its past."""
-    name = mission.request.name
-    if not missions.has_steps(mission.id):
-        console.print(f"Mission {mission.id} ({name}) had not begun; it begins now.", markup=False)
-        return start_of(missions, mission, console, quiet=quiet)
-    taken = take_up(missions, mission)
-    console.print(f"Mission {mission.id} ({name}) goes on.", markup=False)
-    result = run_kept(missions, mission, taken.prepared, taken.durable, console, quiet=quiet)
-    told = list(taken.recollection.told)
-    console.print("\n  ".join(["What became of its past:", *told]), markup=False)
-    show_files(mission.request.out, console)
-    return {**result, "resumed": told}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,7 +13,17 @@ from typer.core import TyperCommand
 if TYPE_CHECKING:
     from skills.robot import Pose2D
 
-__all__ = ["SET", "START", "START_OR_UNKNOWN", "StartCommand", "joined", "start_pose"]
+__all__ = [
+    "FAULT",
+    "RANDOM_FAULTS",
+    "SCENARIO",
+    "SET",
+    "START",
+    "START_OR_UNKNOWN",
+    "StartCommand",
+    "joined",
+    "start_pose",
+]
 
 _NAME = "--start"
 START = Annotated[
@@ -23,6 +34,24 @@ START_OR_UNKNOWN = Annotated[
     typer.Option(
         _NAME, metavar="X Y YAW", help="Where the robot stands (m, rad); 'unknown': anywhere, and it finds out."
     ),
+]
+FAULT = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault", metavar="WORDS", help='A fault, as in "camera.hand: dropout 5 s at 20 s"; may be repeated.'
+    ),
+]
+SCENARIO = Annotated[
+    list[Path] | None,
+    typer.Option("--scenario", metavar="FILE", help="Faults and events: people walk, doors close, objects are moved."),
+]
+RANDOM_FAULTS = Annotated[int, typer.Option("--random-faults", min=0, max=100, help="So many faults, by the seed.")]
+TIME_OF_DAY = Annotated[
+    str | None, typer.Option("--time-of-day", metavar="HH:MM", help="When the run begins; the time on this machine.")
+]
+TIME_LIMIT = Annotated[
+    str | None,
+    typer.Option("--time-limit", metavar="TIME", help='The run ends after so long: seconds, or "2 h"; 20 min.'),
 ]
 SET = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value for a parameter of the mission file.")
@@ -52,6 +81,29 @@ def _joined(arguments: list[str]) -> Iterator[str]:
         else:
             yield arguments[at]
             at += 1
+
+
+def time_of_day(text: str | None) -> str | None:
+    """The time of day of an option. Raises InputError: it is none."""
+    from executive.mission.errors import InputError
+    from executive.mission.expression import TIME_OF_DAY as PATTERN
+
+    if text is not None and not PATTERN.fullmatch(text):
+        raise InputError(f"--time-of-day {text[:20]}: it is no time of day", hint='write it as "08:30"')
+    return text
+
+
+def time_limit_s(text: str | None) -> float | None:
+    """The seconds of an option. Raises InputError: it is no time span above zero, or more than a week."""
+    from executive.mission.errors import InputError
+    from executive.mission.file.condition_schema import in_seconds
+
+    seconds = None if text is None else in_seconds(text)
+    if seconds is not None and not (isinstance(seconds, float) and 0.0 < seconds <= 604_800.0):
+        raise InputError(
+            f"--time-limit {str(text)[:20]}: it is no time span", hint='write seconds, or "30 min" or "2 h"'
+        )
+    return seconds
 
 
 def start_pose(text: str | None) -> Pose2D | None:

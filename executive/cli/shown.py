@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Final, Protocol
 
 from rich.console import Console
+from rich.text import Text
 
 from executive.cli.durable import STORE
 from executive.cli.live import live_view
@@ -15,16 +18,49 @@ from executive.cli.requests import Prepared
 from executive.cli.talk import conversation_of, load_ahead
 from executive.conversation import Conversation
 from executive.language import load_parser
+from executive.record.event_log import Listener
+from executive.record.schemas import SPEECH
 from executive.run.control import Control
 from executive.run.runner import Observer
-from executive.view.text import to_rich
+from executive.speech.voice import Silence, Voice, queued_voice
+from executive.view.text import printable, to_rich
+
+SILENCE: Final = Silence()
 
 
 class Start(Protocol):
     """Runs a mission to its end."""
 
-    def __call__(self, *, control: Control, observer: Observer | None = None) -> Finished:
+    def __call__(
+        self, *, control: Control, observer: Observer | None = None, listener: Listener | None = None
+    ) -> Finished:
         """Run it."""
+
+
+@contextmanager
+def voice_for(aloud: bool) -> Iterator[Voice]:
+    """The voice of a run, which has said all in the end; silence unless `aloud`. Raises InputError: there is none."""
+    if not aloud:
+        yield SILENCE
+        return
+    voice = queued_voice()
+    try:
+        yield voice
+    finally:
+        voice.close()
+
+
+def speech_heard(console: Console, voice: Voice, *, quiet: bool) -> Listener:
+    """Writes what a robot says on the console, unless `quiet`, and says it with a voice, which must not block."""
+
+    def hear(topic: str, t_s: float, message: Mapping[str, Any]) -> None:
+        if topic == SPEECH:
+            robot, text = (str(message.get(name, "")) for name in ("robot", "text"))
+            if not quiet:
+                console.print(Text(printable(f"{robot}: {text}"), style="bold"))
+            voice.say(text)
+
+    return hear
 
 
 def control_for(console: Console, *, quiet: bool) -> Control:
@@ -42,26 +78,31 @@ def show_run(
     quiet: bool,
     whole_tree: bool = False,
     conversation: Conversation | None = None,
+    voice: Voice = SILENCE,
 ) -> Finished:
     """Run it, shown on the console and controlled from there; `conversation` is one that goes on elsewhere, too.
 
+    What the robot says is written there, and said by the `voice`.
     With `whole_tree` all its nodes are shown in the end.
     """
     for told in prepared.mission.notes:
         console.print(f"{told}.", markup=False)
+    for line in prepared.request.scenario.lines():
+        console.print(f"Scenario: {line}", markup=False)
     for command in prepared.mission.commands:
         console.print(str(command), markup=False)
     talk = conversation or conversation_of(prepared, control)
     talk.begun(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
+    listener = speech_heard(console, voice, quiet=quiet)
     if quiet:
         if conversation is None:
             load_parser().release()  # nobody speaks to the run
-        finished = start(control=control, observer=None if conversation is None else talk.observe)
+        finished = start(control=control, observer=None if conversation is None else talk.observe, listener=listener)
     else:
         with live_view(console, control, say=lambda text: talk.hear(text).text) as observer:
             if control.attended and conversation is None:
                 load_ahead()
-            finished = start(control=control, observer=both(observer, talk.observe))
+            finished = start(control=control, observer=both(observer, talk.observe), listener=listener)
     if whole_tree:
         console.print(to_rich(finished.tree, collapsed=False))
     for line in finished.report.lines():

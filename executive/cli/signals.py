@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 from typing import Final
 
 from executive.run.control import Control
 
-__all__ = ["HUNG_UP", "cancelled_by_signals", "interrupted_by_hang_up"]
+__all__ = ["HUNG_UP", "cancelled_by_signals", "ended_by_signals", "interrupted_by_hang_up"]
 
 _OUTPUTS: Final = (1, 2)
 _REASON: Final = "cancelled by {}"
@@ -22,34 +22,53 @@ HUNG_UP: Final = _REASON.format(signal.SIGHUP.name)
 
 @contextmanager
 def cancelled_by_signals(control: Control) -> Iterator[Control]:
-    """The control, which Ctrl-C, a polite kill and closing the terminal cancel; a second Ctrl-C breaks in at once.
-
-    What is printed after the terminal is closed is dropped. Under `nohup` the run goes on.
-    """
-    asked: list[int] = []
-    terminals = [output for output in _OUTPUTS if os.isatty(output)]
-
-    def on_signal(number: int, _frame: FrameType | None) -> None:
-        if number == signal.SIGHUP:
-            _drop_output(terminals)
-        elif asked:
-            raise KeyboardInterrupt
-        else:
-            asked.append(number)
-        control.cancel(_REASON.format(signal.Signals(number).name))
-
-    if threading.current_thread() is not threading.main_thread():
+    """The control, which Ctrl-C, a polite kill and closing the terminal cancel, as `ended_by_signals` says."""
+    with ended_by_signals(control.cancel):
         yield control
+
+
+@contextmanager
+def ended_by_signals(end: Callable[[str], None]) -> Iterator[None]:
+    """Have `end` called with the reason at Ctrl-C, a polite kill and closing the terminal; of several, the inner first.
+
+    A second Ctrl-C breaks in at once. What is printed after the terminal is closed is dropped. Under `nohup` closing it
+    ends nothing.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
         return
     numbers = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         numbers.append(signal.SIGHUP)
-    before = {number: signal.signal(number, on_signal) for number in numbers}
+    ending = _Ending(end, [output for output in _OUTPUTS if os.isatty(output)])
+    before = {number: signal.signal(number, ending) for number in numbers}
+    ending.outer = next((each for each in before.values() if isinstance(each, _Ending)), None)
     try:
-        yield control
+        yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+class _Ending:
+    """The handler of these signals."""
+
+    def __init__(self, end: Callable[[str], None], terminals: Sequence[int]) -> None:
+        self._end, self._terminals = end, terminals
+        self._asked = False
+        self.outer: _Ending | None = None
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """A signal has come."""
+        if number == signal.SIGHUP:
+            _drop_output(self._terminals)
+        elif self._asked:
+            raise KeyboardInterrupt
+        else:
+            self._asked = True
+        self._end(_REASON.format(signal.Signals(number).name))
+        if self.outer is not None:
+            self.outer(number, frame)
 
 
 @contextmanager

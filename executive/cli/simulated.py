@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from executive.cli.report import RefereeReport
 from executive.cli.requests import Prepared
 from executive.mission.request import Start
 from executive.mission.stack_file import load_stack
+from executive.record.event_log import Listener
 from executive.record.profile import Profile
 from executive.run.control import Control
 from executive.run.outcome import RobotResult
@@ -63,6 +64,10 @@ class SimulatedBackend:
         durable.journal.keep_world = self._simulation.keep_in(durable.plant, label=durable.label)
         return replace(entry, journal=durable.journal)
 
+    def happened(self) -> Sequence[tuple[float, str]]:
+        """What doors did, and what somebody moved."""
+        return self._simulation.clock.happened
+
     def work(self) -> Mapping[str, int]:
         """The plant's counters."""
         counts: Mapping[str, int] = self._simulation.work()
@@ -104,6 +109,7 @@ def run_simulated(
     page: PageView | None = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
+    listener: Listener | None = None,
 ) -> Finished:
     """Run a request in the plant, as `run_request` does. Raises InputError: the world cannot be used."""
     request = prepared.request
@@ -116,5 +122,12 @@ def run_simulated(
         start=request.start,
     )
     return run_request(
-        prepared, backend, observer=observer, control=control, page=page, durable=durable, profile=profile
+        prepared,
+        backend,
+        observer=observer,
+        control=control,
+        page=page,
+        durable=durable,
+        profile=profile,
+        listener=listener,
     )

@@ -7,11 +7,20 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from executive.cli.report import VERDICTS, RefereeReport, RunReport
 from executive.mission.errors import InputError
+from executive.mission.request import Request
+from executive.mission.scenario import NO_SCENARIO, Scenario
+from executive.tree.compiling.builder import slug
+
+COUNTS: Final = ("successes", "referee_successes", "false_claims")
+_MOST_LETTERS: Final = 60
+Found = tuple[str, Sequence[RunReport]]
+"""A condition's name, and its reports."""
 
 
 def seed_range(text: str) -> tuple[int, ...]:
@@ -32,6 +41,31 @@ def seed_range(text: str) -> tuple[int, ...]:
 def _span(part: str) -> range:
     first, dash, last = part.partition("-")
     return range(int(first), int(last if dash else first) + 1)
+
+
+def conditions(asked: Request, *, each: bool) -> list[tuple[str, Request]]:
+    """The request under each condition by name: with all its faults and scenarios, or without, and with `each` alone.
+
+    Raises InputError: there are none to try alone.
+    """
+    if not each:
+        return [("", asked)]
+    scenario = asked.scenario
+    plain = replace(asked, scenario=NO_SCENARIO, scenario_files=())
+    alone = [(words, replace(plain, scenario=Scenario((words,)))) for words in scenario.faults]
+    alone += [(str(path), replace(plain, scenario_files=(path,))) for path in asked.scenario_files]
+    if scenario.random:
+        alone.append((f"{scenario.random} random faults", replace(plain, scenario=Scenario(random=scenario.random))))
+    if not alone:
+        raise InputError("there is no fault to try alone", hint="give some by --fault, --random-faults or --scenario")
+    return [("no fault", plain), *alone]
+
+
+def folders(out: Path, names: Sequence[str]) -> list[Path]:
+    """Where the logs under each condition go: a folder of its own in `out`, where there are several."""
+    if len(names) == 1:
+        return [out]
+    return [out / f"{number}-{slug(name)}"[:_MOST_LETTERS] for number, name in enumerate(names)]
 
 
 def sweep(
@@ -91,6 +125,20 @@ def totals(reports: Sequence[RunReport]) -> dict[str, Any]:
         "referee_successes": sum(report.seen.success is True for report in reports),
         "false_claims": sum(report.false_claim for report in reports),
     }
+
+
+def condition_totals(found: Sequence[Found]) -> list[dict[str, Any]]:
+    """For each condition its name, how many runs, and the counts."""
+    return [
+        {"condition": name, "runs": len(reports), **{key: totals(reports)[key] for key in COUNTS}}
+        for name, reports in found
+    ]
+
+
+def condition_rows(found: Sequence[Found]) -> Iterator[tuple[str, ...]]:
+    """The table of conditions, one row for each."""
+    for each in condition_totals(found):
+        yield tuple(str(each[key]) for key in ("condition", "runs", *COUNTS))
 
 
 def rows(reports: Sequence[RunReport]) -> Iterator[tuple[str, ...]]:

@@ -83,7 +83,7 @@ class AllOf:
     parts: tuple[Condition, ...]
 
     def __str__(self) -> str:
-        return " and ".join(f"({part})" for part in self.parts)
+        return " and ".join(map(_bracketed, self.parts))
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class AnyOf:
     parts: tuple[Condition, ...]
 
     def __str__(self) -> str:
-        return " or ".join(f"({part})" for part in self.parts)
+        return " or ".join(map(_bracketed, self.parts))
 
 
 @dataclass(frozen=True)
@@ -103,10 +103,22 @@ class Not:
     part: Condition
 
     def __str__(self) -> str:
+        match self.part:
+            case Look():
+                return f"no {self.part}"
+            case ValueIs(expression) if str(expression).isidentifier():
+                return f"not {expression}"
         return f"not ({self.part})"
 
 
 Condition = ValueIs | Look | DoorOpen | ButtonPressed | AllOf | AnyOf | Not
+
+
+def _bracketed(part: Condition) -> str:
+    """A condition within others, in brackets where it could be misread."""
+    text = str(part)
+    plain = isinstance(part, Look | DoorOpen | ButtonPressed | Not) or not {"and", "or", "if"} & set(text.split())
+    return text if plain else f"({text})"
 
 
 def parts_of(condition: Condition) -> Iterator[ValueIs | Look | DoorOpen | ButtonPressed]:

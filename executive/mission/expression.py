@@ -262,7 +262,7 @@ def _comparison(node: ast.Compare, kinds: list[Kind], ops: list[ast.cmpop]) -> N
     sides = (node.left, *node.comparators)
     if any(isinstance(each, ast.Name) and each.id == CLOCK for each in sides):
         for each in sides:
-            if isinstance(each, ast.Constant) and not _TIME.fullmatch(f"{each.value!s}"):
+            if isinstance(each, ast.Constant) and not TIME_OF_DAY.fullmatch(f"{each.value!s}"):
                 raise ExpressionError(f"{each.value!r} is no time of day", 'write it as "08:30"')
 
 
@@ -334,7 +334,7 @@ def _checked(value: Any) -> Value:
 
 
 CLOCK: Final = "clock"
-_TIME: Final = re.compile(r"([01]\d|2[0-3]):[0-5]\d")
+TIME_OF_DAY: Final = re.compile(r"([01]\d|2[0-3]):[0-5]\d")
 _HINT: Final = "write it as in 'count + 1', 'battery < 0.3 and not holding' or 'drink == \"tea\"'"
 _CONSTANTS: Final[Mapping[str, bool]] = {"true": True, "false": False}
 _ARITHMETIC: Final[Mapping[type[ast.operator], Callable[[Any, Any], Any]]] = {

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import shapely
 
-__all__ = ["Point", "distance_m", "inside"]
+__all__ = ["Point", "Side", "distance_m", "fits", "inside", "nearest_side"]
 
 Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Side:
+    """A side of an outline, and how far (m) something is off it."""
+
+    ends: tuple[Point, Point]
+    off_m: float
 
 
 def inside(polygon: Sequence[Point], point: Point) -> bool:
@@ -20,6 +30,27 @@ def inside(polygon: Sequence[Point], point: Point) -> bool:
 def distance_m(polygon: Sequence[Point], point: Point) -> float:
     """How far (x, y) lies outside the outline; 0 within it."""
     return float(shapely.distance(_outline(tuple(polygon)), shapely.Point(point)))
+
+
+def fits(outline: Sequence[Point], polygon: Sequence[Point], taken: Iterable[Sequence[Point]]) -> bool:
+    """Whether one outline lies within another, and meets none of those that are taken."""
+    body = shapely.Polygon(outline)
+    return bool(shapely.Polygon(polygon).covers(body)) and not any(body.intersects(shapely.Polygon(t)) for t in taken)
+
+
+def nearest_side(polygon: Sequence[Point], middle: Point, length_m: float) -> Side:
+    """The side of an outline along which a line of that length with that middle lies best: its ends are nearest."""
+    ends = zip(polygon, (*polygon[1:], polygon[0]), strict=True)
+    return min((Side(pair, _ends_off_m(pair, middle, length_m)) for pair in ends), key=lambda side: side.off_m)
+
+
+def _ends_off_m(side: tuple[Point, Point], middle: Point, length_m: float) -> float:
+    """How far the ends of a line are from a side to which it is parallel, together."""
+    (x0, y0), (x1, y1) = side
+    way_m = max(math.dist(*side), 1e-9)
+    dx, dy = (0.5 * length_m * (b - a) / way_m for a, b in ((x0, x1), (y0, y1)))
+    ends = (middle[0] - dx, middle[1] - dy), (middle[0] + dx, middle[1] + dy)
+    return sum(float(shapely.distance(shapely.LineString(side), shapely.Point(end))) for end in ends)
 
 
 @functools.lru_cache(maxsize=256)

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from executive.language.questions import QuestionPolicy
 from executive.mission.errors import InputError
+from executive.mission.scenario import NO_SCENARIO, Scenario
 from skills.robot import Pose2D
 
 __all__ = ["Request", "Start"]
@@ -52,10 +53,14 @@ class Request:
     decides); `answers` are to the questions that it leaves open, in their order, and `questions` says what becomes of
     further ones. `given` are values for a file's parameters; the robot stands at `start`, where the world's own is not
     meant. `out` is the folder for the run's files, `stack` the file that says what the robot uses, `map` the
-    folder of the map that it has in place of the world's own.
+    folder of the map that it has in place of the world's own. `scenario` is what goes wrong and happens meanwhile, and
+    `scenario_files` hold more of it.
 
-    What stands below `start` is filled once it is understood. Then another process can take it up: a sentence has the
-    answers in their places, and `text` is that of the file.
+    The run begins at `time_of_day` ("14:30"; None: what it is) and is ended after `time_limit_s` (None: as usual).
+
+    What stands below `time_limit_s` is filled once it is understood. Then another process can take it up: a sentence
+    has the answers in their places, `text` is that of the file, and `scenario` holds all that its files say and the
+    seed draws.
     """
 
     sentence: str | None = None
@@ -70,7 +75,11 @@ class Request:
     stack: Path | None = None
     map: Path | None = None
     start: Start | None = None
+    scenario: Scenario = NO_SCENARIO
+    scenario_files: tuple[Path, ...] = ()
     given: Mapping[str, Any] = field(default_factory=dict)
+    time_of_day: str | None = None
+    time_limit_s: float | None = None
     name: str = ""
     world_name: str = ""
     robot: str = ""

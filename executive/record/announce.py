@@ -19,11 +19,19 @@ PACKAGES = ("spot-errand", "drake", "py-trees", "numpy")
 
 
 def announce(
-    publish: Publish, clock: Clock, tree: CompiledTree, knowledge: Knowledge, *, world: str, seed: int
+    publish: Publish,
+    clock: Clock,
+    tree: CompiledTree,
+    knowledge: Knowledge,
+    *,
+    world: str,
+    seed: int,
+    scenario: Sequence[str] = (),
 ) -> None:
-    """Write the run's facts, then one message for each command."""
+    """Write the run's facts, then one message for each command. `scenario` tells what goes wrong and happens in it."""
     texts = [str(command) for command in tree.commands]
-    publish(RUN, {"world": world, "seed": seed, "commands": texts, "versions": versions(PACKAGES)})
+    facts = {"world": world, "seed": seed, "commands": texts, "versions": versions(PACKAGES)}
+    publish(RUN, {**facts, "scenario": list(scenario)} if scenario else facts)
     messages = task_messages(
         tree.commands,
         stamp=clock.now(),

@@ -9,7 +9,7 @@ from typing import Any, Final
 from executive.record.history import logged_activity, logged_state
 from executive.record.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
 from executive.record.reader import Event
-from executive.record.schemas import ACTIVITY, CONTROL, ERRORS, OUTCOME, RUN, TRANSITIONS, TREE, WALL
+from executive.record.schemas import ACTIVITY, CONTROL, ERRORS, OUTCOME, RUN, SPEECH, TRANSITIONS, TREE, WALL
 from executive.tree.snapshot import NodeState
 
 
@@ -64,7 +64,8 @@ def _transition(event: Event) -> Entry:
 
 def _run(data: Mapping[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in data.get("versions", {}).items())
-    return f"world {data.get('world')}, seed {data.get('seed')}; {versions}"
+    scenario = "".join(f"; {line}" for line in data.get("scenario", ()))
+    return f"world {data.get('world')}, seed {data.get('seed')}; {versions}{scenario}"
 
 
 def _outcome(data: Mapping[str, Any]) -> str:
@@ -94,6 +95,7 @@ def _ticks(data: Mapping[str, Any]) -> str:
 _TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
     RUN: _run,
     OUTCOME: _outcome,
+    SPEECH: lambda data: f'{data.get("robot")} says: "{data.get("text")}"',
     CONTROL: lambda data: f"{data.get('what')}: {data.get('message')}",
     DETECT_TOPIC: lambda data: f"look for {', '.join(data.get('class_name', ()))}",
     DESTINATION_TOPIC: _seen,

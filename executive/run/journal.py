@@ -16,7 +16,7 @@ class TickNote:
     """One tick: what changed in the tree, all values on the blackboard, where the robot believes to be.
 
     `pose` is X_WB, given with changes and once a second while the robot is localised, else None; `checkpoints` are
-    those of the running skills by path id.
+    those of the running skills by path id. `charge` is the battery's (0 to 1), given as often as the pose.
     """
 
     now_s: float
@@ -24,6 +24,7 @@ class TickNote:
     board: Mapping[str, Any]
     pose: Pose2D | None
     checkpoints: Mapping[str, Mapping[str, Any]]
+    charge: float | None = None
 
 
 class Journal(Protocol):

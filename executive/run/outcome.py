@@ -6,6 +6,7 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from executive.run.findings import Finding, Said
 from executive.tree.compiler import CompiledTree
 from executive.tree.snapshot import Snapshot
 from skills.api import Cause
@@ -25,6 +26,7 @@ class Outcome(enum.Enum):
 class RobotResult:
     """How one robot's mission ended: its answers to status checks by path id, and the last state of its tree.
 
+    `answers` has the last answer of each node, `findings` all answers in order, and `said` what the robot said.
     `preempting` are the results of the missions that came in between, in the order of their ends.
     """
 
@@ -36,6 +38,8 @@ class RobotResult:
     states: Snapshot
     mission: str = ""
     preempting: tuple[RobotResult, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    said: tuple[Said, ...] = ()
 
 
 @dataclass(frozen=True)

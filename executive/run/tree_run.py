@@ -8,14 +8,17 @@ from dataclasses import dataclass, replace
 
 from py_trees.common import Status
 
+from executive.mission.goal import GoalKind
 from executive.record.profile import Profile
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
+from executive.run.findings import Findings, claim, told
 from executive.run.journal import Journal, TickNote
 from executive.run.outcome import Outcome, RobotResult
 from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.context import Endings, RunContext
 from executive.tree.behaviours.explained import Explained, message_of
 from executive.tree.behaviours.gate import Gate
+from executive.tree.behaviours.policies import Skip
 from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
 from executive.tree.compiler import CompiledTree
@@ -44,7 +47,9 @@ class TreeRun:
         self, tree: CompiledTree, context: RunContext, journal: Journal | None = None, profile: Profile | None = None
     ) -> None:
         self.tree = tree
-        self.context = context = replace(context, endings=Endings())
+        names = tree.robot_name, tree.mission_name
+        self._findings = Findings(context.publish, context.clock, context.board, *names)
+        self.context = context = replace(context, publish=self._findings, endings=Endings())
         self.journal = journal
         self.root = tree.build(context)
         self._ended_early = self._suspended = False
@@ -167,8 +172,23 @@ class TreeRun:
             for node in self._observed.nodes
             if isinstance(node, Answer) and node.answer is not None
         }
+        findings, said = self._findings.findings, self._findings.said
+        if findings and outcome is Outcome.SUCCESS:
+            message = claim("" if self._tells_nothing_more() else message, findings, self._skipped())
+        elif findings and outcome is Outcome.FAILURE:
+            message = f"{message} (found out: {told(findings)})"
         name, mission = self.tree.robot_name, self.tree.mission_name
-        return RobotResult(name, outcome, cause, message, answers, self.states, mission, preempting)
+        return RobotResult(name, outcome, cause, message, answers, self.states, mission, preempting, findings, said)
+
+    def _tells_nothing_more(self) -> bool:
+        """Whether the last sentence of a mission that gave answers is one of them, or merely where the robot stands."""
+        last = self.tree.parts[-1] if self.tree.parts else None
+        return last is None or last.goal is None or last.goal.kind in (GoalKind.WENT, GoalKind.ANSWERED)
+
+    def _skipped(self) -> Sequence[str]:
+        """What was skipped, and why."""
+        nodes = (node for node in self._observed.nodes if isinstance(node, Skip) and node.status is Status.SUCCESS)
+        return [f"{node.step} ({node.skipped})" for node in nodes if node.skipped is not None]
 
     def _set_gates(self, breakpoints: frozenset[str]) -> None:
         for node in self._observed.nodes:
@@ -183,10 +203,11 @@ class TreeRun:
         context = self.context
         running = (leaf for leaf in self._leaves if leaf.status is Status.RUNNING)
         checkpoints = {leaf.path_id: leaf.checkpoint for leaf in running if leaf.checkpoint}
-        now_s, pose = context.clock.now(), None
+        now_s, pose, charge = context.clock.now(), None, None
         if changes or now_s >= self._pose_due_s:
             self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.known_pose()
-        return TickNote(now_s, changes, context.board.values(), pose, checkpoints)
+            charge = context.robot.battery().charge
+        return TickNote(now_s, changes, context.board.values(), pose, checkpoints, charge)
 
     def _transition(self, change: Change) -> dict[str, object]:
         after = change.after

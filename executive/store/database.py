@@ -10,7 +10,7 @@ from typing import Final
 
 from executive.mission.errors import InputError, disk_is_full
 
-VERSION: Final = 4
+VERSION: Final = 5
 APPLICATION_ID: Final = 0x45525244  # "ERRD"
 BUSY_S: Final = 2.0
 _DAMAGED: Final = "move it away (its missions are lost), or name another by --store"
@@ -58,6 +58,34 @@ CREATE TABLE value (
     PRIMARY KEY (mission, key)
 );
 """
+_TRIGGERS: Final = """
+CREATE TABLE standing (
+    mission INTEGER PRIMARY KEY REFERENCES mission (id) ON DELETE CASCADE,
+    trigger TEXT NOT NULL,
+    missed TEXT NOT NULL,
+    anchor TEXT NOT NULL,
+    since TEXT NOT NULL
+);
+CREATE TABLE origin (
+    mission INTEGER PRIMARY KEY REFERENCES mission (id) ON DELETE CASCADE,
+    standing INTEGER NOT NULL,
+    why TEXT NOT NULL
+);
+CREATE TABLE battery (
+    mission INTEGER PRIMARY KEY REFERENCES mission (id) ON DELETE CASCADE,
+    lowest REAL NOT NULL,
+    last REAL NOT NULL,
+    ended TEXT
+);
+"""
+_SCENARIOS_AND_TIMES: Final = """
+ALTER TABLE mission ADD COLUMN scenario TEXT;
+ALTER TABLE mission ADD COLUMN time_of_day TEXT;
+ALTER TABLE mission ADD COLUMN time_limit_s REAL;
+"""
+_OLDEST: Final = 4
+_ADDED: Final = {5: _TRIGGERS + _SCENARIOS_AND_TIMES}
+"""What each version has added to the one before; `_OLDEST` is `_SCHEMA`."""
 
 
 def connect(path: Path, *, create: bool) -> sqlite3.Connection:
@@ -82,24 +110,31 @@ def connect(path: Path, *, create: bool) -> sqlite3.Connection:
 
 
 def _prepare(connection: sqlite3.Connection, path: Path) -> None:
-    """Set the modes, check whose file it is, and make the tables where there are none."""
+    """Set the modes, check whose file it is, and make the tables that it lacks."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     if tables and application != APPLICATION_ID:
         raise InputError("it is a database, but no store of missions", hint="name another file by --store", file=path)
-    if tables and version != VERSION:
+    if tables and not _OLDEST <= version <= VERSION:
         hint = "finish its missions with the version that wrote it, or name another file by --store"
         raise InputError(f"the store has version {version}, and this errand reads {VERSION}", hint=hint, file=path)
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = NORMAL")
     connection.execute("PRAGMA foreign_keys = ON")
-    if not tables:
+    if version != VERSION:
         with transaction(connection):
-            for statement in filter(str.strip, _SCHEMA.split(";")):
-                connection.execute(statement)
-            connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-            connection.execute(f"PRAGMA user_version = {VERSION}")
+            _migrate(connection)
+
+
+def _migrate(connection: sqlite3.Connection) -> None:
+    """Make the tables that are not there yet; another process may just have done so."""
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    added = [_ADDED[number] for number in range(max(version, _OLDEST) + 1, VERSION + 1)]
+    for statement in filter(str.strip, ";".join([*([] if version else [_SCHEMA]), *added]).split(";")):
+        connection.execute(statement)
+    connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+    connection.execute(f"PRAGMA user_version = {VERSION}")
 
 
 @contextmanager

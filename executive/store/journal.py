@@ -23,6 +23,10 @@ MOVED_M: Final = 0.02
 TURNED_RAD: Final = 0.02
 _PUT_STEP: Final = "INSERT OR REPLACE INTO step VALUES (?, ?, ?, ?, ?, ?, ?)"
 _PUT_VALUE: Final = "INSERT OR REPLACE INTO value VALUES (?, ?, ?)"
+_PUT_CHARGE: Final = """
+INSERT INTO battery (mission, lowest, last) VALUES (?, ?, ?)
+ON CONFLICT (mission) DO UPDATE SET lowest = min(lowest, excluded.lowest), last = excluded.last, ended = NULL
+"""
 _REPLACED: Final = ("name", "commands", "fingerprint", "sentence", "file", "text")
 _REPLACE: Final = f"UPDATE mission SET {', '.join(f'{name} = :{name}' for name in _REPLACED)} WHERE id = :id"
 
@@ -42,6 +46,7 @@ class StoreJournal:
         self._values: dict[str, str] = {}
         self._checkpoints: dict[str, str] = {}
         self._pose: Pose2D | None = None
+        self._charges: tuple[float, float] | None = None  # the lowest so far, and the last
         self._recollection: Recollection | None = None
         self._request_of: Callable[[CompiledTree], Request] | None = None
         self.keep_world: Callable[[], None] = _no_world
@@ -78,6 +83,7 @@ class StoreJournal:
         """Keep what a tick brought."""
         self._take_steps(note)
         self._take_values(note.board)
+        self._take_charge(note.charge)
         news = bool(self._steps or self._values)
         if news:
             self.keep_world()
@@ -110,6 +116,10 @@ class StoreJournal:
             except TypeError as error:
                 self._trouble(f"'{key}': {error}")
 
+    def _take_charge(self, charge: float | None) -> None:
+        if charge is not None:
+            self._charges = (charge if self._charges is None else min(self._charges[0], charge), charge)
+
     def _write(self, note: TickNote) -> None:
         pose = note.pose or self._pose
         text = None if pose is None else json.dumps((pose.x_m, pose.y_m, pose.yaw_rad))
@@ -120,6 +130,7 @@ class StoreJournal:
                 run("DELETE FROM step WHERE mission = ? AND path_id = ?", [(self._mission, path) for path in dropped])
                 run(_PUT_STEP, self._steps.values())
                 run(_PUT_VALUE, [(self._mission, key, value) for key, value in self._values.items()])
+                run(_PUT_CHARGE, [] if self._charges is None else [(self._mission, *self._charges)])
                 self._connection.execute(
                     "UPDATE mission SET clock_s = ?, pose = coalesce(?, pose) WHERE id = ?",
                     (note.now_s, text, self._mission),

@@ -7,12 +7,13 @@ import fcntl
 import json
 import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import TextIO
+from typing import Final, TextIO
 
 from py_trees.common import Status
 
@@ -25,12 +26,21 @@ from executive.store.values import from_text
 from skills.api import Cause
 from skills.robot import Pose2D
 
-__all__ = ["MissionState", "MissionStore", "StoredMission"]
+__all__ = ["MissionState", "MissionStore", "StoredMission", "insert", "utc_now"]
+
+
+def utc_now() -> datetime:
+    """The wall's clock, in UTC."""
+    return datetime.now(UTC)
 
 
 class MissionState(enum.Enum):
-    """How far a mission is. RUNNING while no process works on it means: broken off, `errand resume` goes on."""
+    """How far a mission is. RUNNING while no process works on it means: broken off, `errand resume` goes on.
 
+    A STANDING one is never run itself: each time its trigger fires, a queued copy of it is added.
+    """
+
+    STANDING = "standing"
     QUEUED = "queued"
     RUNNING = "running"
     SUCCESS = "success"
@@ -41,7 +51,10 @@ class MissionState(enum.Enum):
 
 @dataclass(frozen=True)
 class StoredMission:
-    """A mission in the store. `starts` counts how often it was started; `clock_s` and `pose` are the last noted."""
+    """A mission in the store. `starts` counts how often it was started; `clock_s` and `pose` are the last noted.
+
+    `standing` is the number of the standing mission of which it is a copy, `why` what had that fire.
+    """
 
     id: int
     state: MissionState
@@ -51,14 +64,16 @@ class StoredMission:
     message: str
     clock_s: float | None
     pose: Pose2D | None
+    standing: int | None = None
+    why: str = ""
 
 
 class MissionStore:
     """One store file. Use it as a context manager, or close it."""
 
-    def __init__(self, path: Path, *, create: bool = True) -> None:
-        """Open it. Raises InputError: there is none, it is locked, damaged, or of another version."""
-        self.path = path
+    def __init__(self, path: Path, *, create: bool = True, now: Callable[[], datetime] = utc_now) -> None:
+        """Open it; `now` is the wall's clock. Raises InputError: there is none, it is locked, damaged, or too new."""
+        self.path, self.now = path, now
         self._connection = connect(path, create=create)
 
     def __enter__(self) -> MissionStore:
@@ -73,15 +88,13 @@ class MissionStore:
 
     def add(self, request: Request, *, queued: bool) -> StoredMission:
         """Keep a mission that is still to be run, its request understood."""
-        values = {**row_of(request), "queued": queued, "state": "queued"}
-        names, marks = ", ".join(values), ", ".join(f":{name}" for name in values)
-        with self._writing():
-            cursor = self._connection.execute(f"INSERT INTO mission ({names}) VALUES ({marks})", values)
-        return self.mission(cursor.lastrowid or 0)
+        with self.writing() as connection:
+            number = insert(connection, "mission", {**row_of(request), "queued": queued, "state": "queued"})
+        return self.mission(number)
 
     def mission(self, number: int) -> StoredMission:
         """The mission of this number. Raises InputError when there is none."""
-        rows = self._rows("SELECT * FROM mission WHERE id = ?", number)
+        rows = self.rows(f"{_MISSIONS} WHERE id = ?", number)
         if not rows:
             known = [str(mission.id) for mission in self.missions()]
             hint = f"known are {listing(known)}" if known else "the store is empty; queue one first"
@@ -90,39 +103,38 @@ class MissionStore:
 
     def missions(self, *states: MissionState) -> tuple[StoredMission, ...]:
         """All missions in the order in which they came; only those in some states where given."""
-        found = map(_mission, self._rows("SELECT * FROM mission ORDER BY id"))
+        found = map(_mission, self.rows(f"{_MISSIONS} ORDER BY id"))
         return tuple(mission for mission in found if not states or mission.state in states)
 
     def remove(self, number: int) -> None:
         """Forget a mission. Raises InputError when there is none."""
         self.mission(number)
-        with self._writing():
-            self._connection.execute("DELETE FROM mission WHERE id = ?", (number,))
+        with self.writing() as connection:
+            connection.execute("DELETE FROM mission WHERE id = ?", (number,))
 
     def begin(self, number: int) -> None:
         """The mission is started, or started again."""
-        with self._writing():
-            self._connection.execute(
-                "UPDATE mission SET state = 'running', starts = starts + 1 WHERE id = ?", (number,)
-            )
+        with self.writing() as connection:
+            connection.execute("UPDATE mission SET state = 'running', starts = starts + 1 WHERE id = ?", (number,))
 
     def finish(self, number: int, state: MissionState, message: str) -> None:
         """The mission has come to an end."""
-        with self._writing():
+        with self.writing() as connection:
             ended = (state.value, message, number)
-            self._connection.execute("UPDATE mission SET state = ?, message = ? WHERE id = ?", ended)
+            connection.execute("UPDATE mission SET state = ?, message = ? WHERE id = ?", ended)
+            connection.execute("UPDATE battery SET ended = ? WHERE mission = ?", (self.now().isoformat(), number))
 
     def has_steps(self, number: int) -> bool:
         """Whether anything was done of a mission."""
-        return bool(self._rows("SELECT 1 FROM step WHERE mission = ? LIMIT 1", number))
+        return bool(self.rows("SELECT 1 FROM step WHERE mission = ? LIMIT 1", number))
 
     def memory(self, number: int) -> Memory:
         """All that is known of how far a mission has come, once the skills are loaded that it was done with.
 
         Raises InputError: it cannot be read.
         """
-        steps = self._rows("SELECT * FROM step WHERE mission = ?", number)
-        values = self._rows("SELECT key, text FROM value WHERE mission = ?", number)
+        steps = self.rows("SELECT * FROM step WHERE mission = ?", number)
+        values = self.rows("SELECT key, text FROM value WHERE mission = ?", number)
         try:
             board = {row["key"]: from_text(row["text"]) for row in values}
             return Memory({row["path_id"]: _step(row) for row in steps}, board, self.mission(number).pose)
@@ -159,15 +171,27 @@ class MissionStore:
         file.flush()
 
     @contextmanager
-    def _writing(self) -> Iterator[None]:
+    def writing(self) -> Iterator[sqlite3.Connection]:
+        """The database, for changes of which all are kept or none. Raises InputError: it cannot be written."""
         with told(self.path), transaction(self._connection):
-            yield
+            yield self._connection
 
-    def _rows(self, query: str, *values: object) -> list[sqlite3.Row]:
+    def rows(self, query: str, *values: object) -> list[sqlite3.Row]:
+        """What a query finds. Raises InputError: the database cannot be read."""
         with told(self.path):
             cursor = self._connection.cursor()
             cursor.row_factory = sqlite3.Row
             return cursor.execute(query, values).fetchall()
+
+
+_MISSIONS: Final = "SELECT mission.*, standing, why FROM mission LEFT JOIN origin ON origin.mission = id"
+
+
+def insert(connection: sqlite3.Connection, table: str, values: Mapping[str, object]) -> int:
+    """Add a row of these columns; its number."""
+    names, marks = ", ".join(values), ", ".join(f":{name}" for name in values)
+    cursor = connection.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", dict(values))
+    return cursor.lastrowid or 0
 
 
 def _mission(row: sqlite3.Row) -> StoredMission:
@@ -180,6 +204,8 @@ def _mission(row: sqlite3.Row) -> StoredMission:
         message=row["message"],
         clock_s=row["clock_s"],
         pose=None if row["pose"] is None else Pose2D(*json.loads(row["pose"])),
+        standing=row["standing"],
+        why=row["why"] or "",
     )
 
 

@@ -11,6 +11,7 @@ from typing import Any, Final
 from py_trees.common import Status
 
 from executive.mission.request import Request, Start
+from executive.mission.scenario import NO_SCENARIO, Scenario
 from skills.api import Cause
 from skills.robot import Pose2D
 
@@ -42,7 +43,10 @@ class Memory:
 
 _WORLD: Final = -1
 """The world decides whether the robot's name must be said; the column takes no NULL."""
-_AS_THEY_ARE: Final = ("name", "world_name", "robot", "seed", "fingerprint", "sentence", "text", "world")
+_AS_THEY_ARE: Final = (
+    *("name", "world_name", "robot", "seed", "fingerprint", "sentence", "text", "world"),
+    *("time_of_day", "time_limit_s"),
+)
 
 
 def row_of(request: Request) -> dict[str, Any]:
@@ -51,7 +55,8 @@ def row_of(request: Request) -> dict[str, Any]:
     paths = {name: None if (path := getattr(request, name)) is None else str(path) for name in ("file", "stack", "map")}
     flags = {"require_wake": _WORLD if request.require_wake is None else request.require_wake, "record": request.record}
     start = None if request.start is None else str(request.start)
-    told = {"given": json.dumps(dict(request.given)), "start": start}
+    scenario = request.scenario.to_text() if request.scenario else None
+    told = {"given": json.dumps(dict(request.given)), "start": start, "scenario": scenario}
     return {**own, **flags, **paths, **told, "commands": json.dumps(request.commands), "out": str(request.out)}
 
 
@@ -65,6 +70,7 @@ def request_of(row: Mapping[str, Any]) -> Request:
         map=None if row["map"] is None else Path(row["map"]),
         given=json.loads(row["given"]),
         start=None if row["start"] is None else Start.of(row["start"]),
+        scenario=NO_SCENARIO if row["scenario"] is None else Scenario.of_text(row["scenario"]),
         out=Path(row["out"]),
         require_wake=None if row["require_wake"] == _WORLD else bool(row["require_wake"]),
         record=bool(row["record"]),

@@ -17,6 +17,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.decorators import Decorator
 
+from executive.run.findings import finding_keys
 from executive.store.recollection import Recollection
 from executive.store.records import Memory, StepRecord
 from executive.tree.behaviours.context import RunContext
@@ -56,8 +57,11 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     """
     over = frozenset(below for node in tree.mission.walk() if _is_over(node, memory) for below in _paths_below(node))
     skills = {node.path_id: node for node in tree.mission.walk() if node.kind == "skill" and node.path_id not in over}
+    failed = {path for path, step in memory.steps.items() if step.status is Status.FAILURE}
     kept = [
-        path for path, leaf in skills.items() if all(key in memory.board for key in leaf.options["outputs"].values())
+        path
+        for path, leaf in skills.items()
+        if path in failed or all(key in memory.board for key in leaf.options["outputs"].values())
     ]
     recollection = Recollection(tree.path_ids, memory.steps).only(kept)
     parents = {child.path_id: node for node in tree.root.walk() for child in node.children}
@@ -66,7 +70,14 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     if tree.root is not tree.mission:
         root = dataclasses.replace(tree.root, children=(*tree.root.children[:-1], root))
     own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(CompiledTree)}
-    return ResumedTree(**{**own, "root": root}, board=memory.board, changes=change.made), recollection
+    board = {**memory.board, finding_keys(tree.robot_name, tree.mission_name).again: _answered(tree, memory)}
+    return ResumedTree(**{**own, "root": root}, board=board, changes=change.made), recollection
+
+
+def _answered(tree: CompiledTree, memory: Memory) -> frozenset[str]:
+    """The nodes that have given their answer and, since what they rest on is told once more, give it again."""
+    answers = {node.path_id for node in tree.mission.walk() if node.kind == "answer"}
+    return frozenset(path for path in answers if path in memory.steps and memory.steps[path].status is Status.SUCCESS)
 
 
 @dataclass(frozen=True)

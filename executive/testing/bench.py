@@ -14,11 +14,12 @@ from executive.tree.behaviours.board import Board, Constant
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import SkillLeaf
 from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
+from skills.faults.faulty_robot import with_faults
+from skills.faults.kinds import STANDARD_FAULTS, FaultKind
+from skills.faults.words import Fault, parse_fault
 from skills.robot import Clock, Robot
 from skills.testing.detector import PlainColours
 from skills.testing.estimators import BlockCostmap, KnownPlace
-from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
-from skills.testing.faults import Fault, parse_fault, with_faults
 
 TICK_S = 0.05
 HOLDER = "test"
@@ -58,6 +59,7 @@ class SkillBench:
     ) -> None:
         """Take the robot's lease; time passes by `clock`. Estimators that know all stand in for those left out."""
         self.robot, self.clock = robot, clock
+        self._capabilities = robot.capabilities()
         self.sensing = False
         self.published: list[tuple[str, Mapping[str, Any]]] = []
         self._context = RunContext(
@@ -79,8 +81,9 @@ class SkillBench:
         return self._context.for_skill(f"{_PREFIX}/skill")
 
     def inject(self, *words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS) -> None:
-        """From now on these faults are at work. Raises ValueError for words that are no fault."""
-        self.add_faults(*(parse_fault(each, kinds) for each in words))
+        """From now on these faults are at work. Raises ValueError for words that are no fault of this robot."""
+        cameras = [camera.source for camera in self._capabilities.cameras]
+        self.add_faults(*(parse_fault(each, kinds, cameras=cameras) for each in words))
 
     def add_faults(self, *faults: Fault) -> None:
         """From now on these faults are at work."""

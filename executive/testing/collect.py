@@ -14,8 +14,8 @@ from executive.testing.skill_test import SkillTestFile, load_skill_tests
 from executive.testing.suite import PARTS, SuiteCase
 from executive.testing.trial import BenchMakers, carry_out, scripted
 from skills.api import Skill
+from skills.faults.kinds import STANDARD_FAULTS, FaultKind
 from skills.robot import Capabilities
-from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
 
 
 class SkillTestSettings:

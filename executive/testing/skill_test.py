@@ -20,8 +20,8 @@ from executive.tree.port_values import PortValueError, gathered, port_value
 from executive.tree.registry import missing
 from executive.tree.types import describe_type, field_types, required
 from skills.api import Cause, Skill
-from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
-from skills.testing.faults import parse_fault
+from skills.faults.kinds import STANDARD_FAULTS, FaultKind
+from skills.faults.words import parse_fault
 
 SUFFIX = ".skilltest.yaml"
 _Positive = Annotated[float, Field(gt=0.0)]

@@ -21,12 +21,12 @@ from py_trees.common import Status
 
 from executive.testing.bench import SkillBench, SkillRun
 from skills.api import Cause, Skill
+from skills.faults.kinds import SENSE_VERBS, VERBS, Call, Effect, InjectedFault
+from skills.faults.words import Fault
 from skills.robot import Capabilities
 from skills.testing.blocks import ROOM, TABLE_CAN, Block
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
-from skills.testing.fault_kinds import SENSE_VERBS, VERBS, Call, Effect, InjectedFault
-from skills.testing.faults import Fault
 from skills.testing.robot import ScriptedRobot, Start
 
 STILL_WITHIN_S = 0.2

@@ -11,11 +11,11 @@ from typing import Any
 from executive.testing.bench import SkillBench, SkillRun
 from executive.testing.skill_test import BlockSetup, RobotSetup, SkillTest, SkillTestFile, WorldSetup
 from skills.api import Skill
+from skills.faults.kinds import STANDARD_FAULTS, FaultKind
 from skills.robot import Capabilities, Pose2D
 from skills.testing.blocks import ROOM, TABLE_CAN, Block
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
-from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.testing.robot import ScriptedRobot, Start
 
 BenchMaker = Callable[[RobotSetup, WorldSetup], SkillBench]

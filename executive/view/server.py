@@ -10,14 +10,12 @@ import asyncio
 import json
 import secrets
 import socket
-import threading
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Final
 
-import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import FileResponse, JSONResponse, Response
@@ -27,13 +25,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from executive.view.actions import Action, RefusedError
 from executive.view.feed import Feed
+from executive.view.serving import MAX_BODY, ServingThread, body_of
 
 HOST: Final = "127.0.0.1"
 PAGE_FOLDER: Final = Path(__file__).parent / "page"
 RECORDING_ADDRESS: Final = "recording.html"
 TOKEN_HEADER: Final = "x-errand-token"
-START_LIMIT_S: Final = 10.0
-_MAX_BODY: Final = 20_000
 _GOING_AWAY: Final = 1001
 _NOT_ALLOWED: Final = 4403
 
@@ -57,22 +54,9 @@ class PageServer:
         self._token = secrets.token_urlsafe(24)
         self._socket = socket.create_server((HOST, port))
         self.port: int = self._socket.getsockname()[1]
-        self._ready = threading.Event()
         self._closing = False
         self._wakers: set[asyncio.Event] = set()
-        config = uvicorn.Config(
-            self._app(),
-            log_level="error",
-            access_log=False,
-            lifespan="off",
-            ws_max_size=_MAX_BODY,
-            ws="websockets-sansio",
-        )
-        self._server = uvicorn.Server(config)
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._thread = threading.Thread(target=self._serve, name="errand-page", daemon=True)
-        self._thread.start()
-        self._ready.wait(START_LIMIT_S)
+        self._serving = ServingThread(self._app(), self._socket, ws_max_size=MAX_BODY, ws="websockets-sansio")
         content.feed.listen(self._wake)
 
     def offer_recording(self, recording: Path) -> None:
@@ -88,9 +72,9 @@ class PageServer:
     def close(self) -> None:
         """Stop serving; idempotent."""
         self._closing = True
-        self._server.should_exit = True
+        self._serving.end()
         self._wake()
-        self._thread.join(START_LIMIT_S)
+        self._serving.join()
 
     def __enter__(self) -> PageServer:
         return self
@@ -98,18 +82,9 @@ class PageServer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _serve(self) -> None:
-        asyncio.run(self._serve_in_loop())
-
-    async def _serve_in_loop(self) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._ready.set()
-        await self._server.serve(sockets=[self._socket])
-
     def _wake(self) -> None:
         """Tell all websockets that there is news; from any thread."""
-        if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._wake_all)
+        self._serving.call_soon(self._wake_all)
 
     def _wake_all(self) -> None:
         for waker in self._wakers:
@@ -177,7 +152,7 @@ class PageServer:
         if action is None:
             return JSONResponse({"error": f"there is no action '{name}' here"}, HTTPStatus.NOT_FOUND)
         try:
-            values = _values(await request.body())
+            values = _values(await body_of(request))
             said = await asyncio.to_thread(action, values)
         except RefusedError as refusal:
             return JSONResponse({"error": str(refusal)}, HTTPStatus.CONFLICT)
@@ -223,10 +198,10 @@ class PageServer:
         }
 
 
-def _values(body: bytes) -> Mapping[str, Any]:
+def _values(body: bytes | None) -> Mapping[str, Any]:
     """An action's values. Raises RefusedError for what is no JSON object."""
     try:
-        values = json.loads(body or b"{}") if len(body) <= _MAX_BODY else None
+        values = None if body is None else json.loads(body or b"{}")
     except ValueError:
         values = None
     if not isinstance(values, dict):

@@ -22,7 +22,7 @@ from plant.people.walk import Leg, Walk
 from plant.snapshot.values import State
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.route import Route
-from plant.worlds.world import WorldError
+from plant.worlds.world import Point, WorldError
 from skills.robot import FloatArray
 
 BODY_KG, BODY_M = 75.0, (0.2, 1.75)
@@ -63,6 +63,10 @@ class Walkers:
     def __getitem__(self, name: str) -> Walk:
         """The walk of one of them. Raises KeyError."""
         return self._walks[name]
+
+    def places_W(self) -> Iterator[Point]:
+        """Where everybody is, (x, y)."""
+        yield from (walk.place_W for walk in self._walks.values())
 
     def before_step(self, dt_s: float, standing: Collection[str] = ()) -> None:
         """Put everybody where they are, with the velocity that leads to where they will be after dt_s.

@@ -86,7 +86,7 @@ def _judge_handed_over(condition: GoalCondition, truth: Truth, past: bool) -> Fi
     if past:
         done = [history for history in objects if any((history.name, person) in truth.given for person in people)]
     else:
-        done = [history for history in objects if history.on_tray_of in people]
+        done = [one for one in objects if one.on_tray_of in people and not one.lies_where_others_put_it]
     if len(done) >= condition.needed:
         verb = _were(done) + " put" if past else "rests" if len(done) == 1 else "rest"
         return Finding(True, f"{_names(done)} {verb} on {_either(people)}'s tray.")
@@ -110,7 +110,8 @@ def _why_not_handed(
 def _judge_placed(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
     """Resting in the goal, let go."""
     objects = [history for history in _of_class(condition, truth) if _lift(history, condition) is not None]
-    done = {history: p for history in objects if (p := _rest_in(history, condition, past)) is not None}
+    own = [history for history in objects if past or not history.lies_where_others_put_it]
+    done = {history: p for history in own if (p := _rest_in(history, condition, past)) is not None}
     if len(done) >= condition.needed:
         verb = "was put" if past else "rests"
         ons = (f"the {history.name} {verb} on {_region_at(condition.goal, p)}" for history, p in done.items())
@@ -226,7 +227,7 @@ def _lift(history: ObjectHistory, condition: GoalCondition) -> Lift | None:
 
 def _rest_in(history: ObjectHistory, condition: GoalCondition, past: bool) -> FloatArray | None:
     """Where in the goal it rests, or did after it was carried; None when nowhere."""
-    rests = history.rests_W[1:] if past else [history.last.p_WO] if history.resting else []
+    rests = history.own_rests_W if past else [history.last.p_WO] if history.resting else []
     return next((p for p in rests if _region_at(condition.goal, p) is not None), None)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ REST_S = 0.2
 FLICKER_S = 0.15
 _PLAIN = (
     *("events", "drops", "touches", "speed_m_s", "_grip_s", "_grip_robot", "_grip_z_m", "_supported_s"),
-    *("_still_since_s", "_carried", "_left_z_m", "_dropped", "_tray_s", "_tray_of"),
+    *("_still_since_s", "_carried", "_left_z_m", "_dropped", "_tray_s", "_tray_of", "_by_others"),
 )
 
 
@@ -88,6 +88,17 @@ class ObjectHistory:
     _dropped: bool = False
     _tray_s: float = float("-inf")
     _tray_of: str | None = None
+    _by_others: list[int] = field(default_factory=list)
+
+    @property
+    def own_rests_W(self) -> list[FloatArray]:
+        """Where it came to rest, but for its first place and where somebody who is no robot put it."""
+        return [p_W for number, p_W in enumerate(self.rests_W) if number > 0 and number not in self._by_others]
+
+    @property
+    def lies_where_others_put_it(self) -> bool:
+        """Whether somebody who is no robot moved it last."""
+        return len(self.rests_W) - 1 in self._by_others and not self._carried
 
     @property
     def last(self) -> ObjectSample:
@@ -147,6 +158,16 @@ class ObjectHistory:
         self._note_fall(sample)
         self._note_rest(sample)
 
+    def moved_by_others(self, p_WO: FloatArray, time_s: float) -> None:
+        """Somebody who is no robot has put it at p_WO: no fall, no knock, and no robot's doing."""
+        self._last = replace(self.last, time_s=time_s, p_WO=p_WO, gripper=None, X_WH=None, tray_of=None)
+        self._grip_s = self._tray_s = float("-inf")
+        self._carried, self._left_z_m, self._dropped, self._still_since_s = False, None, False, None
+        self._by_others.append(len(self.rests_W))
+        self.rests_W.append(p_WO)
+        self.rested_s.append(time_s)
+        self.events.append(f"Somebody moved the {self.name} at {time_s:.2f} s.")
+
     def state(self) -> State:
         """The history so far."""
         return {
@@ -169,7 +190,7 @@ class ObjectHistory:
     def forget_past(self) -> None:
         """Start over for another mission: what is held keeps how it came there, all else counts from where it is."""
         if self._last is not None and self.held_by is None:
-            self.lifts, self.rests_W, self.rested_s = [], [], []
+            self.lifts, self.rests_W, self.rested_s, self._by_others = [], [], [], []
             self._rests(self._last)
         self.events, self.drops, self.touches = [], 0, 0
 

@@ -147,6 +147,10 @@ class Referee:
         for history in self._histories.values():
             history.forget_past()
 
+    def moved_by_others(self, name: str, plant_context: Context, time_s: float) -> None:
+        """Somebody who is no robot has put an object where it is now. Raises KeyError: there is no such object."""
+        self._histories[name].moved_by_others(self._position(plant_context, self._entities.objects[name]), time_s)
+
     def points(self, robot: str) -> Sequence[FloatArray]:
         """The points of `path`, not to be changed; those that were there stay as more are added."""
         return self._paths[robot]

@@ -108,7 +108,7 @@ def _place(
     obstacles = [*others, *(np.array(polygon) for polygon in world.seed_rules.keep_clear)]
     for name in (*rule.surfaces[first:], *rule.surfaces[:first]):
         surface = world.surfaces[name]
-        for centre, yaw in _candidates(world, surface, rng):
+        for centre, yaw in candidates(world, surface, rng):
             outline = outline_W(form, centre, yaw)
             inside = _inside(outline, surface.polygon_W, rules.rim_m)
             if inside and all(polygon_distance(outline, other) >= rules.clear_m for other in obstacles):
@@ -118,7 +118,7 @@ def _place(
     raise WorldError(f"{world.folder / 'objects.yaml'}: {rule.name} finds no free spot on {', '.join(rule.surfaces)}")
 
 
-def _candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
+def candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
     """Random centres along the surface's front edges, with random yaws."""
     fronts = world.seed_rules.fronts[surface.name]
     middle = np.mean(surface.polygon_W, axis=0)
@@ -132,11 +132,12 @@ def _candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> 
 
 def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, index: int) -> Placement:
     route = None if rule.route is None else route_of(rule.route, world.standing)
-    if route is not None:
-        (x, y), yaw = route.stops[0].at_W, route.first_yaw_rad
-    else:
-        assert rule.ranges is not None
+    if rule.ranges is not None:
         x, y, yaw = _before_start(world, rule.ranges, np.random.default_rng([seed, _PEOPLE_STREAM, index]))
+        route = None if route is None else route.begun_at((x, y), yaw)
+    else:
+        assert route is not None
+        (x, y), yaw = route.stops[0].at_W, route.first_yaw_rad
     X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, form.rest_height_m], dtype=np.float64))
     receiving = Receiving(rule.pull_n, rule.reaction_s) if rule.receives else None
     return Placement(rule.name, rule.model, form, X_WO, route=route, receiving=receiving)

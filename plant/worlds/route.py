@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from plant.worlds.world import Point, RouteRule, StopRule
 
@@ -29,10 +29,17 @@ class Route:
     loops: bool = False
     start_s: float = 0.0
     yields: bool = True
+    yaw_rad: float | None = None
+
+    def begun_at(self, at_W: Point, yaw_rad: float) -> Route:
+        """The same for somebody who stands somewhere at first."""
+        return replace(self, stops=(Stop(at_W), *self.stops), yaw_rad=yaw_rad)
 
     @property
     def first_yaw_rad(self) -> float:
-        """The way that the person looks at first: towards the second stop."""
+        """The way that the person looks at first: as they stand, or towards the second stop."""
+        if self.yaw_rad is not None:
+            return self.yaw_rad
         (x0, y0), (x1, y1) = self.stops[0].at_W, self.stops[min(1, len(self.stops) - 1)].at_W
         return math.atan2(y1 - y0, x1 - x0)
 

@@ -78,7 +78,10 @@ class RouteRule(_Strict):
 
 
 class PersonRule(_Strict):
-    """A person, who walks on a route, or stands before the robot's start pose where three ranges say."""
+    """A person, who walks on a route, or stands before the robot's start pose where three ranges say.
+
+    One who has both walks to the waypoints from where the ranges say.
+    """
 
     name: str = Field(description="the person's name in knowledge.yaml")
     model: str = Field(default="person", description="a class of `plant/models/catalogue.yaml`")
@@ -92,8 +95,8 @@ class PersonRule(_Strict):
 
     @model_validator(mode="after")
     def _walks_or_stands(self) -> PersonRule:
-        if (self.route is None) == (self.ranges is None):
-            raise ValueError("give either 'route', or 'distance_m', 'bearing_rad' and 'turned_rad'")
+        if self.route is None and self.ranges is None:
+            raise ValueError("give 'route', or 'distance_m', 'bearing_rad' and 'turned_rad', or all of them")
         return self
 
     @property
@@ -102,6 +105,28 @@ class PersonRule(_Strict):
         if self.distance_m is None or self.bearing_rad is None or self.turned_rad is None:
             return None
         return self.distance_m, self.bearing_rad, self.turned_rad
+
+
+class DoorRule(_Strict):
+    """A doorway with a sliding door, open at the edges' level inside the wall; metres in the world frame, seconds.
+
+    It is open until `closes`, and closed until `opens`; of both the earlier says how it is at the beginning.
+    """
+
+    name: str
+    at: Point
+    yaw: float = Field(description="direction in which it slides open, along the wall")
+    width: float = Field(gt=0.0, le=10.0)
+    closes: float | None = Field(default=None, ge=0.0)
+    opens: float | None = Field(default=None, ge=0.0)
+
+
+class MoveRule(_Strict):
+    """An object that somebody puts elsewhere: on a free spot of the surface `to`, or with its base at a point."""
+
+    name: str
+    at: float = Field(ge=0.0, description="s")
+    to: str | tuple[float, float, float]
 
 
 class SeedRules(_Strict):
@@ -176,7 +201,8 @@ class World:
 
     Only its geometry and a start are needed: no dock, rooms, surfaces or seed rules. `standing` tells where somebody
     stands who is in a room, or at a surface. The robot has the grids of the folder `maps`, None for those in the
-    world's own `map`. `imports` are the models that are not of the catalogue, by name.
+    world's own `map`. `imports` are the models that are not of the catalogue, by name. `doors` close and open, and
+    `moves` happen, at their times.
     """
 
     name: str
@@ -190,6 +216,8 @@ class World:
     standing: Mapping[str, Point] = field(default_factory=dict)
     maps: Path | None = None
     imports: Mapping[str, Import] = field(default_factory=dict)
+    doors: tuple[DoorRule, ...] = ()
+    moves: tuple[MoveRule, ...] = ()
 
     @property
     def corners(self) -> Polygon:
@@ -211,6 +239,25 @@ class World:
         changed = rules.model_copy(update={"people": tuple({**before, **walking}.values())})
         _check_people(changed, self.standing)
         return replace(self, seed_rules=changed)
+
+    def with_walks(self, walks: Mapping[str, RouteRule]) -> World:
+        """The same with people who walk: those who stand there already from where they stand, others from the first
+        waypoint on.
+
+        Raises WorldError: somebody walks already, a name is that of an object, or a waypoint is not known.
+        """
+        before = {rule.name: rule for rule in self.seed_rules.people}
+        for name in walks:
+            if name in before and before[name].route is not None:
+                raise WorldError(f"{name} walks already")
+        stays = {name: before[name].model_copy(update={"route": walks[name]}) for name in walks if name in before}
+        people = tuple({**before, **stays}.values())
+        stood = replace(self, seed_rules=self.seed_rules.model_copy(update={"people": people}))
+        return stood.with_routes({name: route for name, route in walks.items() if name not in before})
+
+    def with_events(self, doors: Iterable[DoorRule], moves: Iterable[MoveRule]) -> World:
+        """The same with doors that close and open, and objects that are moved, besides those that it has."""
+        return replace(self, doors=(*self.doors, *doors), moves=(*self.moves, *moves))
 
     def with_imports(self, folders: Iterable[Path]) -> World:
         """The same with the models of these folders. Raises WorldError: a folder holds none, or a name is taken."""

@@ -403,7 +403,7 @@ class ArmSkill(RoutineSkill[InputsT]):
     def picture(self, message: str, settle_s: float = SETTLE_S) -> Routine[Image]:
         """A new picture of the hand camera, once the arm is still.
 
-        Raises SkillFailure with cause EXECUTION when the camera gives an old one.
+        Raises SkillFailure with cause EXECUTION when the camera gives none, or an old one.
         """
         yield from self.pause(settle_s, message)
         robot, asked_s = self.context.robot, self.context.clock.now()

@@ -13,7 +13,7 @@ import numpy as np
 
 from skills.api import Cause, Failed, InputsT, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
 from skills.geometry import wrap
-from skills.robot import ArmTrajectory, Clock, CommandId, CommandState, FloatArray, Pose2D
+from skills.robot import ArmTrajectory, Clock, CommandId, CommandState, FloatArray, NoImageError, Pose2D
 
 ResultT = TypeVar("ResultT")
 OtherT = TypeVar("OtherT")
@@ -177,9 +177,12 @@ class RoutineSkill(Skill[InputsT]):
             job.withdraw()
 
     def sense(self, read: Callable[[], ResultT], *, latency_s: float, name: str, message: str) -> Routine[ResultT]:
-        """What `read` gives, which may block."""
+        """What `read` gives, which may block. Raises SkillFailure with cause EXECUTION: a camera gives no picture."""
         job = self.context.worker.sense(read, lambda given: given, latency_s=latency_s, name=name)
-        return (yield from self._awaited(job, message))
+        try:
+            return (yield from self._awaited(job, message))
+        except NoImageError as error:
+            raise SkillFailure(Cause.EXECUTION, str(error)) from error
 
     def follow(
         self, trajectory: ArmTrajectory, message: str, guard: Callable[[FloatArray], bool] | None = None

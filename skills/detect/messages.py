@@ -87,7 +87,8 @@ def object_destination_message(
 
 def tracks_message(context: SkillContext, tracks: Sequence[Track]) -> Message:
     """What is known of the objects around."""
-    return {"stamp": context.clock.now(), "tracks": [_track(track) for track in tracks]}
+    told = {"stamp": context.clock.now(), "robot_name": context.robot.name}
+    return {**told, "tracks": [_track(track) for track in tracks]}
 
 
 def _track(track: Track) -> Message:
@@ -96,6 +97,7 @@ def _track(track: Track) -> Message:
         "class_name": track.class_name,
         "class_belief": round(track.class_belief, 3),
         "belief": round(track.belief, 3),
+        "confirmed": track.confirmed(),
         "views": track.views,
         "missed": track.missed,
         "last_seen_s": track.last_seen_s,

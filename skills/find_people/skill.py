@@ -66,7 +66,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
     }
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "there is no new scan",
-        Cause.EXECUTION: "it is too dark to see, or the robot refuses to turn",
+        Cause.EXECUTION: "it is too dark to see, a camera gives no picture, or the robot refuses to turn",
         Cause.POSTCONDITION: "nobody is seen, or fewer than asked for",
     }
     default_timeout_s = 60.0

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 
 from skills.api import Job, SkillContext
 from skills.quantities import Count, Delay, Duration, Height, Length
-from skills.robot import FloatArray, Image
+from skills.robot import FloatArray, Image, NoImageError
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,14 @@ class LowObstacleWatch:
         self._X_WO = RigidTransform()
 
     def step(self) -> None:
-        """Take in a picture that has arrived; ask for the next when its time has come. Never blocks."""
+        """Take in a picture that has arrived, if one has; ask for the next when its time has come. Never blocks."""
         if self._job is not None:
             if self._job.done():
-                points_O, stamp_s = self._job.result()
-                self._job = None
+                job, self._job = self._job, None
+                try:
+                    points_O, stamp_s = job.result()
+                except NoImageError:
+                    return
                 self._context.costmap.add_points(self._X_WO.multiply(points_O.T).T, stamp_s)
             return
         if not self._sources or self._context.clock.now() < self._next_s:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +18,7 @@ from skills.perception.detector.camera_images import found_in_grey
 from skills.perception.people import SeenPerson, merged
 from skills.perception.position import position_of
 from skills.quantities import Count, Delay, Duration, Length, Margin, Share, Turn
-from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D
+from skills.robot import CameraCapabilities, FloatArray, Image, NoImageError, Pose2D
 
 PEOPLE_TOPIC: Final = "people"
 _HEIGHTS_M: Final = (0.2, 0.6, 1.0)
@@ -96,8 +97,9 @@ class PeopleWatch:
         """Take in what was seen; look again in time, towards a body-frame velocity (3,). Never blocks."""
         if self._job is not None:
             if self._job.done():
-                look, self._job = self._job.result(), None
-                self._take(look)
+                job, self._job = self._job, None
+                with contextlib.suppress(NoImageError):
+                    self._take(job.result())
             return
         now_s = self._context.clock.now()
         cameras, with_depth = self._due(cameras_towards(velocity, self._cameras), now_s)

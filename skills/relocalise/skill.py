@@ -15,7 +15,7 @@ from skills.navigate.low_obstacles import WatchOptions, low_points
 from skills.navigate.moving import MovingSkill
 from skills.quantities import Delay, Length, Share, Speed, Tries, Turn, TurnRate
 from skills.relocalise.free_space import FreeSpaceOptions, can_turn, free_m, obstacles_B
-from skills.robot import FloatArray, Scan
+from skills.robot import FloatArray, NoImageError, Scan
 
 _SCAN_PATIENCE_S = 2.0
 _LEAST_STEP_M = 0.15
@@ -62,7 +62,7 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
     options: RelocaliseOptions
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "there are no new scans, or this robot's localiser cannot search",
-        Cause.EXECUTION: "the robot refuses to move",
+        Cause.EXECUTION: "the robot refuses to move, or a camera gives no picture",
         Cause.POSTCONDITION: "no pose on the map fits what the robot sees",
     }
     default_timeout_s: ClassVar[float] = 240.0
@@ -181,7 +181,10 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
         )
         while not job.done():
             yield Running("looking ahead")
-        return job.result()
+        try:
+            return job.result()
+        except NoImageError as error:
+            raise SkillFailure(Cause.EXECUTION, str(error)) from error
 
     def _well_localised(self) -> bool:
         estimate = self.context.localiser.estimate()

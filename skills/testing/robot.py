@@ -10,6 +10,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from skills.arm.kinematics import ArmModel, arm_model
+from skills.faults.pulling import pulled
 from skills.geometry import compose
 from skills.robot import (
     ArmTrajectory,
@@ -34,7 +35,6 @@ from skills.robot import (
 from skills.testing.blocks import Block, can_at
 from skills.testing.clock import VirtualClock
 from skills.testing.commands import Commands
-from skills.testing.pulling import pulled
 from skills.testing.sensing import FRONT_CAMERAS, mount_of, picture, sweep
 
 _ACCELERATION_M_S2 = 2.5

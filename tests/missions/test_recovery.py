@@ -22,7 +22,7 @@ from executive.tree.registry import built_in_skills
 from plant.diagram import LooseModel
 from plant.simulation import Simulation
 from plant.spot.sensing import HAND_LINK
-from skills.testing.faults import with_faults
+from skills.faults.faulty_robot import with_faults
 
 FETCH = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",

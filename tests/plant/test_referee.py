@@ -306,6 +306,30 @@ def test_placed_earlier_and_then_taken_again_still_counts_in_a_sequence():
     assert not stage.holds(PLACED)
 
 
+def moved(stage, name, p_WO):
+    """Somebody puts an object elsewhere."""
+    stage.put(name, p_WO).referee.moved_by_others(name, stage.context, stage.time)
+    return stage.watch()
+
+
+def test_what_somebody_else_puts_on_the_goal_was_not_placed_by_the_robot():
+    stage = placed_stage().let_go().watch()
+    assert not moved(moved(stage, "coke", ON_TABLE), "coke", ON_SHELF).holds(PLACED)
+
+
+def test_what_somebody_else_moves_down_is_neither_a_drop_nor_a_knock():
+    stage = moved(Stage(), "coke", (0.0, 0.0, HALF - TOUCH))
+    assert stage.referee.drops == 0
+    assert stage.referee.events == ("Somebody moved the coke at 0.50 s.",)
+
+
+def test_what_the_robot_placed_stays_placed_when_somebody_takes_it_away_later():
+    stage = moved(placed_stage().let_go().watch(), "coke", ON_TABLE)
+    again = GoalCondition(GoalKind.GRASPED, ("coke",), source=(TABLE,))
+    assert not stage.holds(PLACED)
+    assert stage.lift("coke", ON_TABLE).holds(PLACED, again)
+
+
 def test_slipping_out_of_the_gripper_is_one_drop():
     stage = Stage().lift()
     stage.let_go().fall("coke", np.add(ON_TABLE, (0, 0, 0.3)), ON_TABLE)

@@ -11,8 +11,8 @@ from executive.testing.skill_test import load_skill_tests
 from executive.testing.suite import PARTS, SuiteCase
 from executive.testing.trial import carry_out, scripted, scripted_maker
 from executive.tree.registry import built_in_skills
+from skills.faults.kinds import STANDARD_FAULTS
 from skills.robot import BaseKind
-from skills.testing.fault_kinds import STANDARD_FAULTS
 
 SKILLS = built_in_skills()
 DRIVING = ("navigate", "approach", "back_off", "place", "hand_over", "relocalise", "find_people")

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictInt, model_validator
 
 from executive.mission.errors import listing
+from executive.mission.expression import TIME_OF_DAY
 from executive.mission.yaml_source import Name, Text
 from skills.quantities import Duration, Share
 
@@ -15,7 +16,6 @@ __all__ = ["CONDITION", "DockFile", "RepeatFile", "Rounds", "Span", "Strict", "W
 
 _UNITS_S: Final = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 _SPAN: Final = re.compile(r"(\d+(?:\.\d+)?)\s*(s|min|h)?")
-TIME_OF_DAY: Final = r"^([01]\d|2[0-3]):[0-5]\d$"
 _CONDITIONS: Final = ("expression", "look", "object", "person", "door", "button", "all", "any", "not")
 
 
@@ -123,7 +123,7 @@ class WaitFile(Strict):
 
     for_: Condition | None = Field(None, alias="for", description="Wait until this holds.")
     seconds: Span | None = Field(None, description='So long: seconds, or "10 min".')
-    until_clock: Annotated[str, Field(pattern=TIME_OF_DAY)] | None = Field(
+    until_clock: Annotated[str, Field(pattern=rf"^{TIME_OF_DAY.pattern}$")] | None = Field(
         None, description='Until this time of day, as in "14:30".'
     )
     every: Span = Field(15.0, description="How often a condition that takes a look is looked at.")

@@ -8,6 +8,8 @@ within a longer text the parameter's text is put in.
 
 from __future__ import annotations
 
+import json
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -20,7 +22,7 @@ from executive.mission.expression import Value
 from executive.mission.file.model import KeyPath
 from executive.mission.yaml_source import YamlSource
 
-__all__ = ["Given", "given_values", "round_source", "with_parameters"]
+__all__ = ["Given", "given_values", "round_source", "values_in_json", "with_parameters"]
 
 _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -48,11 +50,31 @@ def given_values(settings: Iterable[str]) -> dict[str, Any]:
             value = yaml.safe_load(text)
         except yaml.YAMLError:
             value = None
-        if not equals or not _NAME.fullmatch(name) or not isinstance(value, _SCALARS):
+        if not equals or not _can_be_given(name, value):
             hint = "give a name, =, and a text, a number, true or false"
             raise InputError(f"--set {setting[:60]}: it is not NAME=VALUE", hint=hint)
         values[name] = value
     return values
+
+
+def values_in_json(text: bytes) -> dict[str, Any]:
+    """Values in a JSON object, each as `given_values` takes them; none in an empty text. Raises InputError."""
+    try:
+        values = json.loads(text) if text.strip() else {}
+    except (ValueError, RecursionError):
+        values = None
+    if not isinstance(values, dict):
+        raise InputError("the values are no JSON object", hint='give one such as {"room": "kitchen"}, or nothing')
+    wrong = next((name for name, value in values.items() if not _can_be_given(name, value)), None)
+    if wrong is not None:
+        hint = "give each name a text, a number, true or false"
+        raise InputError(f"'{wrong[:60]}' is not a name with a value", hint=hint)
+    return values
+
+
+def _can_be_given(name: str, value: Any) -> bool:
+    finite = not isinstance(value, float) or math.isfinite(value)
+    return bool(_NAME.fullmatch(name)) and isinstance(value, _SCALARS) and finite
 
 
 def with_parameters(source: YamlSource, given: Given) -> YamlSource:

@@ -256,10 +256,10 @@ class MustNotBegin(MustHold):
 class Decide(ExplainedNode, Composite):
     """Decides, and takes the looks (its children) one after the other only as long as the decision needs them.
 
-    A look that has begun is taken to its end.
-    Decided: SUCCESS, the answer under `key`. A look RUNNING: RUNNING. A look FAILURE: FAILURE with its cause. An
-    expression without a value: FAILURE with PRECONDITION. Without a look left and not decided: FAILURE with ERROR.
-    `looks` are the blackboard keys of the looks' answers, which are forgotten when it begins.
+    A look that has begun is taken to its end. Decided: SUCCESS, the answer under `key`. A look RUNNING: RUNNING. A look
+    FAILURE: FAILURE with its cause. An expression without a value: FAILURE with PRECONDITION. Without a look left and
+    not decided: FAILURE with ERROR. `looks` are the blackboard keys of the looks' answers, which are forgotten when it
+    begins.
     """
 
     decision: Decision

@@ -1,25 +1,98 @@
-"""Looking whether a door is open: go where it can be seen through, and look."""
+"""Looking whether a door is open: go where it can be seen through, and look; where that fails, from its other side.
+
+A closed door may bar the way to where it would be looked at. So the robot looks from where its way ended, too.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from itertools import product
+from typing import Final
+
 from executive.mission.errors import InputError
-from executive.mission.knowledge import Door
+from executive.mission.geometry import Point, distance_m, fits, nearest_side
+from executive.mission.knowledge import Door, Knowledge
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.node import NodeSpec
+from skills.robot import Pose2D
 
-CHECK_DOOR = "check_door"
+CHECK_DOOR: Final = "check_door"
+_BEFORE_M: Final = ((1.5, 1.2, 1.8), (0.9, 0.7))
+"""How far before a door, the better ones first."""
+_ASIDE_RAD: Final = tuple(map(math.radians, (0.0, 20.0, -20.0, 40.0, -40.0)))
+_LOOK_S: Final = 0.5
+_TURNED_RAD: Final = (0.0, math.pi / 2)
+_BODY_M: Final = (1.3, 0.7)
+"""Length and width of the body, with a little room around it."""
 
 
 def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str) -> NodeSpec:
-    """Go near the door from the room on its first side, and look; whether it is open goes to `key`.
+    """Go before the door in the room on one side, or else on the other, and look; the answer goes to `key`.
+
+    The side with more doors comes first: whoever must go through a door to look at it need not look.
 
     Raises InputError: the world has no such door.
     """
     door = _door(builder, between)
-    view = pose_2d(builder.knowledge.places[between[0]].pose)
-    look = builder.skill(CHECK_DOOR, {"middle_W": door.at, "width_m": door.width}, {"open": key})
-    name = f"is the door between {between[0]} and {between[1]} open?"
-    return builder.sequence(name, builder.navigate(view, f"the door to the {between[1]}"), look)
+    through_rad = _through_rad(builder.knowledge, door)
+    sides = sorted(between, key=lambda room: -sum(room in other.between for other in builder.knowledge.doors))
+    views = [(room, view) for room in sides if (view := view_of(builder.knowledge, door, room)) is not None]
+    views = views or [(room, pose_2d(builder.knowledge.places[room].pose)) for room in sides]
+    told = f"door between {between[0]} and {between[1]}"
+    ports = {"middle_W": door.at, "width_m": door.width, "through_rad": through_rad, "door": told}
+
+    def looked(room: str, view: Pose2D) -> NodeSpec:
+        below = builder.at(f"from-{room}")
+        stay = below.pause("stay", "look from here", _LOOK_S)
+        near = below.node(
+            "selector", "stand before it, or stay", below.navigate(view, f"the {told}"), stay, part="near"
+        )
+        return below.sequence(f"look from the {room}", near, below.skill(CHECK_DOOR, ports, {"open": key}))
+
+    return builder.node("selector", f"is the {told} open?", *(looked(room, view) for room, view in views))
+
+
+def view_of(knowledge: Knowledge, door: Door, room: str) -> Pose2D | None:
+    """Where to stand in a room on a side of a door to see through it: before it, or a little aside; None: nowhere.
+
+    The robot looks at the door, or stands along the wall where it has no room to; its LiDAR sees all around.
+    """
+    across = _through_rad(knowledge, door)
+    outline = knowledge.places[room].polygon
+    into = min((across, across + math.pi), key=lambda way_rad: distance_m(outline, _from(door.at, way_rad, 0.5)))
+    taken = [knowledge.surfaces[name].polygon for name in knowledge.surfaces_in(room)]
+    return next((pose for pose in _before(door, into) if fits(_outline(pose), outline, taken)), None)
+
+
+def _before(door: Door, into_rad: float) -> Iterator[Pose2D]:
+    """Poses before a door, the best view first."""
+    for far_m in _BEFORE_M:
+        for aside_rad, turned_rad, before_m in product(_ASIDE_RAD, _TURNED_RAD, far_m):
+            bearing_rad = into_rad + aside_rad
+            x, y = _from(door.at, bearing_rad, before_m)
+            yaw_rad = math.remainder(bearing_rad + math.pi + turned_rad, math.tau)
+            yield Pose2D(round(x, 3), round(y, 3), round(yaw_rad, 4))
+
+
+def _through_rad(knowledge: Knowledge, door: Door) -> float:
+    """The direction through a door: across the side of a room along which it lies."""
+    sides = [nearest_side(knowledge.places[room].polygon, door.at, door.width) for room in door.between]
+    (x0, y0), (x1, y1) = min(sides, key=lambda side: side.off_m).ends
+    return math.remainder(math.atan2(y1 - y0, x1 - x0) + math.pi / 2, math.tau)
+
+
+def _from(point: Point, way_rad: float, by_m: float) -> Point:
+    """The point so far away in a direction."""
+    return point[0] + by_m * math.cos(way_rad), point[1] + by_m * math.sin(way_rad)
+
+
+def _outline(pose: Pose2D) -> tuple[Point, ...]:
+    """The corners of the body at a pose."""
+    half_x, half_y = 0.5 * _BODY_M[0], 0.5 * _BODY_M[1]
+    corners = ((half_x, half_y), (-half_x, half_y), (-half_x, -half_y), (half_x, -half_y))
+    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    return tuple((pose.x_m + c * x - s * y, pose.y_m + s * x + c * y) for x, y in corners)
 
 
 def _door(builder: PlanBuilder, between: tuple[str, str]) -> Door:

@@ -50,6 +50,15 @@
       }
     }
 
+    // What the robot says stays in sight for as long as people need to read it.
+    hear(robot, text) {
+      byId("announced").textContent = `${robot} says: ${text}`;
+      byId("said").textContent = `${robot}: ${text}`;
+      byId("said").classList.remove("bad");
+      clearTimeout(this.clearing);
+      this.clearing = setTimeout(() => { byId("said").textContent = ""; }, 6000 + 60 * text.length);
+    }
+
     async answer(text) {
       this.saying = true;
       if (await this.do("say", { text })) byId("sentence").value = "";

@@ -8,6 +8,7 @@
     run: (data) => ["run", `world ${data.world}, seed ${data.seed}: ${(data.commands || []).join(" · ")}`],
     object_to_detect: (data) => ["look for", data.class_name.join(", ")],
     object_destination: (data) => ["found", data.class_name],
+    speech: (data) => [`${data.robot} says`, `“${data.text}”`],
     errors: (data) => ["defect", (data.traceback || "").trim().split("\n").pop()],
     control: (data) => [data.what || "control", data.message || ""],
     question: (data) => ["question", data.text || data.message || ""],

@@ -102,6 +102,7 @@
     for (const message of messages) {
       store.add(message);
       if (greeted && message.topic === "transitions") fresh.push(message.sent_ms);
+      if (greeted && message.topic === "speech") control.hear(message.data.robot, message.data.text);
       if (message.topic === "map") map.setMap(message.data, addressOf(message.data.picture)).catch(() => {});
       if (message.live === "hello") greet(message.data);
       if (message.live === "recording" && message.data.address) {

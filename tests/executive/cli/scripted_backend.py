@@ -27,6 +27,9 @@ class ScriptedBackend:
     def attach(self, profile):
         profile.attach("scripted", self.clock, "advance")
 
+    def happened(self):
+        return ()
+
     def work(self):
         return {"calls": len(self.robot.calls)}
 

@@ -11,6 +11,7 @@ from executive.cli.mission_run import run_request
 from executive.cli.report import RunReport
 from executive.cli.requests import prepare
 from executive.mission.request import Request
+from executive.mission.scenario import Scenario
 from executive.record.profile import Profile
 from executive.record.reader import read_events
 from executive.run.outcome import Outcome
@@ -41,6 +42,37 @@ def test_its_report_says_that_nobody_else_saw_it(prepared):
     assert not any("referee" in line or "collisions" in line for line in report.lines())
 
 
+def test_faults_and_events_are_at_work_logged_and_in_the_report(prepared):
+    class Busy(ScriptedBackend):
+        """One in whose world something happens."""
+
+        def happened(self):
+            return [(0.5, "a door closes")] if self.clock.now() > 0.5 else []
+
+    scenario = Scenario(("lidar: dropout 0.5 s at 1 s", "drive is stopped after 3 calls"))
+    disturbed = replace(prepared, request=replace(prepared.request, scenario=scenario))
+    report = run_request(disturbed, Busy()).report
+    assert (report.outcome, report.scenario) == ("failure", tuple(f"fault: {words}" for words in scenario.faults))
+    assert RunReport.from_json(json.loads(json.dumps(report.to_json()))) == report
+    events = read_events(prepared.request.out / "log.mcap")
+    told = [(event.data["what"], event.data["message"]) for event in events if event.topic == "control"]
+    assert ("event", "a door closes") in told
+    assert ("fault", "drive is stopped after 3 calls: begins") in told
+    assert next(event.data["scenario"] for event in events if event.topic == "run") == list(report.scenario)
+
+
+def test_a_fault_that_ends_is_logged_and_the_robot_goes_on(prepared):
+    scenario = Scenario(("lidar: dropout 0.5 s at 1 s",))
+    report = run_request(replace(prepared, request=replace(prepared.request, scenario=scenario)), ScriptedBackend())
+    assert report.report.outcome == "success"
+    events = read_events(prepared.request.out / "log.mcap")
+    told = [(round(event.stamp_s, 2), event.data["message"]) for event in events if event.topic == "control"]
+    assert told == [
+        (1.0, "lidar: dropout 0.5 s at 1 s: begins"),
+        (1.5, "lidar: dropout 0.5 s at 1 s: is over"),
+    ]
+
+
 def test_its_work_is_in_report_and_log_and_its_parts_are_timed(prepared):
     profile = Profile()
     report = run_request(prepared, ScriptedBackend(), profile=profile).report
@@ -53,7 +85,7 @@ def test_its_work_is_in_report_and_log_and_its_parts_are_timed(prepared):
 def test_log_and_tree_are_left_as_after_a_simulated_run(prepared):
     run_request(prepared, ScriptedBackend())
     out = prepared.request.out
-    assert sorted(path.name for path in out.iterdir()) == ["log.mcap", "tree.svg"]
+    assert sorted(path.name for path in out.iterdir()) == ["log.mcap", "report.html", "tree.svg"]
     topics = {event.topic for event in read_events(out / "log.mcap")}
     assert {"map", "run", "tree", "transitions", "pose", "state", "outcome"} <= topics
 

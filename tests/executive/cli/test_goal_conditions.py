@@ -8,6 +8,7 @@ from executive.mission.file.model import Mission, MissionStep, OnFailure, SkillC
 from executive.mission.goal import command_goal
 from executive.tree.compiler import compile_mission
 from plant.referee import GoalKind, Verdict
+from skills.speak.skill import Speak
 
 
 def conditions(knowledge, *texts):
@@ -169,3 +170,16 @@ def test_a_mission_that_failed_is_never_fulfilled(verdict_on, script):
     verdict = verdict_on(step(GET, StepPolicy()), holds=True)
     assert verdict.success is False
     assert "failure" in verdict.why
+
+
+def test_what_is_said_needs_no_goal_condition(knowledge, registry, run_tree):
+    """A drive with a sentence before and after it is judged as the drive alone."""
+    spoken = MissionStep(skill=SkillCall("speak", {"text": "Hello"}))
+    there = MissionStep((parse_command("Take [Nothing] to [hall] and do [Nothing] to [Nothing]"),))
+    mission = Mission("tell", "flat", "Alice", (spoken, there, spoken))
+    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": Speak})
+    result = run_tree(tree).worst
+    asked = []
+    verdict = verdict_of(tree, result, lambda given: asked.extend(given) or Verdict(True, "there", 0, 0))
+    assert verdict.success is True
+    assert [(one.kind, one.passing) for one in asked] == [(GoalKind.WENT, False)]

@@ -140,7 +140,7 @@ def test_run_json_has_exactly_the_contract_on_the_last_line(no_plant, tmp_path):
     values = json.loads(result.stdout.splitlines()[-1])
     assert list(values) == [
         "outcome", "cause", "message", "referee", "commands", "world", "seed", "sim_time_s", "wall_time_s",
-        "real_time_factor", "ticks", "log", "work",
+        "real_time_factor", "ticks", "log", "work", "answers", "said", "seen_objects",
     ]  # fmt: skip
     assert list(values["referee"]) == ["success", "why", "collisions", "drops", "people_hit", "hit_by_people"]
     assert (result.exit_code, len(result.stdout.splitlines())) == (0, 1)
@@ -255,3 +255,48 @@ def test_evaluate_counts_claims_and_verdicts(monkeypatch, tmp_path):
     values = json.loads(result.stdout.splitlines()[-1])
     assert (values["successes"], values["referee_successes"], values["false_claims"]) == (2, 1, 1)
     assert ([run["seed"] for run in values["runs"]], result.exit_code) == ([1, 2, 3], 1)
+
+
+def test_evaluate_tries_each_fault_alone(monkeypatch, tmp_path):
+    asked = []
+
+    def sweep(arguments, seeds, *, jobs, out, done):
+        asked.append((arguments[2:], out.name))
+        return (report(outcome="failure" if arguments[2:] else "success"),)
+
+    monkeypatch.setattr(main, "sweep", sweep)
+    faults = ("--fault", "camera.hand: dropout 5 s at 20 s", "--random-faults", "1")
+    options = ("--each-fault", "--json", "--out", str(tmp_path))
+    result = invoke("evaluate", "--say", FETCH, *faults, *options)
+    assert asked == [
+        ([], "0-no-fault"),
+        (["--fault=camera.hand: dropout 5 s at 20 s"], "1-camera-hand-dropout-5-s-at-20-s"),
+        (["--random-faults=1"], "2-1-random-faults"),
+    ]
+    values = json.loads(result.stdout.splitlines()[-1])
+    told = [(each["condition"], each["runs"], each["successes"]) for each in values["conditions"]]
+    assert told == [("no fault", 1, 1), ("camera.hand: dropout 5 s at 20 s", 1, 0), ("1 random faults", 1, 0)]
+    assert (values["successes"], result.exit_code) == (1, 1)
+
+
+@pytest.mark.parametrize(
+    ("option", "says"),
+    [
+        (("--fault", "camra: dropout"), "'camra' is no verb of the robot; did you mean 'camera'"),
+        (("--fault", "camera.hnad: dropout"), "no camera 'hnad'; did you mean 'hand'"),
+        (("--scenario", "nowhere.yaml"), "nowhere.yaml: cannot read it"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "evaluate"])
+def test_a_fault_that_is_none_is_refused_with_a_hint(command, option, says, tmp_path):
+    result = invoke(command, "--say", FETCH, *option, "--out", str(tmp_path / "out"))
+    assert (result.exit_code, says in result.output, "Traceback" in result.output) == (2, True, False), result.output
+
+
+def test_the_random_faults_of_a_run_are_printed(no_plant, tmp_path):
+    lines = [
+        invoke("run", "--say", FETCH, "--random-faults", "2", "--seed", seed, "--out", str(tmp_path / name)).stdout
+        for seed, name in (("3", "a"), ("3", "b"), ("4", "c"))
+    ]
+    drawn = [[line for line in text.splitlines() if line.startswith("Scenario: fault:")] for text in lines]
+    assert (len(drawn[0]), drawn[0] == drawn[1], drawn[0] == drawn[2]) == (2, True, False)

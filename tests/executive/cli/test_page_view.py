@@ -15,6 +15,7 @@ from websockets.sync.client import connect
 from executive.cli.page_view import PageView, queueing
 from executive.cli.page_view import said as sentence_action
 from executive.cli.requests import prepare
+from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.run.control import Mode
 from executive.store.missions import MissionState, MissionStore
@@ -82,6 +83,16 @@ def test_a_sentence_is_queued_for_later(prepared, tmp_path):
         (mission,) = missions.missions(MissionState.QUEUED)
     asked = mission.request
     assert (asked.sentence, asked.seed, asked.world_name) == ("go to the bathroom", 5, "flat")
+
+
+def test_a_shipped_mission_is_queued_for_later_with_its_parameters(prepared, tmp_path):
+    later = queueing(prepared, store=tmp_path / "missions.sqlite", out=tmp_path)
+    assert later("visit_room room=office thing=hammer").startswith("queued as mission 1")
+    with pytest.raises(InputError, match="has no parameter 'rom'; did you mean 'room'"):
+        later("visit_room rom=office")
+    with MissionStore(tmp_path / "missions.sqlite", create=False) as missions:
+        (mission,) = missions.missions(MissionState.QUEUED)
+    assert mission.request.given == {"room": "office", "thing": "hammer"}
 
 
 @pytest.mark.mission

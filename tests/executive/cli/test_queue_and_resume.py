@@ -1,7 +1,10 @@
 """Queue and resume on the command line, without a plant: what is kept, in which order it is run, what is refused."""
 
 import json
+import signal
+import time
 from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -16,6 +19,7 @@ from executive.mission.errors import InputError
 from executive.mission.mission import mission_from_commands
 from executive.run.journal import TickNote
 from executive.store.missions import MissionStore
+from executive.store.wakeup import WakeupPipe
 from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
 from executive.tree.registry import installed_skills
@@ -282,3 +286,184 @@ def test_only_one_process_runs_missions_of_a_store(errand, mission, plant, tmp_p
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store, store.claimed():
         result = errand("run", mission("alone"), "--quiet")
     assert (result.exit_code, "runs a mission of this store" in result.output) == (2, True)
+
+
+def listed(errand):
+    return json.loads(errand("queue", "list", "--json").stdout.splitlines()[-1])["missions"]
+
+
+@pytest.mark.parametrize(
+    ("options", "trigger", "missed"),
+    [
+        (("--at", "every weekday 09:00"), "every weekday 09:00", "skip"),
+        (("--every", "30m", "--missed", "once"), "every 30m", "once"),
+        (("--on", "battery full"), "battery full", "skip"),
+        (("--on", "call first"), "call first", None),
+    ],
+)
+def test_a_mission_with_a_trigger_stands_until_it_is_removed(errand, mission, plant, options, trigger, missed):
+    result = errand("queue", "add", mission("first"), *options)
+    assert (result.exit_code, f"({trigger}): first" in result.output) == (0, True), result.output
+    (told,) = listed(errand)
+    assert (told["state"], told["trigger"], told.get("missed")) == ("standing", trigger, missed)
+    assert (told["next"] is not None) == trigger.startswith("every")
+    assert trigger in errand("queue", "list").output
+    assert errand("queue", "run", "--quiet").exit_code == 0
+    assert errand("queue", "remove", "1").exit_code == 0
+    assert (plant.runs, listed(errand)) == ([], [])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--at", "every wekday 09:00"), "did you mean 'weekday'"),
+        (("--at", "every day 09:00", "--every", "30m"), "--at, --every and --on are one trigger each"),
+        (("--at", "2020-01-01 09:00"), "has passed"),
+        (("--every", "soon"), "is no period"),
+        (("--on", "noon"), "is no trigger"),
+        (("--on", "topic mqtt:door"), "registers 'mqtt' in the entry-point group 'errand.triggers'"),
+        (("--missed", "once"), "--missed says nothing without a trigger"),
+        (("--on", "call x", "--missed", "once"), "--missed says nothing for 'call x'"),
+    ],
+)
+def test_a_trigger_that_cannot_be_is_refused_and_nothing_is_kept(errand, mission, plant, options, words):
+    result = errand("queue", "add", mission("first"), *options)
+    assert (result.exit_code, words in result.output) == (2, True), result.output
+    assert errand("queue", "list").exit_code == 2 or listed(errand) == []
+
+
+def test_what_has_passed_is_over(errand, mission, plant, tmp_path):
+    errand("queue", "add", mission("first"), "--at", "2999-01-01 09:00")
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+        store._connection.execute("UPDATE standing SET trigger = '2020-01-01 09:00'")
+    assert "2020-01-01 09:00, over" in errand("queue", "list").output
+
+
+def test_serve_runs_what_is_due_and_the_list_says_where_it_came_from(errand, mission, plant, tmp_path):
+    errand("queue", "add", mission("first"), "--every", "1d", "--missed", "once", "--seed", "4")
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+        day_before = (store.now() - timedelta(days=1.5)).isoformat()
+        store._connection.execute("UPDATE standing SET since = ?, anchor = ?", (day_before, day_before))
+    result = errand("queue", "serve", "--until-idle", "--quiet", "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout.splitlines()[-1])
+    assert told == {"missions": [{"mission": 2, "outcome": "success", "achieved": True}]}
+    assert [run[:3] for run in plant.runs] == [("first", 4, "002-first")]
+    standing, fired = listed(errand)
+    assert (standing["state"], fired["state"], fired["standing"]) == ("standing", "success", 1)
+    assert fired["why"].startswith("every 1d, due 2") and fired["why"].endswith(", missed")
+    assert f"1: {fired['why']}" in errand("queue", "list").output
+
+
+def test_serve_ends_well_although_a_mission_was_not_achieved(errand, mission, plant, states):
+    plant.outcomes = ["failure"]
+    errand("queue", "add", mission("first"))
+    errand("queue", "add", mission("second"))
+    result = errand("queue", "serve", "--until-idle", "--quiet")
+    assert (result.exit_code, "1 of 2 missions achieved" in result.output) == (0, True)
+    assert states() == ["failure", "success"]
+
+
+def test_serve_goes_on_with_what_was_killed(errand, mission, plant, states):
+    plant.outcomes = ["killed"]
+    errand("queue", "add", mission("first"))
+    errand("queue", "add", mission("second"))
+    with pytest.raises(GoneError):
+        errand("queue", "serve", "--until-idle", "--quiet")
+    assert states() == ["running", "queued"]
+    assert errand("queue", "serve", "--until-idle", "--quiet").exit_code == 0
+    assert [(run[0], run[2], run[3].log) for run in plant.runs[1:]] == [
+        ("first", "001-first", "log-2.mcap"),
+        ("second", "002-second", "log.mcap"),
+    ]
+    assert states() == ["success", "success"]
+
+
+def test_only_one_process_serves_a_store(errand, mission, plant, tmp_path):
+    errand("queue", "add", mission("first"), "--every", "1h")
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store, store.claimed():
+        result = errand("queue", "serve", "--until-idle")
+        assert (result.exit_code, "runs a mission of this store" in result.output) == (2, True)
+        assert errand("queue", "remove", "1").exit_code == 0
+
+
+def test_serve_ends_when_its_time_is_over(errand, mission, plant):
+    errand("queue", "add", mission("first"), "--every", "1h")
+    assert errand("queue", "serve", "--for", "0.05").exit_code == 0
+    assert plant.runs == []
+
+
+@pytest.mark.parametrize("seconds", ["1e300", "inf"])
+def test_serve_may_have_all_the_time_there_is(errand, mission, plant, seconds):
+    errand("queue", "add", mission("first"))
+    assert errand("queue", "serve", "--for", seconds, "--until-idle", "--quiet").exit_code == 0
+    assert len(plant.runs) == 1
+
+
+def test_serve_without_a_store_is_refused(errand):
+    result = errand("queue", "serve", "--until-idle")
+    assert (result.exit_code, "there is no store" in result.output) == (2, True)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_server_that_waits(errand, mission, plant, monkeypatch, number):
+    wait = WakeupPipe.wait
+
+    def signalled(self, until):
+        signal.raise_signal(number)
+        wait(self, until)
+
+    monkeypatch.setattr(WakeupPipe, "wait", signalled)
+    errand("queue", "add", mission("first"), "--every", "1h")
+    begun = time.monotonic()
+    assert errand("queue", "serve", "--for", "50").exit_code == 0
+    assert time.monotonic() - begun < 30
+
+
+def test_a_signal_during_a_mission_ends_the_server_and_keeps_the_queue(errand, mission, plant, states):
+    def signalled(prepared, *, control, **options):
+        signal.raise_signal(signal.SIGTERM)
+        plant.outcomes = ["cancelled" if control.poll().cancel == "cancelled by SIGTERM" else "error"]
+        return Plant.__call__(plant, prepared, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(queue_run, "run_simulated", signalled)
+        errand("queue", "add", mission("first"))
+        errand("queue", "add", mission("second"))
+        result = errand("queue", "serve", "--quiet")
+    assert (result.exit_code, states()) == (0, ["cancelled", "queued"])
+    assert "goes on with it" in " ".join(result.output.split())
+    assert errand("resume", "--quiet").exit_code == 0
+    assert states() == ["success", "success"]
+
+
+PLUG_IN = """
+class Bell:
+    def start(self, topics, fire):
+        for topic in topics:
+            fire(topic, b"")
+
+    def stop(self):
+        pass
+"""
+
+
+def test_serve_runs_what_a_plug_in_hears(errand, mission, plant, tmp_path, monkeypatch):
+    (tmp_path / "bell_source.py").write_text(PLUG_IN)
+    info = tmp_path / "bell_source-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Name: bell-source\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[errand.triggers]\nbell = bell_source:Bell\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert errand("queue", "add", mission("first"), "--on", "topic bell:front door").exit_code == 0
+    result = errand("queue", "serve", "--until-idle", "--quiet")
+    assert (result.exit_code, [run[0] for run in plant.runs]) == (0, ["first"]), result.output
+    assert "(topic bell:front door)" in result.output
+
+
+def test_serve_is_refused_where_a_plug_in_is_gone(errand, mission, plant, tmp_path):
+    errand("queue", "add", mission("first"), "--every", "1h")
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+        store._connection.execute("UPDATE standing SET trigger = 'topic gone:x'")
+    result = errand("queue", "serve")
+    assert (result.exit_code, "entry-point group 'errand.triggers'" in result.output) == (2, True)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.cli.signals import cancelled_by_signals, interrupted_by_hang_up
+from executive.cli.signals import cancelled_by_signals, ended_by_signals, interrupted_by_hang_up
 from executive.record.reader import read_events
 from executive.run.control import Control
 from executive.store.missions import MissionState, MissionStore
@@ -44,12 +44,12 @@ RUN = """
     request = Request(file=out / "m.yaml", out=out)
     prepared = prepare(request)
 
-    def start(*, control, observer):
+    def start(*, control, observer, listener):
         def told(progress):
             observer(progress)
             (out / "begun").touch()
             time.sleep(0.01)
-        return run_request(prepared, robot, control=control, observer=told)
+        return run_request(prepared, robot, control=control, observer=told, listener=listener)
 
     with MissionStore(out / "missions.sqlite") as store:
         mission = store.add(prepared.request, queued=False)
@@ -69,6 +69,16 @@ def test_a_signal_cancels_and_the_handlers_are_put_back(number):
         signal.raise_signal(number)
     assert control.poll().cancel == f"cancelled by {signal.Signals(number).name}"
     assert signal.getsignal(number) == before
+
+
+def test_what_ends_by_a_signal_within_something_that_does_ends_both():
+    reasons, control = [], Control(pace=None)
+    with ended_by_signals(reasons.append):
+        with cancelled_by_signals(control):
+            signal.raise_signal(signal.SIGTERM)
+        assert (control.poll().cancel, reasons) == ("cancelled by SIGTERM", ["cancelled by SIGTERM"])
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
 
 
 def test_a_second_ctrl_c_breaks_in_and_a_second_hang_up_does_not():

@@ -2,13 +2,16 @@
 
 import json
 import subprocess
+from pathlib import Path
 
 import pytest
 
 from executive.cli import sweep as module
 from executive.cli.report import RefereeReport, RunReport
-from executive.cli.sweep import rows, seed_range, sweep, totals
+from executive.cli.sweep import condition_rows, conditions, folders, rows, seed_range, sweep, totals
 from executive.mission.errors import InputError
+from executive.mission.request import Request
+from executive.mission.scenario import Scenario
 
 
 def report(seed: int, outcome: str = "success") -> RunReport:
@@ -53,6 +56,38 @@ def test_totals_count_claims_that_the_referee_denies():
         ("1", "success", "fulfilled"),
         ("2", "success", "not fulfilled"),
     ]
+
+
+def test_each_fault_and_scenario_is_tried_alone_after_none():
+    asked = Request("go", scenario=Scenario(("arm refuses", "drive refuses"), 2), scenario_files=(Path("doors.yaml"),))
+    tried = conditions(asked, each=True)
+    assert [name for name, _ in tried] == [
+        "no fault", "arm refuses", "drive refuses", "doors.yaml", "2 random faults"
+    ]  # fmt: skip
+    assert [(each.scenario.faults, each.scenario.random, len(each.scenario_files)) for _, each in tried] == [
+        ((), 0, 0), (("arm refuses",), 0, 0), (("drive refuses",), 0, 0), ((), 0, 1), ((), 2, 0)
+    ]  # fmt: skip
+
+
+def test_without_each_all_faults_are_in_all_runs():
+    asked = Request("go", scenario=Scenario(("arm refuses",)))
+    assert conditions(asked, each=False) == [("", asked)]
+
+
+def test_nothing_to_try_alone_is_refused():
+    with pytest.raises(InputError, match="no fault to try alone; give some by --fault"):
+        conditions(Request("go"), each=True)
+
+
+def test_several_conditions_have_folders_of_their_own():
+    assert folders(Path("out"), [""]) == [Path("out")]
+    names = folders(Path("out"), ["no fault", "camera.hand: dropout 5 s at 20 s"])
+    assert [name.name for name in names] == ["0-no-fault", "1-camera-hand-dropout-5-s-at-20-s"]
+
+
+def test_counts_are_given_for_each_condition():
+    found = [("no fault", [report(1), report(2)]), ("arm refuses", [report(1, "failure"), report(2)])]
+    assert list(condition_rows(found)) == [("no fault", "2", "2", "2", "0"), ("arm refuses", "2", "1", "1", "0")]
 
 
 def test_a_run_that_was_not_judged_is_neither_a_success_by_the_referee_nor_a_false_claim():

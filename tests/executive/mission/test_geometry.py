@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.mission.geometry import distance_m, inside
+from executive.mission.geometry import distance_m, fits, inside, nearest_side
 
 SQUARE = ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
 NOTCHED = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (2.0, 1.0), (0.0, 4.0))
@@ -18,3 +18,15 @@ def test_the_distance_counts_from_the_outline(outline, point, metres):
 @pytest.mark.parametrize(("point", "within"), [((0.5, 2.0), True), ((2.0, 2.0), False), ((3.5, 2.0), True)])
 def test_an_outline_may_have_a_notch(point, within):
     assert inside(NOTCHED, point) is within
+
+
+def test_the_side_along_which_a_line_lies_is_found_in_a_corner_too():
+    assert nearest_side(SQUARE, (1.6, 2.05), 0.9).ends == ((2.0, 2.0), (0.0, 2.0))
+    assert nearest_side(SQUARE, (2.05, 1.6), 0.9).ends == ((2.0, 0.0), (2.0, 2.0))
+
+
+def test_what_fits_lies_within_and_meets_nothing_taken():
+    body = ((0.5, 0.5), (1.0, 0.5), (1.0, 1.0), (0.5, 1.0))
+    assert fits(body, SQUARE, [])
+    assert not fits(SQUARE, body, [])
+    assert not fits(body, SQUARE, [((0.9, 0.9), (1.5, 0.9), (1.5, 1.5))])

@@ -8,6 +8,7 @@ from py_trees.common import Status
 from executive.mission.errors import InputError
 from executive.record.event_log import EventLog
 from executive.record.history import read_history
+from executive.record.reader import Event
 from executive.record.timeline import timeline
 from executive.tree.node_view import node_view, to_json
 from skills.api import Cause, Failed
@@ -128,3 +129,10 @@ def test_a_log_cut_anywhere_gives_the_tree_as_it_was(failed_run, tmp_path):
         readable += bool(changes)
         assert changes == all_changes[: len(changes)]
     assert readable > 10
+
+
+def test_the_timeline_tells_what_a_robot_says():
+    events = [Event("speech", 2.0, {"t": 2.0, "robot": "Alice", "text": "Hello"})]
+    assert [(entry.t, entry.about, entry.text) for entry in timeline(events)] == [
+        (2.0, "speech", 'Alice says: "Hello"')
+    ]

@@ -487,6 +487,20 @@ def test_the_journal_is_kept_of_the_mission_that_took_the_place(compiled, run_tr
     assert journal.taken[0].notes > 0
 
 
+def test_the_journal_hears_of_the_battery_with_each_change_and_once_a_second(compiled, run_tree, make, robot):
+    class Charges(Notebook):
+        def note(self, note):
+            self.taken.append((bool(note.changes), note.charge))
+
+    journal = Charges("fetch drink")
+    robot.charge = 0.5
+    run_tree(compiled(*make.FETCH), journal=journal)
+    assert all(charge is not None for changed, charge in journal.taken if changed)
+    charges = [charge for _, charge in journal.taken if charge is not None]
+    assert 0 < len(charges) < len(journal.taken)
+    assert all(0.4 < charge <= 0.5 for charge in charges)
+
+
 def test_of_a_mission_that_comes_in_between_no_journal_is_kept(compiled, run_tree, make, control):
     between, other, journal = compiled(GO, name="between"), compiled(GO, name="other"), Notebook("fetch drink")
     actions = {2: lambda: control.preempt(between), 4: lambda: control.replace(other)}

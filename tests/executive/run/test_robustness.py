@@ -20,11 +20,12 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
 from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause, Running, Skill, Succeeded
+from skills.faults.faulty_robot import with_faults
+from skills.faults.kinds import VERBS, Effect
+from skills.faults.words import Fault
 from skills.robot import ArmTrajectory
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
-from skills.testing.fault_kinds import VERBS, Effect
-from skills.testing.faults import Fault, with_faults
 from skills.testing.robot import ScriptedRobot
 
 CAPABILITIES = spot_capabilities()

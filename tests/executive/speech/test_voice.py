@@ -1,6 +1,9 @@
+import time
+
 import pytest
 
-from executive.speech.voice import EspeakVoice, Silence, installed_voice
+from executive.mission.errors import InputError
+from executive.speech.voice import EspeakVoice, Silence, installed_voice, queued_voice
 
 
 def test_without_a_synthesiser_nothing_is_said():
@@ -39,3 +42,32 @@ def test_an_answer_that_looks_like_an_option_is_said_too(talker, tmp_path):
 def test_a_long_answer_is_cut(talker, tmp_path):
     talker.say("x" * 1000)
     assert len(_said(tmp_path, talker)[1]) == 300
+
+
+@pytest.fixture
+def slow_talker(tmp_path):
+    program = tmp_path / "espeak-ng"
+    program.write_text(f'#!/bin/sh\nsleep 0.1\nprintf "%s\\n" "$2" >> {tmp_path}/said\n')
+    program.chmod(0o755)
+    return queued_voice(which=lambda name: str(program))
+
+
+def test_a_queued_voice_says_all_in_order_and_never_waits(slow_talker, tmp_path):
+    begun_s = time.perf_counter()
+    for text in ("one", "two", "three"):
+        slow_talker.say(text)
+    assert time.perf_counter() - begun_s < 0.1
+    slow_talker.close()
+    slow_talker.close()
+    assert (tmp_path / "said").read_text().splitlines() == ["one", "two", "three"]
+
+
+def test_a_queued_voice_that_does_not_start_lets_go(tmp_path):
+    voice = queued_voice(which=lambda name: str(tmp_path / "missing"))
+    voice.say("All right.")
+    voice.close()
+
+
+def test_without_a_synthesiser_a_queued_voice_is_refused():
+    with pytest.raises(InputError, match="no voice"):
+        queued_voice(which=lambda name: None)

@@ -11,6 +11,7 @@ from py_trees.common import Status
 
 from executive.mission.errors import InputError
 from executive.mission.request import Request, Start
+from executive.mission.scenario import Scenario
 from executive.run.journal import TickNote
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.snapshot import Change, NodeState
@@ -32,8 +33,8 @@ def changed(path_id, status, cause=None, message=""):
     return Change(path_id, NodeState(), NodeState(status, cause, message))
 
 
-def note(*changes, now_s=1.0, board=None, pose=None, checkpoints=None):
-    return TickNote(now_s, changes, board or {}, pose, checkpoints or {})
+def note(*changes, now_s=1.0, board=None, pose=None, checkpoints=None, charge=None):
+    return TickNote(now_s, changes, board or {}, pose, checkpoints or {}, charge)
 
 
 def test_a_simulated_world_is_kept_before_what_a_tick_brought_and_not_for_a_pose(path):
@@ -52,6 +53,15 @@ def test_a_mission_keeps_where_it_starts(path, start):
     request = replace(REQUEST, start=start)
     with MissionStore(path) as store:
         store.add(request, queued=True)
+    with MissionStore(path, create=False) as store:
+        assert store.missions()[0].request == request
+
+
+def test_a_mission_keeps_what_goes_wrong_and_happens(path):
+    events = {"people": {"Robin": {"start": 3.0}}, "doors": ({"name": "door", "closes": 4.0},), "moves": ()}
+    request = replace(REQUEST, scenario=Scenario(("arm refuses at 3 s",), **events))
+    with MissionStore(path) as store:
+        store.add(request, queued=False)
     with MissionStore(path, create=False) as store:
         assert store.missions()[0].request == request
 
@@ -198,8 +208,35 @@ def test_a_store_of_another_version_is_refused(path):
     with sqlite3.connect(path) as other:
         other.execute("PRAGMA user_version = 9")
     other.close()
-    with pytest.raises(InputError, match="version 9, and this errand reads 4"):
+    with pytest.raises(InputError, match="version 9, and this errand reads 5"):
         MissionStore(path)
+
+
+def test_a_store_of_version_4_is_brought_up_to_date(path):
+    with MissionStore(path) as store:
+        kept = store.add(REQUEST, queued=True)
+    with sqlite3.connect(path) as old:
+        for table in ("standing", "origin", "battery"):
+            old.execute(f"DROP TABLE {table}")
+        for column in ("scenario", "time_of_day", "time_limit_s"):
+            old.execute(f"ALTER TABLE mission DROP COLUMN {column}")
+        old.execute("PRAGMA user_version = 4")
+    old.close()
+    with MissionStore(path, create=False) as store:
+        assert store.missions() == (kept,)
+        store.journal(kept.id).note(note(changed("a", Status.SUCCESS), charge=0.5))
+        store.finish(kept.id, MissionState.SUCCESS, "done")
+        assert store.rows("SELECT lowest, last FROM battery")[0]["last"] == 0.5
+
+
+def test_the_lowest_charge_of_a_mission_is_kept_over_a_restart_and_the_last(path):
+    with MissionStore(path) as store:
+        mission = store.add(REQUEST, queued=False).id
+        journal = store.journal(mission)
+        for tick, charge in enumerate((0.8, None, 0.3, 0.6)):
+            journal.note(note(*([changed(f"a/{tick}", Status.SUCCESS)] if tick != 2 else []), charge=charge))
+        store.journal(mission).note(note(changed("b", Status.SUCCESS), charge=0.9))
+        assert [tuple(row) for row in store.rows("SELECT lowest, last, ended FROM battery")] == [(0.3, 0.9, None)]
 
 
 def test_a_folder_in_place_of_the_store_is_refused(tmp_path):

@@ -252,11 +252,23 @@ def test_what_was_finished_is_told_and_not_done_again(live, script, world):
     assert "goes on here" in told
 
 
+def test_a_look_that_found_nothing_anywhere_is_not_repeated(live, script):
+    """Nothing was ever written to the port of its detections: that is no reason to look again."""
+    live(FETCH_AND_ASK, kill_after=30)
+    script.begun.clear()
+    result, _, recollection = live(FETCH_AND_ASK)
+    assert result.outcome is Outcome.SUCCESS
+    looks = [told for told in recollection.told if "1-bedroom/search" in told and "/detect: " in told]
+    assert [look.partition(": ")[2] for look in looks] == ["failure before the restart: not seen"]
+
+
 def test_answers_and_the_start_pose_outlive_the_process(live, script):
     live(FETCH_AND_ASK, kill_after=30)
     result, _, _ = live(FETCH_AND_ASK)
     assert result.outcome is Outcome.SUCCESS
     assert list(result.worst.answers.values()) == [False]
+    (found,) = result.worst.findings
+    assert (found.answer, found.t_s < 2.0) == (False, True)
     remembered = next(state for path, state in result.worst.states.items() if path.endswith("remember-start"))
     assert remembered.message.endswith("(before the restart)")
 

@@ -25,7 +25,9 @@ from executive.tree.node_view import node_view
 from executive.view.actions import RefusedError, asked_json, control_actions
 from executive.view.feed import Feed
 from executive.view.replay import fed, to_html
+from executive.view.report_page import AnswerRow, ReportPage, StepRow, Verdict, to_report
 from executive.view.server import PageContent, PageServer
+from executive.view.styles import Styles
 from executive.view.watch import SEND_LIMIT_S, ControlWatch
 from skills.api import Cause, Failed, Question
 from skills.estimate.grid_map import GridMap
@@ -610,3 +612,31 @@ def test_a_browser_that_draws_on_the_processor_asks_for_fewer_pictures_of_the_sc
         page.goto(server.url)
         page.wait_for_timeout(500)
         assert eased.wait(5)
+
+
+def test_what_the_robot_says_is_announced_and_in_the_list(page, live):
+    feed, tree, url = live
+    page.goto(url)
+    row(page, leaf_ids(tree)[0]).wait_for(state="attached")
+    feed("activity", 0.5, {"t": 0.5, "robot": "Alice", "node": leaf_ids(tree)[0], "message": "at it"})
+    playwright_api.expect(row(page, leaf_ids(tree)[0])).to_be_attached()
+    page.wait_for_timeout(300)
+    feed("speech", 1.0, {"t": 1.0, "robot": "Alice", "text": "Dinner <b>is</b> ready"})
+    playwright_api.expect(page.locator("#events")).to_contain_text("Alice says “Dinner <b>is</b> ready”")
+    assert page.locator("#said").text_content() == "Alice: Dinner <b>is</b> ready"
+    assert page.locator("#announced").text_content() == "Alice says: Dinner <b>is</b> ready"
+
+
+def test_the_report_is_drawn_without_scripts_in_the_width_of_a_telephone(browser, tmp_path):
+    answers = (AnswerRow(1.0, "hammer in the office", "office", False, "no hammer " + "x" * 200),)
+    steps = (StepRow("go to the hall", Styles.SUCCESS.value, "success", 0, (0.0, 9.0), "there"),)
+    verdict = Verdict("The tree claims", True, "success", "no hammer")
+    report = to_report(ReportPage("patrol", "patrol.yaml", (), (verdict,), (), answers, steps=steps))
+    (tmp_path / "report.html").write_text(report, encoding="utf-8")
+    context = browser.new_context(viewport={"width": 390, "height": 800}, java_script_enabled=False)
+    opened = context.new_page()
+    opened.goto((tmp_path / "report.html").as_uri())
+    assert opened.locator("h1").inner_text() == "Patrol"
+    assert opened.locator(".answer").bounding_box()["width"] <= 390
+    assert opened.locator("main").bounding_box()["width"] <= 390
+    context.close()

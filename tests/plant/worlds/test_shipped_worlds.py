@@ -15,6 +15,8 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
+from executive.mission.knowledge import load_knowledge
+from executive.tree.compiling.doors import view_of
 from plant.worlds.builder.__main__ import build
 from plant.worlds.builder.plan import PLANS, load_plan
 from plant.worlds.placement import place_objects, place_people
@@ -113,6 +115,19 @@ def test_every_room_has_a_free_circle_to_turn_in(knowledge: dict[str, Any], keep
             continue  # ways, in which there need be none
         window = np.ix_((y > low[1]) & (y < high[1]), (x > low[0]) & (x < high[0]))
         assert 2 * radius[window].max() * keepout.header["resolution"] >= 1.5, name
+
+
+def test_from_before_every_door_it_is_seen_from_a_free_pose(world: World, keepout: Map) -> None:
+    knowledge = load_knowledge(world.knowledge_path)
+    for door in knowledge.doors:
+        views = [view for room in door.between if (view := view_of(knowledge, door, room)) is not None]
+        poses = [{"x": view.x_m, "y": view.y_m, "yaw": view.yaw_rad} for view in views]
+        lines = [np.linspace([view.x_m, view.y_m], door.at, 100) for view in views]
+        free = [
+            np.all(keepout.at(np.vstack([footprint(pose), line])) == FREE)
+            for pose, line in zip(poses, lines, strict=True)
+        ]
+        assert any(free), door
 
 
 @pytest.mark.parametrize(

@@ -142,7 +142,7 @@ def test_a_person_walks_on_a_route_of_places_and_points(copy: Path) -> None:
 @pytest.mark.parametrize(
     ("people", "says"),
     [
-        ("people: [{name: Kim}]", "give either 'route', or 'distance_m', 'bearing_rad' and 'turned_rad'"),
+        ("people: [{name: Kim}]", "give 'route', or 'distance_m', 'bearing_rad' and 'turned_rad'"),
         ("people: [{name: Kim, route: {waypoints: []}}]", "route.waypoints"),
         ("people: [{name: Kim, route: {waypoints: [kitchn]}}]", "Kim cannot walk to 'kitchn'.*did you mean 'kitchen'"),
         ("people: [{name: Kim, route: {waypoints: [kitchen], speed: 9}}]", "route.speed"),

@@ -8,10 +8,10 @@ from planar_robot import TWO_ROOMS, Bench
 
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.back_off.skill import BackOff, BackOffInputs
+from skills.faults.faulty_robot import with_faults
 from skills.navigate.scan_health import ScanHealth
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
-from skills.testing.faults import with_faults
 
 START, GOAL = Pose2D(1.2, 5.4, 0.0), Pose2D(4.0, 5.4, 0.0)
 

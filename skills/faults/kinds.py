@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -11,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.robot import CommandState, CommandStatus, Image, Robot
-from skills.testing.pulling import pulled
+from skills.faults.pulling import pulled
+from skills.robot import CommandState, CommandStatus, FrameTree, Image, NoImageError, Robot
 
 THIEF: Final = "the tablet"
 """Who takes the lease in "lease taken"."""
@@ -54,26 +55,29 @@ class Call:
 class Effect:
     """What a fault does: to which verbs, and `act(call)` while it is on; `watch(result, call)` sees the calls before.
 
-    Calls of the verbs in `always` go to `act` at all times.
+    Calls of the verbs in `always` go to `act` at all times. What happens `once` is over then, though it stays on.
     """
 
     verbs: frozenset[str]
     act: Callable[[Call], Any]
     watch: Callable[[Any, Call], None] = field(default=lambda result, call: None)
     always: frozenset[str] = frozenset()
+    once: bool = False
 
 
 @dataclass(frozen=True)
 class FaultKind:
     """A fault by name: the words (a pattern with named groups), an example, and the effect of a match.
 
-    Raises ValueError from `effect` when the words match but name nothing that there is.
+    Raises ValueError from `effect` when the words match but name nothing that there is. `random` are the words by which
+    it is drawn at random, with {camera}, {sensor}, {motion}, {metres}, {span} and {at}; without, it never is.
     """
 
     pattern: str
     example: str
     meaning: str
     effect: Callable[[re.Match[str]], Effect]
+    random: str = ""
 
 
 class InjectedFault(RuntimeError):  # noqa: N818 - it stands for any defect of a driver
@@ -84,7 +88,10 @@ def verb_of(word: str) -> str:
     """The verb that a word names. Raises ValueError."""
     verb = _OTHER_WORDS.get(word, word)
     if verb not in VERBS:
-        raise ValueError(f"'{word}' is no verb of the robot; known are {', '.join((*VERBS, *_OTHER_WORDS))}")
+        known = (*VERBS, *_OTHER_WORDS)
+        near = difflib.get_close_matches(word, known, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
+        raise ValueError(f"'{word}' is no verb of the robot; {hint}")
     return verb
 
 
@@ -107,8 +114,25 @@ def _freezes(match: re.Match[str]) -> Effect:
             call.memory[call.source] = call.proceed()
         return call.memory[call.source]
 
+    return Effect(_sensors(match), act, watch)
+
+
+def _sensors(match: re.Match[str]) -> frozenset[str]:
+    """The sense verb that the words name, or all."""
     everything = match["verb"] in ("sensors", "everything")
-    return Effect(frozenset(SENSE_VERBS) if everything else _among(match, SENSE_VERBS), act, watch)
+    return frozenset(SENSE_VERBS) if everything else _among(match, SENSE_VERBS)
+
+
+def _drops_out(match: re.Match[str]) -> Effect:
+    """There are no new readings, and no pictures at all."""
+    frozen = _freezes(match)
+
+    def act(call: Call) -> Any:
+        if call.verb == "image":
+            raise NoImageError(f"the camera '{call.arguments[0]}' gives no picture")
+        return frozen.act(call)
+
+    return replace(frozen, act=act)
 
 
 def _raises(match: re.Match[str]) -> Effect:
@@ -204,8 +228,18 @@ def _pulled(match: re.Match[str]) -> Effect:
 
 
 def _jumps(match: re.Match[str]) -> Effect:
+    """Dead reckoning is off wherever it is told: by itself, with scans, and with pictures."""
     ahead = RigidTransform(np.array([float(match["metres"]), 0.0, 0.0]))
-    return _reads("odometry", lambda reading: replace(reading, X_OB=reading.X_OB @ ahead))
+
+    def act(call: Call) -> Any:
+        reading = call.proceed()
+        if isinstance(reading, Image):
+            edges = reading.frames.edges.items()
+            moved = {child: (parent, X_PC @ ahead if parent == "odom" else X_PC) for child, (parent, X_PC) in edges}
+            return replace(reading, frames=FrameTree(moved))
+        return None if reading is None else replace(reading, X_OB=reading.X_OB @ ahead)
+
+    return Effect(frozenset(("odometry", "scan", "image")), act)
 
 
 def _battery(match: re.Match[str]) -> Effect:
@@ -224,7 +258,7 @@ def _lease(_: re.Match[str]) -> Effect:
             call.memory["taken"] = call.robot.take_lease(THIEF)
         return call.proceed()
 
-    return Effect(frozenset(VERBS) - {"take_lease"}, act)
+    return Effect(frozenset(VERBS) - {"take_lease"}, act, once=True)
 
 
 def _loses(_: re.Match[str]) -> Effect:
@@ -240,7 +274,7 @@ def _loses(_: re.Match[str]) -> Effect:
             return call.robot.set_gripper(opening_rad, _WEAK_N, until_s=until_s, lease=owned)
         return call.proceed()
 
-    return Effect(frozenset(("gripper", "set_gripper")), act)
+    return Effect(frozenset(("gripper", "set_gripper")), act, once=True)
 
 
 _WEAK_N, _WEAK_S = 0.5, 1.0
@@ -252,11 +286,37 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         "camera freezes at 3 s",
         'a sensor, or all ("sensors"), gives its last reading over and over',
         _freezes,
+        "{sensor}: freezes {span}",
+    ),
+    FaultKind(
+        r"(?P<verb>\w+) (?:has a )?(?:dropout|drops out)",
+        "camera.hand: dropout 5 s at 20 s",
+        'a sensor, or all ("sensors"), gives no new readings; a camera gives no pictures',
+        _drops_out,
+        "{sensor}: dropout {span}",
     ),
     FaultKind(r"(?P<verb>\w+)(?: verb)? raises", "drive raises at 2 s", "a verb raises an exception", _raises),
-    FaultKind(r"(?P<verb>\w+) refuses", "arm refuses", "a motion verb refuses its commands", _refuses),
-    FaultKind(r"(?P<verb>\w+) never ends", "stand never ends", "commands stay under way and do nothing", _never_ends),
-    FaultKind(r"(?P<verb>\w+) is stopped", "arm is stopped at 1 s", "commands are stopped at once", _is_stopped),
+    FaultKind(
+        r"(?P<verb>\w+) refuses",
+        "arm refuses",
+        "a motion verb refuses its commands",
+        _refuses,
+        "{motion} refuses {span}",
+    ),
+    FaultKind(
+        r"(?P<verb>\w+) never ends",
+        "stand never ends",
+        "commands stay under way and do nothing",
+        _never_ends,
+        "{motion} never ends {span}",
+    ),
+    FaultKind(
+        r"(?P<verb>\w+) is stopped",
+        "arm is stopped at 1 s",
+        "commands are stopped at once",
+        _is_stopped,
+        "{motion} is stopped {span}",
+    ),
     FaultKind(
         r"gripper reports holding(?: (?P<what>nothing|something))?",
         "gripper reports holding nothing",
@@ -268,15 +328,23 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         "gripper loses it at 20 s",
         "what the gripper holds then, or takes next, falls out of it, once",
         _loses,
+        "gripper loses it {at}",
     ),
     FaultKind(
         r"(?:image|camera) returns (?P<what>NaN|nan|no) depth",
         "image returns NaN depth",
         "pictures come with depth that is NaN, or none",
         _no_depth,
+        "{camera}: returns no depth {span}",
     ),
-    FaultKind(r"(?:image|camera) is black", "camera is black from 1 s", "pictures show nothing, depth stays", _black),
-    FaultKind(r"(?:scan|lidar) is missing", "scan is missing", "there is no scan", _missing),
+    FaultKind(
+        r"(?:image|camera) is black",
+        "camera is black from 1 s",
+        "pictures show nothing, depth stays",
+        _black,
+        "{camera}: is black {span}",
+    ),
+    FaultKind(r"(?:scan|lidar) is missing", "scan is missing", "there is no scan", _missing, "lidar is missing {span}"),
     FaultKind(r"(?P<verb>\w+) returns garbage", "joints returns garbage", "a sensor's numbers are NaN", _garbage),
     FaultKind(
         r"hand is pulled with (?P<force>\d+(?:\.\d+)?) N",
@@ -289,6 +357,7 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         "odometry jumps 0.5 m at 2 s",
         "dead reckoning is off by so much ahead",
         _jumps,
+        "odometry jumps {metres} m {at}",
     ),
     FaultKind(
         r"battery falls to (?P<percent>\d+(?:\.\d+)?) ?%",

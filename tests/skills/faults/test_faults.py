@@ -5,12 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from skills.robot import CommandState
+from skills.faults.faulty_robot import with_faults
+from skills.faults.kinds import STANDARD_FAULTS, InjectedFault
+from skills.faults.words import parse_fault, random_faults
+from skills.robot import CommandState, NoImageError
 from skills.testing.blocks import ROOM
 from skills.testing.clock import VirtualClock
-from skills.testing.fault_kinds import STANDARD_FAULTS, InjectedFault
-from skills.testing.faults import parse_fault, with_faults
 from skills.testing.robot import ScriptedRobot, Start
+
+CAMERAS = ("hand", "left", "back")
 
 
 @pytest.fixture
@@ -123,6 +126,8 @@ def test_odometry_can_jump(faulty, clock):
     assert robot.odometry().pose.x_m == 0.0
     clock.advance(1.0)
     assert robot.odometry().pose.x_m == pytest.approx(0.5)
+    assert robot.scan().X_OB.translation()[0] == pytest.approx(0.5)
+    assert robot.image("left").frames.pose("body").translation()[0] == pytest.approx(0.5)
 
 
 def test_battery_and_faults_can_be_set(faulty):
@@ -139,6 +144,88 @@ def test_several_faults_act_together(faulty):
 
 
 @pytest.mark.parametrize(
+    ("words", "from_s", "to_s", "source"),
+    [
+        ("camera.hand: dropout 5 s at 20 s", 20.0, 25.0, "hand"),
+        ("camera.hand: dropout", 0.0, math.inf, "hand"),
+        ("camera: is black for 2.5 s at 3 s", 3.0, 5.5, None),
+        ("lidar: freezes from 3 s to 5 s", 3.0, 5.0, None),
+        ("lidar freezes 4s", 0.0, 4.0, None),
+        ("odometry drops out 1 s from 2 s", 2.0, 3.0, None),
+        ("hand is pulled with 15 N at 6 s", 6.0, math.inf, None),
+        ("gripper: loses it at 20 s", 20.0, math.inf, None),
+    ],
+)
+def test_words_say_when_and_of_which_camera(words, from_s, to_s, source):
+    fault = parse_fault(words)
+    assert (fault.from_s, fault.to_s, fault.source) == (from_s, to_s, source)
+
+
+def test_a_camera_that_drops_out_gives_no_pictures_for_a_while_and_the_others_go_on(faulty, clock):
+    robot, _ = faulty("camera.hand: dropout 2 s at 1 s")
+    robot.image("hand")
+    clock.advance(1.0)
+    with pytest.raises(NoImageError, match="the camera 'hand' gives no picture"):
+        robot.image("hand")
+    assert robot.image("left").source == "left"
+    clock.advance(2.0)
+    assert robot.image("hand").stamp_s == 3.0
+
+
+def test_a_sensor_that_drops_out_gives_no_new_readings(faulty, clock):
+    robot, _ = faulty("lidar: dropout 2 s at 1 s")
+    clock.advance(0.9)
+    before = robot.scan().stamp_s
+    clock.advance(1.0)
+    assert robot.scan().stamp_s == before
+    clock.advance(1.2)
+    assert robot.scan().stamp_s == pytest.approx(3.1)
+
+
+def test_a_robot_tells_which_of_its_faults_are_on(faulty, clock):
+    robot, _ = faulty("lidar: dropout 2 s at 1 s", "joints freezes after 1 call")
+    assert robot.faults_at_work() == ()
+    robot.joints()
+    clock.advance(1.0)
+    assert robot.faults_at_work() == ("lidar: dropout 2 s at 1 s", "joints freezes after 1 call")
+    clock.advance(2.0)
+    assert robot.faults_at_work() == ("joints freezes after 1 call",)
+
+
+def test_times_may_count_from_the_beginning_of_the_clock(clock, spot):
+    clock.advance(5.0)
+    robot = with_faults(ScriptedRobot(clock, capabilities=spot), clock, ["gripper reports holding at 5 s"], since_s=0.0)
+    assert robot.gripper().holding
+
+
+@pytest.mark.parametrize(
+    ("words", "over"),
+    [("lease taken at 4 s", True), ("lease taken at 6 s", False), ("lidar freezes at 4 s", False),
+     ("lidar: dropout 1 s at 4 s", True), ("lidar: dropout 2 s at 4 s", False)],
+)  # fmt: skip
+def test_what_is_over_does_not_come_again_after_a_restart(words, over):
+    assert parse_fault(words).over_by(5.0) is over
+
+
+def test_random_faults_are_the_same_for_a_seed_and_are_faults():
+    drawn = random_faults(50, 7, CAMERAS)
+    assert drawn == random_faults(50, 7, CAMERAS)
+    assert drawn != random_faults(50, 8, CAMERAS)
+    assert len(drawn) == 50
+    assert len({parse_fault(words, cameras=CAMERAS).effect.verbs for words in drawn}) > 4
+
+
+def test_more_random_faults_keep_those_that_fewer_have():
+    assert set(random_faults(2, 7, CAMERAS)) < set(random_faults(5, 7, CAMERAS))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in STANDARD_FAULTS if kind.random], ids=lambda kind: kind.example)
+def test_every_kind_that_is_drawn_parses_as_that_kind(kind):
+    (words,) = random_faults(1, 1, CAMERAS, [kind])
+    assert parse_fault(words, [kind], cameras=CAMERAS).words == words
+
+
+@pytest.mark.parametrize(
     ("words", "message"),
     [
         ("camera freeses at 3 s", "did you mean 'camera freezes at 3 s'"),
@@ -146,11 +233,18 @@ def test_several_faults_act_together(faulty):
         ("tail raises", "'tail' is no verb of the robot"),
         ("drive freezes", "'drive' cannot do that"),
         ("camera freezes from 3 s to 2 s", "ends before it begins"),
+        ("camera freezes 2 s from 3 s to 5 s", "says twice how long"),
+        ("camera freezes 0 s at 3 s", "ends before it begins"),
+        ("camera.hand: droput 5 s at 20 s", "did you mean 'camera.hand: dropout 5 s at 20 s'"),
+        ("camera.hnad: dropout 5 s at 20 s", "the robot has no camera 'hnad'; did you mean 'hand'"),
+        ("lidar.front: dropout 5 s", "leave '.front' out"),
+        ("drive: dropout", "'drive' cannot do that"),
+        ("camra: dropout", "'camra' is no verb of the robot; did you mean 'camera'"),
     ],
 )
 def test_words_that_are_no_fault_are_refused_with_the_mend(words, message):
     with pytest.raises(ValueError, match=message):
-        parse_fault(words)
+        parse_fault(words, cameras=("hand", "left"))
 
 
 @pytest.fixture

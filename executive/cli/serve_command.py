@@ -1,0 +1,68 @@
+"""`errand queue serve`: its options, and what it needs opened around it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from datetime import timedelta
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from executive.cli.durable import STORE
+from executive.cli.output import console_for, print_json, refusals
+from executive.cli.signals import ended_by_signals
+from executive.store.missions import MissionState, MissionStore
+from executive.store.standing import StandingMissions
+from executive.store.wakeup import WakeupPipe
+
+__all__ = ["AsJson", "Out", "Store", "serve"]
+
+Out = Annotated[Path, typer.Option(help="Folder for logs; each mission gets one of its own in it.")]
+Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
+_LONGEST_S: Final = 3.2e9  # a hundred years
+
+AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
+
+
+def serve(
+    out: Out = Path("out"),
+    store: Store = None,
+    host: Annotated[str, typer.Option(help="Where HTTP calls are served.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="The port for HTTP calls; 0 takes a free one.")] = 8950,
+    token: Annotated[
+        str | None,
+        typer.Option(envvar="ERRAND_TOKEN", help="What calls must bear; by default one kept beside the store."),
+    ] = None,
+    until_idle: Annotated[bool, typer.Option("--until-idle", help="End when nothing is queued.")] = False,
+    for_s: Annotated[
+        float | None,
+        typer.Option("--for", metavar="SECONDS", min=0.0, help="End after so long; no mission begins then."),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while a mission runs.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Wait for triggers and run what is queued, until Ctrl-C: at times, on a full battery, calls and messages."""
+    from executive.cli.listeners import CallAddress, Listeners
+    from executive.cli.queue_serve import MissionRunner, QueueServer
+
+    console = console_for(as_json)
+    limit = None if for_s is None else timedelta(seconds=min(for_s, _LONGEST_S))
+
+    def tell(line: str) -> None:
+        console.print(line, markup=False)
+
+    with refusals(), MissionStore(store or out / STORE, create=False) as missions, missions.claimed():
+        end = None if limit is None else missions.now() + limit
+        address = CallAddress(host, port, token)
+        with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
+            standing, runner = StandingMissions(missions), MissionRunner(missions, console, quiet=quiet)
+            server = QueueServer(missions, standing, wakeup, runner, follow=listeners.follow, tell=tell)
+            with ended_by_signals(server.stop):
+                tell(f"Standing missions: {len(standing.missions())} ({missions.path}). Ctrl-C ends.")
+                ended = server.serve(end=end, until_idle=until_idle)
+    tell(f"{sum(each.achieved for each in ended)} of {len(ended)} missions achieved")
+    if ended and ended[-1].outcome == MissionState.CANCELLED.value:
+        tell(f"Mission {ended[-1].mission} was cancelled; `errand resume --store {missions.path}` goes on with it.")
+    if as_json:
+        print_json({"missions": [asdict(each) for each in ended]})

@@ -1,0 +1,80 @@
+"""Scenarios: what goes wrong with the robot, and what happens in its world, while a mission runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+__all__ = ["NO_SCENARIO", "Scenario"]
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What goes wrong and what happens, understood: words of faults, how many the seed draws, and events as plain data.
+
+    `people` are routes by name, `doors` doorways with the times at which they close and open, `moves` objects with the
+    time at which they are moved and where to; all points are in the world frame, in metres.
+    """
+
+    faults: tuple[str, ...] = ()
+    random: int = 0
+    people: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    doors: tuple[Mapping[str, Any], ...] = ()
+    moves: tuple[Mapping[str, Any], ...] = ()
+
+    def __bool__(self) -> bool:
+        return self != NO_SCENARIO
+
+    @property
+    def moving(self) -> set[str]:
+        """The people and doors that it moves, by name; in one run, only one scenario may move each."""
+        return {*self.people, *(door["name"] for door in self.doors)}
+
+    def and_also(self, other: Scenario) -> Scenario:
+        """Both together."""
+        return Scenario(
+            (*self.faults, *other.faults),
+            self.random + other.random,
+            {**self.people, **other.people},
+            (*self.doors, *other.doors),
+            (*self.moves, *other.moves),
+        )
+
+    def with_drawn(self, faults: tuple[str, ...]) -> Scenario:
+        """The same with the random faults drawn."""
+        return replace(self, faults=(*self.faults, *faults), random=0)
+
+    def lines(self) -> tuple[str, ...]:
+        """What goes wrong and happens, one line each."""
+        people = (f"{name} sets off at {route['start']:g} s" for name, route in self.people.items())
+        doors = (f"the {door['name']} {_times(door)}" for door in self.doors)
+        moves = (f"somebody moves the {_moved(move)} at {move['at']:g} s" for move in self.moves)
+        return (*(f"fault: {words}" for words in self.faults), *people, *doors, *moves)
+
+    def to_text(self) -> str:
+        """As JSON."""
+        return json.dumps({"faults": self.faults, "people": self.people, "doors": self.doors, "moves": self.moves})
+
+    @staticmethod
+    def of_text(text: str) -> Scenario:
+        """What `to_text` wrote."""
+        told = json.loads(text)
+        return Scenario(tuple(told["faults"]), 0, told["people"], tuple(told["doors"]), tuple(told["moves"]))
+
+
+NO_SCENARIO: Final = Scenario()
+"""Nothing goes wrong, and nothing happens but what the robot does."""
+
+
+def _times(door: Mapping[str, Any]) -> str:
+    """When a door closes and opens, in order."""
+    told = sorted((door[verb], verb) for verb in ("closes", "opens") if door[verb] is not None)
+    return " and ".join(f"{verb} at {at_s:g} s" for at_s, verb in told)
+
+
+def _moved(move: Mapping[str, Any]) -> str:
+    """What is moved, and where to."""
+    to = move["to"]
+    return f"{move['name']} to {f'the {to}' if isinstance(to, str) else '({:g}, {:g}, {:g})'.format(*to)}"

@@ -1,0 +1,250 @@
+"""Scenario files: faults by their words, how many more the seed draws, and events.
+
+Events are people who walk, doors that close and open, and objects that somebody moves.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, model_validator
+
+from executive.mission.errors import InputError, Problems, suggestion
+from executive.mission.file.people import StopFile
+from executive.mission.knowledge import Corner, Knowledge
+from executive.mission.scenario import Scenario
+from executive.mission.yaml_source import KeyPath, Name, Text, YamlSource, read_yaml, validate
+from skills.faults.words import parse_fault
+from skills.quantities import Coordinate, Delay, Height, Speed
+
+__all__ = ["EventFile", "ScenarioFile", "checked_fault", "load_scenario", "scenario_of"]
+
+MOST_RANDOM: Final = 100
+_SECONDS: Final = re.compile(r"\s*(\d+(?:\.\d+)?)\s*s\s*")
+_KINDS: Final = ("person", "door", "object")
+_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
+    "person": ("at", "to", "from", "speed", "loop", "yields"),
+    "door": ("closes", "opens"),
+    "object": ("at", "to"),
+}
+
+
+def _seconds(value: Any) -> Any:
+    """A number of seconds, or its text with the unit."""
+    match = _SECONDS.fullmatch(value) if isinstance(value, str) else None
+    return value if match is None else float(match[1])
+
+
+Seconds = Annotated[Delay, BeforeValidator(_seconds), Field(strict=True)]
+Spot = tuple[Coordinate, Coordinate, Height]
+Stops = Annotated[tuple[Corner | Name | StopFile, ...], Field(min_length=1)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class EventFile(_Strict):
+    """Something that happens: exactly one of `person`, `door` and `object` says to whom or what."""
+
+    person: Name | None = Field(None, description="Somebody who walks; known in the world, or somebody new.")
+    door: tuple[Name, Name] | None = Field(None, description="The two rooms that a door joins.")
+    object: Name | None = Field(None, description="An object by its name in the world, or the first of a class.")
+    at: Seconds | None = Field(None, description="When, on the robot's clock: `20` or `20 s`.")
+    to: Corner | Spot | Name | Stops | None = Field(
+        None,
+        description="A person: a place, a point [x, y], or a list of them with pauses. An object: a surface, or "
+        "[x, y, z] of what it is put on, in metres.",
+    )
+    from_: Corner | Name | None = Field(None, alias="from", description="Where somebody new stands at first.")
+    speed: Annotated[Speed, Field(strict=True)] = Field(1.2, description="How fast the person walks, in m/s.")
+    loop: StrictBool = Field(False, description="Whether the person goes on from the first place after the last.")
+    yields: StrictBool = Field(True, description="Whether the person stops for a robot that is close ahead.")
+    closes: Seconds | None = Field(None, description="When the door begins to close.")
+    opens: Seconds | None = Field(None, description="When it begins to open; alone, it is closed at first.")
+
+    @model_validator(mode="after")
+    def _of_one_kind(self) -> EventFile:
+        named = [kind for kind in _KINDS if getattr(self, kind) is not None]
+        if len(named) != 1:
+            raise ValueError("give exactly one of 'person', 'door' and 'object'")
+        given = {_alias(name) for name in self.model_fields_set} - {named[0]}
+        strange = sorted(given - {*_KEYS[named[0]]})
+        if strange:
+            raise ValueError(f"'{strange[0]}' is none of the keys of a {named[0]}: {', '.join(_KEYS[named[0]])}")
+        if named[0] == "door" and self.closes is None and self.opens is None:
+            raise ValueError("a door needs 'closes' or 'opens'")
+        if named[0] != "door" and (self.at is None or self.to is None):
+            raise ValueError(f"a {named[0]} needs 'at' and 'to'")
+        spot = isinstance(self.to, tuple) and len(self.to) == 3 and isinstance(self.to[0], float)
+        if named[0] == "person" and spot:
+            raise ValueError("a person walks to a point [x, y], without a height")
+        if named[0] == "object" and not (spot or isinstance(self.to, str)):
+            raise ValueError("an object is moved to a surface, or to a point [x, y, z], z of what it is put on")
+        return self
+
+
+def _alias(name: str) -> str:
+    return name.removesuffix("_")
+
+
+class ScenarioFile(_Strict):
+    """What goes wrong and happens while a mission runs."""
+
+    faults: tuple[Text, ...] = Field(default=(), description="Faults by their words.")
+    random: Annotated[int, Field(ge=0, le=MOST_RANDOM, strict=True)] = Field(
+        0, description="How many more faults the run's seed draws."
+    )
+    events: tuple[EventFile, ...] = Field(default=(), description="What happens in the world.")
+
+
+def checked_fault(words: str, cameras: tuple[str, ...]) -> str:
+    """The words of a fault that there is. Raises InputError."""
+    try:
+        return parse_fault(words, cameras=cameras).words
+    except ValueError as error:
+        what, _, hint = str(error).partition("; ")
+        raise InputError(what, hint=hint) from error
+
+
+def load_scenario(path: Path) -> tuple[ScenarioFile, YamlSource]:
+    """Read a scenario file. Raises InputError with file and line."""
+    source = read_yaml(path)
+    return validate(ScenarioFile, source), source
+
+
+def scenario_of(
+    file: ScenarioFile,
+    source: YamlSource,
+    knowledge: Knowledge,
+    *,
+    cameras: tuple[str, ...],
+    objects: Mapping[str, str],
+    people: Mapping[str, bool],
+) -> Scenario:
+    """A file's scenario in a world, its places as points.
+
+    `cameras` are the robot's, `objects` the classes of the world's objects by their names, `people` tells of those in
+    the world whether they walk already.
+
+    Raises:
+        InputError: a fault, place, door, object or person is not there; with the line.
+    """
+    problems, faults = Problems(), list[str]()
+    for number, words in enumerate(file.faults):
+        with problems, _placed(source, ("faults", number)):
+            faults.append(checked_fault(words, cameras))
+    reader = _Events(source, knowledge, objects, people)
+    for number, event in enumerate(file.events):
+        with problems:
+            reader.take(event, ("events", number))
+    problems.raise_any()
+    return Scenario(tuple(faults), file.random, reader.people, tuple(reader.doors), tuple(reader.moves))
+
+
+class _placed:  # noqa: N801 - a context manager
+    """Gives errors without a place the line of a key."""
+
+    def __init__(self, source: YamlSource, path: KeyPath) -> None:
+        self._source, self._path = source, path
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: object) -> None:
+        if isinstance(error, InputError):
+            raise self._source.error(self._path, error.message, error.hint) from error
+
+
+class _Events:
+    """Collects the events of a file, each checked against the world."""
+
+    def __init__(
+        self, source: YamlSource, knowledge: Knowledge, objects: Mapping[str, str], known_people: Mapping[str, bool]
+    ) -> None:
+        self._source, self._knowledge = source, knowledge
+        self._objects, self._known_people = objects, known_people
+        self.people: dict[str, Mapping[str, Any]] = {}
+        self.doors: list[Mapping[str, Any]] = []
+        self.moves: list[Mapping[str, Any]] = []
+
+    def take(self, event: EventFile, path: KeyPath) -> None:
+        """Take in one. Raises InputError."""
+        if event.person is not None:
+            self._walk(event, event.person, path)
+        elif event.door is not None:
+            self._door(event, event.door, path)
+        elif event.object is not None:
+            self._move(event, event.object, path)
+
+    def _walk(self, event: EventFile, said: str, path: KeyPath) -> None:
+        name = self._knowledge.person(said) or said
+        if name in self.people:
+            hint = "give its 'to' a list of places, with pauses"
+            raise self._source.error((*path, "person"), f"{name} has an event already", hint)
+        if self._known_people.get(name, False):
+            raise self._source.error((*path, "person"), f"{name} walks already", "take somebody who stands")
+        if name not in self._known_people and event.from_ is None:
+            hint = suggestion(said, self._known_people, f"add 'from', where {name} stands at first")
+            raise self._source.error((*path, "person"), f"there is no {said} in the world", hint)
+        if name in self._known_people and event.from_ is not None:
+            raise self._source.error((*path, "from"), f"{name} stands in the world already", "take 'from' out")
+        stops = _stops(event.to) if event.from_ is None else [StopFile(at=event.from_, pause=0.0), *_stops(event.to)]
+        route = {"start": event.at, "speed": event.speed, "loop": event.loop, "yields": event.yields}
+        points = [{"at": self._point(stop.at, (*path, "to")), "pause": stop.pause} for stop in stops]
+        self.people[name] = {**route, "waypoints": points}
+
+    def _point(self, at: Corner | str, path: KeyPath) -> Corner:
+        """A place as a point."""
+        if not isinstance(at, str):
+            return at
+        place = self._knowledge.place(at)
+        if place is None:
+            hint = suggestion(at, self._knowledge.spellings(self._knowledge.place_names()), "give a point [x, y]")
+            raise self._source.error(path, f"unknown place {at!r}", hint)
+        pose = self._knowledge.place_pose(place)
+        return pose.x, pose.y
+
+    def _door(self, event: EventFile, rooms: tuple[str, str], path: KeyPath) -> None:
+        names = tuple(self._knowledge.place(room) or room for room in rooms)
+        doors = [door for door in self._knowledge.doors if set(door.between) == set(names)]
+        if not doors:
+            known = [" and ".join(door.between) for door in self._knowledge.doors]
+            hint = suggestion(" and ".join(names), known) if known else "list it under 'doors' in knowledge.yaml"
+            raise self._source.error((*path, "door"), f"no door is known between {rooms[0]} and {rooms[1]}", hint)
+        for number, door in enumerate(doors, 1):
+            name = f"door between {door.between[0]} and {door.between[1]}" + (f" ({number})" if number > 1 else "")
+            if any(other["name"] == name for other in self.doors):
+                raise self._source.error((*path, "door"), f"the {name} has an event already", "write one for each door")
+            times = {"closes": event.closes, "opens": event.opens}
+            self.doors.append({"name": name, "at": door.at, "width": door.width, **times})
+
+    def _move(self, event: EventFile, said: str, path: KeyPath) -> None:
+        classes = self._knowledge.classes(self._knowledge.thing(said) or said)
+        named = [name for name in self._objects if name.lower() == said.lower()]
+        of_class = [name for name, kind in self._objects.items() if kind in classes]
+        if not named and not of_class:
+            hint = suggestion(said, [*self._objects, *self._objects.values()])
+            raise self._source.error((*path, "object"), f"there is no {said!r} in the world", hint)
+        self.moves.append({"name": (named or of_class)[0], "at": event.at, "to": self._rest(event.to, (*path, "to"))})
+
+    def _rest(self, to: Any, path: KeyPath) -> str | Spot:
+        """The surface that is meant, or the point."""
+        if not isinstance(to, str):
+            x, y, z = to
+            return x, y, z
+        place = self._knowledge.place(to)
+        if place is None or place not in self._knowledge.surfaces:
+            what = f"{to!r} is no surface" if place is not None else f"unknown surface {to!r}"
+            hint = suggestion(to, self._knowledge.spellings(self._knowledge.surfaces), shown=self._knowledge.surfaces)
+            raise self._source.error(path, what, hint)
+        return place
+
+
+def _stops(to: Any) -> list[StopFile]:
+    """Where a person goes, one after the other."""
+    single = isinstance(to, str) or isinstance(to[0], float | int)
+    return [each if isinstance(each, StopFile) else StopFile(at=each, pause=0.0) for each in ((to,) if single else to)]

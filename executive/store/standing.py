@@ -1,0 +1,162 @@
+"""Standing missions: each waits in the store with its trigger; when that fires, a queued copy of it is added."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta, tzinfo
+from typing import Final
+
+from executive.mission.errors import InputError
+from executive.mission.request import Request
+from executive.store.missions import MissionState, MissionStore, StoredMission, insert
+from executive.store.records import request_of, row_of
+from executive.store.triggers import Every, Missed, OnBatteryFull, Once, Schedule, Timed, Trigger, local, trigger_of
+
+__all__ = ["LATE", "MOST_WAITING", "StandingMission", "StandingMissions", "TooManyError"]
+
+LATE: Final = timedelta(seconds=90)
+"""What is noticed later than this after its time is missed: the clock was set, or the machine slept."""
+SET_BACK: Final = timedelta(hours=1)
+"""A clock that is set back by less has no occurrence come twice; by more, occurrences come as it shows their times."""
+MOST_WAITING: Final = 100
+_ENDED_SQL: Final = (
+    "SELECT lowest, last, ended, world_name, robot FROM battery JOIN mission ON id = mission WHERE ended"
+)
+
+
+@dataclass(frozen=True)
+class StandingMission:
+    """A mission that is queued whenever its trigger fires.
+
+    `anchor` is when it was given, `since` the moment up to which its occurrences have been dealt with, both aware.
+    """
+
+    id: int
+    request: Request
+    trigger: Trigger
+    missed: Missed
+    anchor: datetime
+    since: datetime
+
+    def due_next(self, now: datetime, zone: tzinfo | None) -> datetime | None:
+        """When its next occurrence after now is due (`zone` None: the system's); None where no time says so."""
+        if not isinstance(self.trigger, Timed):
+            return None
+        return self.trigger.after(max(now, self.since), self.anchor, zone)
+
+
+class StandingMissions:
+    """The standing missions of a store."""
+
+    def __init__(self, store: MissionStore, zone: tzinfo | None = None) -> None:
+        """`zone` is where local times are meant; None is the system's."""
+        self._store, self._zone = store, zone
+
+    def add(self, request: Request, trigger: Trigger, missed: Missed = Missed.SKIP) -> StandingMission:
+        """Keep a mission whose request is understood. Raises InputError: its only time has passed."""
+        now = self._store.now()
+        if isinstance(trigger, Once) and trigger.latest(now, now, self._zone) is not None:
+            raise InputError(f"{trigger} has passed", hint="give a time to come, or queue the mission without --at")
+        times = {"anchor": now.isoformat(), "since": now.isoformat()}
+        with self._store.writing() as connection:
+            values = {**row_of(request), "queued": False, "state": MissionState.STANDING.value}
+            number = insert(connection, "mission", values)
+            told = {"mission": number, "trigger": str(trigger), "missed": missed.value, **times}
+            insert(connection, "standing", told)
+        return StandingMission(number, request, trigger, missed, now, now)
+
+    def missions(self) -> tuple[StandingMission, ...]:
+        """All of them, in the order in which they came."""
+        rows = self._store.rows("SELECT * FROM mission JOIN standing ON standing.mission = id ORDER BY id")
+        return tuple(map(_standing, rows))
+
+    def fire(self, chosen: Sequence[tuple[StandingMission, Request]], why: str) -> tuple[StoredMission, ...]:
+        """Queue these requests, each for its standing mission: all of them or none.
+
+        Raises InputError: too many of one wait already, or it was removed meanwhile.
+        """
+        with self._store.writing() as connection:
+            for each, _ in chosen:
+                self._refuse_more(connection, each)
+            numbers = [_queue(connection, each.id, request, f"{each.trigger}{why}") for each, request in chosen]
+        return tuple(map(self._store.mission, numbers))
+
+    def fire_due(self, *, waiting_since: datetime, serving_since: datetime) -> tuple[StoredMission, ...]:
+        """Queue what came due since the last time, by the policies of the missions; what was queued.
+
+        Occurrences from before `waiting_since`, when no mission ran any more, are missed; so are batteries that became
+        full before `serving_since`. That an occurrence has been dealt with is written together with its mission.
+        """
+        now, numbers = self._store.now(), list[int]()
+        ended = self._store.rows(_ENDED_SQL)
+        for each in self.missions():
+            if each.since - now > SET_BACK:
+                self._deal_with(each, now, None)
+                continue
+            at = self._latest(each, now, ended)
+            if at is None or at <= each.since:
+                continue
+            begun = waiting_since if isinstance(each.trigger, Timed) else serving_since
+            missed = at <= begun or now - at > LATE
+            due = f", due {local(at, self._zone):%Y-%m-%d %H:%M}" if isinstance(each.trigger, Timed) else ""
+            why = f"{each.trigger}{due}{', missed' if missed else ''}"
+            numbers += self._deal_with(each, now, why if not missed or each.missed is Missed.ONCE else None)
+        return tuple(map(self._store.mission, numbers))
+
+    def due_next(self) -> datetime | None:
+        """When the next occurrence of any is due; None where no time says so."""
+        now = self._store.now()
+        times = (each.due_next(now, self._zone) for each in self.missions())
+        return min((at for at in times if at is not None), default=None)
+
+    def _latest(self, each: StandingMission, now: datetime, ended: Sequence[sqlite3.Row]) -> datetime | None:
+        """The last occurrence of a standing mission up to now."""
+        if isinstance(each.trigger, Schedule | Once | Every):
+            return each.trigger.latest(now, each.anchor, self._zone)
+        if not isinstance(each.trigger, OnBatteryFull):
+            return None
+        own, full = (each.request.world_name, each.request.robot), each.trigger
+        times = (
+            datetime.fromisoformat(row["ended"])
+            for row in ended
+            if (row["world_name"], row["robot"]) == own and full.rises(row["lowest"], row["last"])
+        )
+        return max((at for at in times if at <= now), default=None)
+
+    def _deal_with(self, each: StandingMission, now: datetime, why: str | None) -> list[int]:
+        """Note that all occurrences up to now have been dealt with, and queue a mission where there is a reason."""
+        with self._store.writing() as connection:
+            told = (now.isoformat(), each.id)
+            still_there = connection.execute("UPDATE standing SET since = ? WHERE mission = ?", told).rowcount
+            return [_queue(connection, each.id, each.request, why)] if why is not None and still_there else []
+
+    def _refuse_more(self, connection: sqlite3.Connection, each: StandingMission) -> None:
+        if not connection.execute("SELECT 1 FROM standing WHERE mission = ?", (each.id,)).fetchone():
+            raise InputError(f"standing mission {each.id} was removed", hint="`errand queue list` shows the others")
+        counting = "SELECT count(*) FROM origin JOIN mission ON id = mission WHERE standing = ? AND state = 'queued'"
+        (waiting,) = connection.execute(counting, (each.id,)).fetchone()
+        if waiting >= MOST_WAITING:
+            raise TooManyError(f"{waiting} missions of standing mission {each.id} wait already", hint="try again later")
+
+
+class TooManyError(InputError):
+    """So many copies of a standing mission wait that no more are added."""
+
+
+def _queue(connection: sqlite3.Connection, standing: int, request: Request, why: str) -> int:
+    number = insert(connection, "mission", {**row_of(request), "queued": True, "state": MissionState.QUEUED.value})
+    insert(connection, "origin", {"mission": number, "standing": standing, "why": why})
+    return number
+
+
+def _standing(row: sqlite3.Row) -> StandingMission:
+    return StandingMission(
+        id=row["id"],
+        request=request_of(dict(row)),
+        trigger=trigger_of(row["trigger"]),
+        missed=Missed(row["missed"]),
+        anchor=datetime.fromisoformat(row["anchor"]),
+        since=datetime.fromisoformat(row["since"]),
+    )

@@ -1,0 +1,71 @@
+"""Trigger sources: plug-ins that hear messages, such as those of an MQTT broker or a Zenoh network.
+
+A distribution registers one in the entry-point group `errand.triggers`, name = the KIND in `--on "topic KIND:TOPIC"`,
+value = "module:factory". The factory takes no arguments and gives an object that keeps the protocol below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Final, Protocol
+
+from executive.mission.errors import InputError, listing
+
+__all__ = ["GROUP", "Fire", "TriggerSource", "refuse_missing_source", "trigger_source"]
+
+GROUP: Final = "errand.triggers"
+
+Fire = Callable[[str, bytes], None]
+"""Takes a topic, as it was given to `start`, and the payload: nothing, or a JSON object of parameter values."""
+
+
+class TriggerSource(Protocol):
+    """Hears the topics of one kind."""
+
+    def start(self, topics: Sequence[str], fire: Fire) -> None:
+        """Begin to listen, and return; call `fire` for each message that comes.
+
+        `fire` may be called from any thread. When it returns, the mission is kept in the store, or the reason why not
+        was printed; it raises nothing. It takes a second or more for a payload with values.
+        """
+
+    def stop(self) -> None:
+        """Stop listening, and let go of what was opened; `fire` is not called after it returns. Idempotent."""
+
+
+def refuse_missing_source(kind: str) -> None:
+    """Raises InputError: no installed distribution registers a trigger source of this kind, or several do."""
+    _entry(kind)
+
+
+def trigger_source(kind: str) -> TriggerSource:
+    """A new source of a kind. Raises InputError: there is none, or it cannot be made."""
+    entry = _entry(kind)
+    try:
+        source: Any = entry.load()()
+    except (Exception, SystemExit) as defect:
+        raise _broken(entry, defect) from defect
+    lacking = [name for name in ("start", "stop") if not callable(getattr(source, name, None))]
+    if lacking:
+        what = f"trigger source '{kind}' ({entry.value}) has no {listing(lacking)}"
+        raise InputError(what, hint="see executive.store.trigger_source.TriggerSource")
+    found: TriggerSource = source
+    return found
+
+
+def _entry(kind: str) -> EntryPoint:
+    known = entry_points(group=GROUP)
+    found = {entry.value: entry for entry in known if entry.name == kind}
+    if len(found) > 1:
+        raise InputError(f"{listing(sorted(found))} both are trigger source '{kind}'", hint="uninstall one of them")
+    if not found:
+        others = f"installed are {listing(sorted({entry.name for entry in known}))}" if known else "none is installed"
+        hint = f"install a package that registers '{kind}' in the entry-point group '{GROUP}'; {others}"
+        raise InputError(f"there is no trigger source '{kind}'", hint=hint)
+    return next(iter(found.values()))
+
+
+def _broken(entry: EntryPoint, defect: BaseException) -> InputError:
+    what = f"trigger source '{entry.name}' ({entry.value}) cannot be made ({type(defect).__name__}: {defect})"
+    return InputError(what, hint="repair or uninstall that package")

@@ -1,0 +1,288 @@
+"""Triggers: when a standing mission is queued anew. Data with a text form that parses back to itself.
+
+    every weekday 09:00                    every monday and friday 08:15 and 17:00
+    2026-12-01 09:00                       every 30m
+    battery full        battery 80%        call patrol        topic mqtt:home/door
+
+Times of day are local wall time. On the day on which clocks go forward, a time that they skip comes as long after
+midnight as on any other day: 02:30 comes when clocks show 03:30. On the day on which they go back, a time that they
+show twice comes once, the first time. A period counts the time that passes, whatever clocks show.
+"""
+
+from __future__ import annotations
+
+import enum
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, date, datetime, time, timedelta, tzinfo
+from typing import Final
+
+from executive.mission.errors import InputError, listing, suggestion
+
+__all__ = [
+    "Every",
+    "Missed",
+    "OnBatteryFull",
+    "OnCall",
+    "OnTopic",
+    "Once",
+    "Schedule",
+    "Timed",
+    "Trigger",
+    "event_of",
+    "local",
+    "schedule_of",
+    "trigger_of",
+]
+
+FULL: Final = 0.95
+NOISE: Final = 0.01
+"""A charge that falls is read now below a level and now above it; one that rises was lower by more than this."""
+LONGEST: Final = timedelta(days=366)
+_WEEK: Final = 7
+_LONGEST_SKIP: Final = timedelta(hours=3)
+_EXAMPLES: Final = "'every weekday 09:00', 'every monday and friday 08:15' or '2026-12-01 09:00'"
+_EVENTS: Final = "'battery full', 'battery 80%', 'call NAME' or 'topic KIND:TOPIC'"
+
+
+class Missed(enum.Enum):
+    """What becomes of occurrences that pass while nothing serves, or while a mission runs."""
+
+    SKIP = "skip"
+    ONCE = "once"
+
+
+class Day(enum.Enum):
+    """A day of the week; the value is Python's number of it."""
+
+    MONDAY = 0
+    TUESDAY = 1
+    WEDNESDAY = 2
+    THURSDAY = 3
+    FRIDAY = 4
+    SATURDAY = 5
+    SUNDAY = 6
+
+
+_SETS: Final = {"day": tuple(Day), "weekday": tuple(Day)[:5], "weekend": tuple(Day)[5:]}
+_DAYS: Final = {spelled: day for day in Day for name in [day.name.lower()] for spelled in (name, f"{name}s", name[:3])}
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Some times of day (local) on some days of the week, both in order and without repetition."""
+
+    days: tuple[Day, ...]
+    times: tuple[time, ...]
+
+    def __str__(self) -> str:
+        named = next((name for name, days in _SETS.items() if days == self.days), None)
+        days = named or listing(day.name.lower() for day in self.days)
+        return f"every {days} {listing(each.strftime('%H:%M') for each in self.times)}"
+
+    def after(self, moment: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
+        """The first occurrence later than a moment (aware); `zone` None is the system's. `anchor` does not matter."""
+        return min(each for each in self._around(moment, range(-1, _WEEK + 2), zone) if each > moment)
+
+    def latest(self, now: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
+        """The last occurrence up to now."""
+        return max(each for each in self._around(now, range(-_WEEK - 1, 2), zone) if each <= now)
+
+    def _around(self, moment: datetime, offsets: Iterable[int], zone: tzinfo | None) -> list[datetime]:
+        """The occurrences on the days so far from that of a moment."""
+        today = local(moment, zone).date()
+        dates = (today + timedelta(days=offset) for offset in offsets)
+        on = [each for each in dates if Day(each.weekday()) in self.days]
+        return [_moment(each, at, zone) for each in on for at in self.times]
+
+
+@dataclass(frozen=True)
+class Once:
+    """One local date and time of day."""
+
+    date: date
+    time: time
+
+    def __str__(self) -> str:
+        return f"{self.date.isoformat()} {self.time.strftime('%H:%M')}"
+
+    def after(self, moment: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
+        """The occurrence where it is later than a moment."""
+        at = _moment(self.date, self.time, zone)
+        return at if at > moment else None
+
+    def latest(self, now: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
+        """The occurrence where it is not later than now."""
+        at = _moment(self.date, self.time, zone)
+        return at if at <= now else None
+
+
+@dataclass(frozen=True)
+class Every:
+    """Again and again after a period of whole seconds, counted from the anchor: the time at which it was given."""
+
+    period: timedelta
+
+    def __str__(self) -> str:
+        seconds = round(self.period.total_seconds())
+        unit, size = next((unit, size) for unit, size in _UNITS if seconds % size == 0)
+        return f"every {seconds // size}{unit}"
+
+    @staticmethod
+    def of(text: str) -> Every:
+        """The period in "30m", "2 h", "90 seconds" or "1 day". Raises InputError."""
+        found = _PERIOD.fullmatch(text.strip().lower())
+        seconds = int(found["count"]) * dict(_UNITS)[found["unit"]] if found else 0
+        if not 0 < seconds <= LONGEST.total_seconds():
+            hint = "give a whole number of s, m, h or d, at least 1 s and at most 366 d, as in 30m"
+            raise InputError(f"'{text}' is no period", hint=hint)
+        return Every(timedelta(seconds=seconds))
+
+    def after(self, moment: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
+        """The first occurrence later than a moment."""
+        start = anchor.astimezone(UTC)  # between two times of one zone, Python counts what clocks show
+        return start + max(1, (moment.astimezone(UTC) - start) // self.period + 1) * self.period
+
+    def latest(self, now: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
+        """The last occurrence up to now."""
+        start = anchor.astimezone(UTC)
+        count = (now.astimezone(UTC) - start) // self.period
+        return start + count * self.period if count > 0 else None
+
+
+@dataclass(frozen=True)
+class OnBatteryFull:
+    """A mission ends with this charge (0 to 1) or more, and the charge was lower while it ran, by more than NOISE."""
+
+    level: float = FULL
+
+    def __str__(self) -> str:
+        return "battery full" if self.level == FULL else f"battery {100 * self.level:g}%"
+
+    def rises(self, lowest: float, last: float) -> bool:
+        """Whether a mission with this lowest and last charge is an occurrence."""
+        return lowest < self.level - NOISE and self.level <= last
+
+
+@dataclass(frozen=True)
+class OnCall:
+    """An HTTP call of this name."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return f"call {self.name}"
+
+
+@dataclass(frozen=True)
+class OnTopic:
+    """A message of a topic, heard by the trigger source of a kind."""
+
+    kind: str
+    topic: str
+
+    def __str__(self) -> str:
+        return f"topic {self.kind}:{self.topic}"
+
+
+Timed = Schedule | Once | Every
+Trigger = Timed | OnBatteryFull | OnCall | OnTopic
+
+_UNITS: Final = (("d", 86400), ("h", 3600), ("m", 60), ("s", 1))
+_PERIOD: Final = re.compile(
+    r"(?P<count>\d{1,9}) ?(?P<unit>[smhd])(?:(?<=s)ec(?:ond)?s?|(?<=m)in(?:ute)?s?|(?<=h)ours?|(?<=d)ays?)?"
+)
+_CLOCK: Final = re.compile(r"([01]?\d|2[0-3]):([0-5]\d)")
+_ONCE: Final = re.compile(r"(2\d{3})-(\d\d)-(\d\d)[ t](?P<time>\S+)")
+_BATTERY: Final = re.compile(r"battery (?:full|(?P<percent>\d{1,3}(?:\.\d+)?) ?%)")
+_CALL: Final = re.compile(r"call (?P<name>[A-Za-z0-9_-]{1,64})")
+_TOPIC: Final = re.compile(r"topic (?P<kind>[A-Za-z0-9_-]{1,64}):(?P<topic>\S(?:.{0,254}\S)?)")
+
+
+def trigger_of(text: str) -> Trigger:
+    """The trigger that `str` wrote. Raises InputError."""
+    first, _, rest = text.partition(" ")
+    if first == "every" and rest[:1].isdigit():
+        return Every.of(rest)
+    return schedule_of(text) if first == "every" or first[:1].isdigit() else event_of(text)
+
+
+def schedule_of(text: str) -> Schedule | Once:
+    """The times in a text such as "every weekday 09:00" or "2026-12-01 09:00". Raises InputError, with a hint."""
+    words = " ".join(text.lower().split())
+    once = _ONCE.fullmatch(words)
+    if once is not None:
+        return Once(_date(once, text), _time(once["time"], text))
+    head, *named = re.split(r",? and |, ?| at | ", words)
+    at = next((number for number, word in enumerate(named) if word[:1].isdigit()), len(named))
+    if head != "every" or not 0 < at < len(named):
+        raise InputError(f"'{text}' says no times", hint=f"write {_EXAMPLES}")
+    days = {day for word in named[:at] for day in _days(word)}
+    times = {_time(word, text) for word in named[at:]}
+    return Schedule(tuple(sorted(days, key=lambda day: day.value)), tuple(sorted(times)))
+
+
+def event_of(text: str) -> OnBatteryFull | OnCall | OnTopic:
+    """What `--on` says: a battery's charge, a call or a topic. Raises InputError, with a hint."""
+    words = text.strip()
+    first = words.split(" ", 1)[0]
+    if (topic := _TOPIC.fullmatch(words)) is not None and topic["topic"].isprintable():
+        return OnTopic(topic["kind"], topic["topic"])
+    if (call := _CALL.fullmatch(words)) is not None:
+        return OnCall(call["name"])
+    if (battery := _BATTERY.fullmatch(words.lower())) is not None:
+        level = FULL if battery["percent"] is None else round(float(battery["percent"]) / 100.0, 6)
+        if 0.0 < level <= 1.0:
+            return OnBatteryFull(level)
+        raise InputError(f"'{text}': a charge is above 0 % and at most 100 %", hint="write as in 'battery 80%'")
+    hint = _HINTS.get(first) or suggestion(first, _HINTS, f"write {_EVENTS}")
+    raise InputError(f"'{text}' is no trigger", hint=hint)
+
+
+_HINTS: Final = {
+    "battery": "write 'battery full' or as in 'battery 80%'",
+    "call": "give 'call' one name of letters, digits, _ and -, at most 64",
+    "topic": "write 'topic KIND:TOPIC', as in 'topic mqtt:home/door'",
+}
+
+
+def local(moment: datetime, zone: tzinfo | None) -> datetime:
+    """A moment (aware) as local wall time; `zone` None is the system's."""
+    return moment.astimezone(zone)
+
+
+def _moment(day: date, at: time, zone: tzinfo | None) -> datetime:
+    """A local date and time as UTC."""
+    wall = datetime.combine(day, at)
+    if zone is not None:
+        return wall.replace(tzinfo=zone).astimezone(UTC)
+    moment = wall.astimezone(UTC)
+    if moment.astimezone().replace(tzinfo=None) == wall:
+        return moment
+    before = (wall - _LONGEST_SKIP).astimezone().utcoffset() or timedelta()  # of a time that clocks skip
+    return (wall - before).replace(tzinfo=UTC)
+
+
+def _days(word: str) -> Sequence[Day]:
+    if word in _DAYS:
+        return (_DAYS[word],)
+    known = (*_SETS, *(day.name.lower() for day in Day))
+    if word not in _SETS:
+        hint = suggestion(word, known, f"write {listing(_SETS, last='or')}, or the names of days")
+        raise InputError(f"'{word}' is no day", hint=hint)
+    return _SETS[word]
+
+
+def _time(word: str, text: str) -> time:
+    found = _CLOCK.fullmatch(word)
+    if found is None:
+        raise InputError(f"'{word}' in '{text}' is no time of day", hint="write it from 00:00 to 23:59, as in 09:00")
+    return time(int(found[1]), int(found[2]))
+
+
+def _date(found: re.Match[str], text: str) -> date:
+    try:
+        return date(int(found[1]), int(found[2]), int(found[3]))
+    except ValueError as error:
+        raise InputError(f"'{text}': there is no such day", hint="write YEAR-MONTH-DAY, as in 2026-12-01") from error

@@ -1,0 +1,86 @@
+"""How a process that waits for work hears of it at once: a named pipe beside the store, to which anybody may write.
+
+It says only that the store, or something in the waiting process, has changed. Threads, signal handlers and other
+processes write to it in the same way; what is written while nobody waits ends the next wait, and many count as one.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import stat
+from contextlib import suppress
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Final
+
+from executive.mission.errors import InputError
+from executive.store.database import told
+from executive.store.missions import MissionStore
+
+__all__ = ["LONGEST_WAIT", "WakeupPipe", "wake_server"]
+
+LONGEST_WAIT: Final = timedelta(minutes=1)
+"""A wait counts the time that passes, but the wall's clock may be set meanwhile, or the machine may sleep."""
+_MOST_WAKES: Final = 4096
+
+
+class WakeupPipe:
+    """The waiting side. Use it as a context manager, or close it."""
+
+    def __init__(self, store: MissionStore) -> None:
+        """Listen beside a store. Raises InputError: no pipe can be made there."""
+        self._store, self._path = store, _path(store.path)
+        with told(store.path):
+            with suppress(FileExistsError):
+                os.mkfifo(self._path, 0o600)
+            self._pipe = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)  # never without a writer, so never at an end
+        if not _is_pipe(self._pipe):
+            os.close(self._pipe)
+            raise InputError("there is something else in the place of a pipe", hint="move it away", file=self._path)
+
+    def __enter__(self) -> WakeupPipe:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._path.unlink(missing_ok=True)
+        os.close(self._pipe)
+
+    def wake(self) -> None:
+        """End the wait under way, or the next one; from any thread, and from signal handlers."""
+        with suppress(BlockingIOError):
+            os.write(self._pipe, b"!")
+
+    def wait(self, until: datetime | None) -> None:
+        """Block until somebody wakes it or a moment (aware) comes, but never for longer than LONGEST_WAIT."""
+        left = LONGEST_WAIT if until is None else min(LONGEST_WAIT, until - self._store.now())
+        select.select([self._pipe], [], [], max(0.0, left.total_seconds()))
+        with suppress(BlockingIOError):
+            os.read(self._pipe, _MOST_WAKES)
+
+
+def wake_server(store: Path) -> None:
+    """Tell the process that waits at a store, if there is one, that something has changed."""
+    try:
+        pipe = os.open(_path(store), os.O_WRONLY | os.O_NONBLOCK)
+    except OSError:
+        return  # nobody waits
+    try:
+        if _is_pipe(pipe):
+            os.write(pipe, b"!")
+    except OSError:
+        return  # it is full already, or was closed just now
+    finally:
+        os.close(pipe)
+
+
+def _is_pipe(opened: int) -> bool:
+    return stat.S_ISFIFO(os.fstat(opened).st_mode)
+
+
+def _path(store: Path) -> Path:
+    return store.with_name(f"{store.name}-wakeup")

@@ -1,0 +1,1 @@
+"""Looking whether a door is open."""

@@ -1,0 +1,102 @@
+"""What the rays of a LiDAR tell of a doorway: how much of its width lets them through."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+
+from skills.robot import Scan, unit_rays
+
+_STRIP_M = 0.05
+_HEIGHTS_M = (0.1, 1.9)
+_IN_PLANE_M = 0.2
+_BEYOND_M = 0.5
+_FEWEST = 5
+_CLEARLY = 0.8
+_LEAST_TOWARDS = 0.05
+
+Bools = NDArray[np.bool_]
+Counts = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Doorway:
+    """A doorway: its middle (x, y) in the world (m), its clear width (m), and the direction through it (rad).
+
+    From which side the direction leads through does not matter.
+    """
+
+    middle_W: tuple[float, float]
+    width_m: float
+    through_rad: float
+
+    def distance_m(self, place_W: tuple[float, float]) -> float:
+        """How far its middle is from a place."""
+        return math.dist(self.middle_W, place_W)
+
+    def view_angle_rad(self, place_W: tuple[float, float]) -> float:
+        """How flat it is seen from a place: 0 from straight before it, pi/2 from within its wall."""
+        bearing = math.atan2(self.middle_W[1] - place_W[1], self.middle_W[0] - place_W[0])
+        off = abs(math.remainder(bearing - self.through_rad, math.tau))
+        return min(off, math.pi - off)
+
+
+@dataclass(frozen=True)
+class Opening:
+    """How wide a doorway is open, in one piece (m): seen to be free, and if all that is not seen were free.
+
+    `rays` is how many rays told something.
+    """
+
+    least_m: float
+    most_m: float
+    rays: int
+
+
+def opening(door: Doorway, scans: Iterable[tuple[Scan, RigidTransform]]) -> Opening:
+    """How wide a door is open, from scans with the pose X_WL of the LiDAR.
+
+    A strip of the doorway is free when its rays go clearly beyond the doorway, and shut when they end within it. What
+    is shut and joined to no side of the doorway is no door: somebody who stands in it, say. It counts as not seen.
+    """
+    strips = max(1, round(door.width_m / _STRIP_M))
+    counts: Counts = np.array([_counts(door, strips, scan, X_WL) for scan, X_WL in scans]).sum(axis=0)
+    free, shut = (_clearly(part, counts.sum(axis=0)) for part in counts[:2])
+    closed = np.logical_and.accumulate(shut) | np.logical_and.accumulate(shut[::-1])[::-1]
+    strip_m = door.width_m / strips
+    return Opening(_longest(free) * strip_m, _longest(~closed) * strip_m, int(counts.sum()))
+
+
+def _counts(door: Doorway, strips: int, scan: Scan, X_WL: RigidTransform) -> Counts:
+    """How many rays (3, strips) towards each strip go through, end in the doorway, or end elsewhere."""
+    origin, middle = X_WL.translation(), np.array(door.middle_W)
+    through = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
+    through = through if (middle - origin[:2]) @ through > 0.0 else -through
+    along = np.array([-through[1], through[0]])
+    rays = unit_rays(scan.elevations_rad, scan.azimuths_rad) @ X_WL.rotation().matrix().T
+    towards = np.maximum(rays[..., :2] @ through, _LEAST_TOWARDS)
+    crossing = ((middle - origin[:2]) @ through) / towards
+    aside = (origin[:2] - middle) @ along + crossing * (rays[..., :2] @ along) + 0.5 * door.width_m
+    height = origin[2] + crossing * rays[..., 2]
+    tells = np.isfinite(scan.ranges_m) & (towards > _LEAST_TOWARDS) & (aside >= 0.0) & (aside < door.width_m)
+    tells &= (height > _HEIGHTS_M[0]) & (height < _HEIGHTS_M[1])
+    beyond = ((scan.ranges_m - crossing) * towards)[tells]
+    strip = np.minimum((aside[tells] / door.width_m * strips).astype(np.int64), strips - 1)
+    goes, ends = beyond > _BEYOND_M, np.abs(beyond) <= _IN_PLANE_M
+    return np.array([np.bincount(strip[kind], minlength=strips) for kind in (goes, ends, ~goes & ~ends)])
+
+
+def _clearly(counts: Counts, of: Counts) -> Bools:
+    """Where enough rays, and nearly all, say the same."""
+    return np.asarray((counts >= _FEWEST) & (counts >= _CLEARLY * of))
+
+
+def _longest(flags: Bools) -> int:
+    """The length of the longest run of true ones."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return int((edges[1::2] - edges[::2]).max(initial=0))

@@ -1,0 +1,124 @@
+"""The check_door skill: look from where the robot stands whether the robot can go through a doorway."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from skills.api import Cause, Part, Running, Succeeded
+from skills.arm.routine import Routine, RoutineSkill, SkillFailure
+from skills.check_door.doorway import Doorway, Opening, opening
+from skills.quantities import Angle, Coordinate, Count, Delay, Length, Margin, Turn
+from skills.robot import Scan
+
+if TYPE_CHECKING:
+    from pydrake.math import RigidTransform
+
+_SCAN_PATIENCE_S = 1.0
+_CLOSED_M = 0.1
+_FEW_RAYS = 50
+
+
+@dataclass(frozen=True)
+class CheckDoorInputs:
+    """The middle (x, y) of the doorway `middle_W`, its clear width, the direction in which one goes through it, from
+    either side, and what it is called."""
+
+    middle_W: tuple[Coordinate, Coordinate]
+    width_m: Length
+    through_rad: Angle
+    door: str = "door"
+
+
+@dataclass(frozen=True)
+class CheckDoorOptions:
+    """How the robot looks: `scans` at a time, up to `looks` times, `pause_s` apart, until it can tell.
+
+    It can from `reach_m` at most, and from `flattest_rad` at most off the direct view. The door is open when the
+    robot's outline fits through with `margin_m` on each side.
+    """
+
+    scans: Count = 5
+    looks: Count = 3
+    pause_s: Delay = 3.0
+    reach_m: Length = 4.0
+    flattest_rad: Turn = 1.1
+    margin_m: Margin = 0.05
+
+
+class CheckDoor(RoutineSkill[CheckDoorInputs]):
+    """Looks with the LiDAR whether a door is open, from where the robot stands. A gap too narrow for it is not open.
+
+    Rays that go through and clearly beyond the doorway show where it is free. It does not judge what lies on the floor.
+    """
+
+    name = "check_door"
+    Inputs = CheckDoorInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
+    Options: ClassVar[type] = CheckDoorOptions
+    options: CheckDoorOptions
+    outputs: ClassVar[Mapping[str, type]] = {"open": bool, "free_m": float}
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "there is no new scan, or the robot does not know where it is",
+        Cause.POSTCONDITION: "it cannot tell: too far, seen too flat, or something stands in the doorway or before it",
+    }
+    default_timeout_s = 30.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"scan": 0.5, "localisation": 1.0}
+
+    def run(self, inputs: CheckDoorInputs) -> Routine[Succeeded]:
+        """Look until it can be told."""
+        door = Doorway(inputs.middle_W, inputs.width_m, inputs.through_rad)
+        for look in range(self.options.looks):
+            if look:
+                yield from self.pause(self.options.pause_s, f"waiting until more is seen of the {inputs.door}")
+            seen = yield from self._look(door, inputs.door)
+            if seen.least_m >= self._needed_m() or seen.most_m < self._needed_m():
+                return self._told(inputs, seen)
+        few = f"hardly anything is seen of the {inputs.door}"
+        why = few if seen.rays < _FEW_RAYS else f"something stands in the {inputs.door} or before it"
+        raise SkillFailure(Cause.POSTCONDITION, why)
+
+    def _look(self, door: Doorway, name: str) -> Routine[Opening]:
+        """How wide it is open in the next scans.
+
+        Raises SkillFailure: there are none, the robot is lost, or stands where it cannot tell.
+        """
+        scans: list[tuple[Scan, RigidTransform]] = []
+        while len(scans) < self.options.scans:
+            scan = yield from self._next_scan(f"looking at the {name}")
+            estimate = self.context.localiser.estimate()
+            if not estimate.localised:
+                raise SkillFailure(Cause.PRECONDITION, "the robot does not know where it is")
+            scans.append((scan, estimate.X_WO @ scan.X_OB @ scan.X_BL))
+        x_m, y_m, _ = (float(value) for value in scans[-1][1].translation())
+        if (far_m := door.distance_m((x_m, y_m))) > self.options.reach_m:
+            raise SkillFailure(Cause.POSTCONDITION, f"the {name} is {far_m:.1f} m away, too far to tell")
+        if door.view_angle_rad((x_m, y_m)) > self.options.flattest_rad:
+            raise SkillFailure(Cause.POSTCONDITION, f"the {name} is seen too flat from here to tell")
+        return opening(door, scans)
+
+    def _next_scan(self, message: str) -> Routine[Scan]:
+        """The first scan that is taken from now on. Raises SkillFailure: there is none."""
+        now_s = self.context.clock.now()
+        while (scan := self.context.robot.scan()) is None or scan.stamp_s <= now_s:
+            if self.context.clock.now() > now_s + _SCAN_PATIENCE_S:
+                raise SkillFailure(Cause.PRECONDITION, "there is no new scan to see the door in")
+            yield Running(message)
+        return scan
+
+    def _needed_m(self) -> float:
+        """How wide the robot is, with a margin on each side."""
+        sides = [y for _, y in self.context.robot.capabilities().footprint_m]
+        return max(sides) - min(sides) + 2.0 * self.options.margin_m
+
+    def _told(self, inputs: CheckDoorInputs, seen: Opening) -> Succeeded:
+        """The answer."""
+        door, needed_m = inputs.door, self._needed_m()
+        outputs = {"open": seen.least_m >= needed_m, "free_m": seen.least_m}
+        if outputs["open"]:
+            return Succeeded(f"the {door} is open: {seen.least_m:.2f} m of {inputs.width_m:.2f} m are free", outputs)
+        if seen.most_m <= _CLOSED_M:
+            return Succeeded(f"the {door} is closed", outputs)
+        gap = f"at most {seen.most_m:.2f} m are free, and the robot needs {needed_m:.2f} m"
+        return Succeeded(f"the {door} is not open: {gap}", outputs)

@@ -1,0 +1,95 @@
+"""Injection of faults by name: "camera freezes at 3 s", around any robot."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, cast
+
+from skills.faults.kinds import VERBS, Call
+from skills.faults.words import Fault, parse_fault
+from skills.robot import Clock, Robot
+
+
+@dataclass
+class _Armed:
+    """A fault at work: its memory and how many calls it has seen."""
+
+    fault: Fault
+    memory: dict[str, Any] = field(default_factory=dict)
+    seen: int = 0
+
+    def through(self, call: Call, now_s: float) -> Any:
+        """The call as the fault lets it happen now."""
+        effect = self.fault.effect
+        if call.verb in effect.always:
+            return effect.act(call)
+        self.seen += 1
+        if self.on(now_s) and self.seen > self.fault.calls:
+            return effect.act(call)
+        result = call.proceed()
+        effect.watch(result, call)
+        return result
+
+    def on(self, now_s: float) -> bool:
+        """Whether it is the time of the fault."""
+        return self.fault.from_s - 1e-9 <= now_s < self.fault.to_s - 1e-9
+
+    def concerns(self, verb: str, arguments: tuple[Any, ...]) -> bool:
+        """Whether the fault sees a call."""
+        if verb == "image" and self.fault.source not in (None, *arguments[:1]):
+            return False
+        return verb in self.fault.effect.verbs | self.fault.effect.always
+
+
+class FaultyRobot:
+    """A robot whose verbs go wrong as its faults say, their times counted from `since_s`. `with_faults` makes one."""
+
+    def __init__(self, robot: Robot, clock: Clock, faults: Sequence[Fault], since_s: float) -> None:
+        self._robot, self._clock, self._since_s = robot, clock, since_s
+        self._armed = [_Armed(fault) for fault in faults]
+
+    def faults_at_work(self) -> tuple[str, ...]:
+        """The words of the faults that are on now; one that waits for calls is, once there were so many."""
+        now_s = self._clock.now() - self._since_s
+        return tuple(each.fault.words for each in self._armed if each.on(now_s) and each.seen >= each.fault.calls)
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._robot, name)
+        if name not in VERBS:
+            return value
+
+        bind = inspect.signature(value).bind
+
+        def faulty(*arguments: Any, **options: Any) -> Any:
+            """The verb as the faults let it happen."""
+            given = tuple(bind(*arguments, **options).arguments.values())
+            return self._call(name, lambda: value(*arguments, **options), given)
+
+        self.__dict__[name] = faulty
+        return faulty
+
+    def _call(self, verb: str, proceed: Callable[[], Any], arguments: tuple[Any, ...]) -> Any:
+        """The call through all faults that concern the verb, the first outermost."""
+        now_s = self._clock.now() - self._since_s
+        for armed in reversed(self._armed):
+            if armed.concerns(verb, arguments):
+                call = Call(self._robot, verb, proceed, arguments, armed.memory)
+                proceed = partial(armed.through, call, now_s)
+        return proceed()
+
+
+def with_faults(robot: Robot, clock: Clock, faults: Sequence[Fault | str], *, since_s: float | None = None) -> Robot:
+    """The robot with these faults, given as words or parsed; their times count from now, or from `since_s`.
+
+    Raises ValueError for words that are no fault of this robot.
+    """
+    parsed = [fault if isinstance(fault, Fault) else _parsed(fault, robot) for fault in faults]
+    begun_s = clock.now() if since_s is None else since_s
+    return cast(Robot, FaultyRobot(robot, clock, parsed, begun_s)) if parsed else robot
+
+
+def _parsed(words: str, robot: Robot) -> Fault:
+    return parse_fault(words, cameras=[camera.source for camera in robot.capabilities().cameras])

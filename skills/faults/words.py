@@ -1,0 +1,126 @@
+"""The words of faults: what to a robot goes wrong, and when. `docs/reference/faults.md` lists the kinds.
+
+A fault is `SENSOR[.SOURCE]: WORDS`, or the words with the sensor or verb at their head, and perhaps when it is on:
+`at T s` or `from T s` (and ever after), `from T s to U s`, `5 s at T s`, `after N calls` (of the verbs concerned), or
+nothing (always).
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from skills.faults.kinds import STANDARD_FAULTS, Effect, FaultKind
+
+__all__ = ["Fault", "parse_fault", "random_faults"]
+
+_NUMBER: Final = r"\d+(?:\.\d+)?"
+_WHEN: Final = re.compile(
+    r"(?P<what>.+?)"
+    rf"(?: (?:for )?(?P<lasts>{_NUMBER}) ?s)?"
+    rf"(?: (?:(?:at|from) (?P<from>{_NUMBER}) ?s(?: (?:to|until) (?P<to>{_NUMBER}) ?s)?"
+    r"|after (?P<calls>\d+) calls?))?"
+)
+_PREFIX: Final = re.compile(r"(?P<sensor>\w+)(?:\.(?P<source>[\w-]+))?: ?(?P<words>.+)")
+_STREAM: Final = 11
+_FIRST_S, _LAST_S = 5.0, 90.0
+_MOTIONS: Final = ("arm", "base", "body")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault by its words: its effect, on from `from_s` until before `to_s`, after `calls` calls.
+
+    Of the pictures, it concerns those of one `source` only, where that is given.
+    """
+
+    words: str
+    effect: Effect
+    from_s: float = 0.0
+    to_s: float = math.inf
+    calls: int = 0
+    source: str | None = None
+
+    def over_by(self, now_s: float) -> bool:
+        """Whether it is over at a time; one that happens once is, when it has begun before."""
+        return now_s >= self.to_s or (self.effect.once and now_s > self.from_s)
+
+
+def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS, *, cameras: Sequence[str] = ()) -> Fault:
+    """The fault of these words. `cameras` are the robot's, where it is known.
+
+    Raises ValueError: no kind has such words, or they name something that the robot does not have; with the hint.
+    """
+    plain = " ".join(words.split())
+    prefix = _PREFIX.fullmatch(plain)
+    source = None if prefix is None else prefix["source"]
+    when = _WHEN.fullmatch(plain if prefix is None else f"{prefix['sensor']} {prefix['words']}")
+    for kind in kinds if when is not None else ():
+        assert when is not None
+        match = re.fullmatch(kind.pattern, when["what"])
+        if match is None:
+            continue
+        effect = kind.effect(match)
+        if source is not None:
+            _check_source(source, effect, cameras)
+        return Fault(words, effect, *_span(words, when), int(when["calls"] or 0), source)
+    examples = [kind.example for kind in kinds]
+    near = difflib.get_close_matches(plain, examples, n=1, cutoff=0.5)
+    hint = f"did you mean '{near[0]}'?" if near else f"known are, for instance: {'; '.join(examples)}"
+    raise ValueError(f"there is no fault '{words}'; {hint}")
+
+
+def _span(words: str, when: re.Match[str]) -> tuple[float, float]:
+    """From when until when the fault is on. Raises ValueError."""
+    from_s, to_s = float(when["from"] or 0.0), float(when["to"] or math.inf)
+    if when["lasts"] is not None:
+        if when["to"] is not None or when["calls"] is not None:
+            raise ValueError(f"'{words}' says twice how long; write '5 s at 20 s' or 'from 20 s to 25 s'")
+        to_s = from_s + float(when["lasts"])
+    if to_s <= from_s:
+        raise ValueError(f"'{words}' ends before it begins; write the earlier time first")
+    return from_s, to_s
+
+
+def _check_source(source: str, effect: Effect, cameras: Sequence[str]) -> None:
+    """Raise ValueError unless the effect is one on pictures, and the source one of the robot's, where it is known."""
+    if effect.verbs != {"image"}:
+        raise ValueError(f"'.{source}' names a camera, and this fault is none of a camera; leave '.{source}' out")
+    if cameras and source not in cameras:
+        near = difflib.get_close_matches(source, cameras, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(cameras)}"
+        raise ValueError(f"the robot has no camera '{source}'; {hint}")
+
+
+def random_faults(
+    count: int, seed: int, cameras: Sequence[str], kinds: Sequence[FaultKind] = STANDARD_FAULTS
+) -> tuple[str, ...]:
+    """The words of so many faults, drawn from a seed among the kinds that a robot may live through, in order of time.
+
+    The first n of a seed are the same, however many are drawn.
+    """
+    rng = np.random.default_rng([seed, _STREAM])
+    drawable = [kind.random for kind in kinds if kind.random]
+    drawn = [_drawn(drawable[int(rng.integers(len(drawable)))], cameras, rng) for _ in range(count)]
+    return tuple(words for _, words in sorted(drawn))
+
+
+def _drawn(template: str, cameras: Sequence[str], rng: np.random.Generator) -> tuple[float, str]:
+    """One fault of a kind: its time (s) and its words."""
+    images = [f"camera.{source}" for source in cameras] or ["camera"]
+    at_s = round(float(rng.uniform(_FIRST_S, _LAST_S)), 1)
+    values = {
+        "camera": images[int(rng.integers(len(images)))],
+        "sensor": ("lidar", *images)[int(rng.integers(1 + len(images)))],
+        "motion": _MOTIONS[int(rng.integers(len(_MOTIONS)))],
+        "metres": round(float(rng.uniform(-0.3, 0.3)), 2),
+        "span": f"{round(float(rng.uniform(1.0, 6.0)), 1):g} s at {at_s:g} s",
+        "at": f"at {at_s:g} s",
+    }
+    return at_s, template.format(**values)

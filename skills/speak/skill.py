@@ -1,0 +1,79 @@
+"""The skill that says a sentence to the people around."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Final
+
+from skills.api import Cause, Failed, Part, Running, Skill, Step, Succeeded
+from skills.quantities import Delay
+
+SPEECH_TOPIC: Final = "speech"
+LONGEST_TEXT: Final = 500
+"""Characters."""
+
+
+@dataclass(frozen=True)
+class SpeakInputs:
+    """What is said, 500 characters at most."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class SpeakOptions:
+    """How long the robot takes to say something: so much a word, and no less than `at_least_s`."""
+
+    word_s: Delay = 0.35
+    at_least_s: Delay = 0.5
+
+
+class Speak(Skill[SpeakInputs]):
+    """Says a text once, and waits as long as saying it takes. Moves nothing.
+
+    The text is published under the topic `speech` when it begins; whoever shows the run says it aloud or in writing.
+    """
+
+    name: ClassVar[str] = "speak"
+    Inputs: ClassVar[type] = SpeakInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.VOICE})
+    Options: ClassVar[type] = SpeakOptions
+    options: SpeakOptions
+    causes: ClassVar[Mapping[Cause, str]] = {Cause.PRECONDITION: "there is no text, or it is too long"}
+
+    _begun_s: float | None = None
+
+    def begin(self, inputs: SpeakInputs) -> None:
+        """Say it, unless it cannot be said."""
+        self._text = " ".join(inputs.text.split())
+        self._refusal = _refusal(self._text)
+        self._begun_s = begun_s = self.context.clock.now()
+        self._lasts_s = max(self.options.at_least_s, self.options.word_s * len(self._text.split()))
+        if self._refusal is None:
+            message = {"robot": self.context.robot.name, "text": self._text, "t": round(begun_s, 6)}
+            self.context.publish(SPEECH_TOPIC, message)
+
+    def step(self) -> Step:
+        """Wait until it is said."""
+        if self._refusal is not None:
+            return self._refusal
+        assert self._begun_s is not None
+        passed_s = self.context.clock.now() - self._begun_s
+        if passed_s < self._lasts_s:
+            return Running(f'says "{self._text}"', passed_s / self._lasts_s)
+        return Succeeded(f'said "{self._text}"')
+
+    def resume(self, inputs: SpeakInputs) -> None:
+        """Not said twice after a pause; after a restart nobody knows how much was heard, and it is said again."""
+        if self._begun_s is None:
+            self.begin(inputs)
+
+
+def _refusal(text: str) -> Failed | None:
+    """Why a text cannot be said; None when it can."""
+    if not text:
+        return Failed(Cause.PRECONDITION, "there is nothing to say")
+    if len(text) > LONGEST_TEXT:
+        return Failed(Cause.PRECONDITION, f"{len(text)} characters are too many to say; {LONGEST_TEXT} are the most")
+    return None

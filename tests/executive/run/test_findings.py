@@ -1,0 +1,158 @@
+"""What a mission found out: every answer in order, and what its claim tells of them."""
+
+import math
+
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.run.findings import Finding, Findings, Said, claim, finding_keys
+from executive.run.outcome import Outcome
+from executive.tree.behaviours.board import Board
+from skills.api import Cause, Failed, Succeeded
+
+CHECKS = (
+    "Take [Nothing] to [kitchen] and do [find] to [hammer]",
+    "Take [Nothing] to [bedroom] and do [find] to [drink]",
+    "Take [Nothing] to [start] and do [Nothing] to [Nothing]",
+)
+
+
+@pytest.fixture
+def findings(clock, published):
+    return Findings(lambda topic, message: published.append((topic, message)), clock, Board("alice"), "Alice", "patrol")
+
+
+def answered(node, answer, sentence):
+    return {"node": node, "question": "q", "answer": answer, "message": sentence}
+
+
+def found(*sentences):
+    return [Finding("alice/p/1", 1.0, "q", True, sentence) for sentence in sentences]
+
+
+def test_every_answer_of_a_node_is_kept_in_order_with_its_time(findings, clock, published):
+    for answer in (False, False, True):
+        clock.advance(1.0)
+        findings("answer", answered("alice/patrol/1", answer, "told"))
+    assert [(one.t_s, one.answer) for one in findings.findings] == [(1.0, False), (2.0, False), (3.0, True)]
+    assert published[-1] == ("answer", {**answered("alice/patrol/1", True, "told"), "robot": "Alice", "t": 3.0})
+
+
+@pytest.mark.parametrize("answer", ["in the shed", 3, 2.5, None])
+def test_any_node_adds_a_finding_by_publishing_an_answer(findings, answer):
+    findings("answer", answered("alice/patrol/ask", answer, "Robin says so"))
+    (one,) = findings.findings
+    assert (one.answer, one.sentence, one.question) == (answer, "Robin says so", "q")
+
+
+def test_what_was_said_is_kept(findings, published, clock):
+    clock.advance(2.0)
+    findings("speech", {"robot": "Alice", "text": "Hello", "t": 2.0})
+    assert findings.said == (Said(2.0, "Hello"),)
+    assert published[-1][0] == "speech"
+
+
+def test_a_number_that_json_does_not_know_is_told_as_text(findings):
+    findings("answer", answered("alice/patrol/1", math.nan, "nobody knows"))
+    assert findings.findings[0].answer == "nan"
+
+
+def test_an_answer_given_again_after_a_restart_is_one_finding(clock):
+    board = Board("alice")
+    keys = finding_keys("Alice", "patrol")
+    board.put(keys.findings, (Finding("alice/patrol/1", 4.0, "q", False, "none"),))
+    board.put(keys.again, frozenset({"alice/patrol/1"}))
+    findings = Findings(lambda topic, message: None, clock, board, "Alice", "patrol")
+    findings("answer", answered("alice/patrol/1", False, "none"))
+    assert [one.t_s for one in findings.findings] == [4.0]
+    clock.advance(9.0)
+    findings("answer", answered("alice/patrol/1", False, "none"))
+    assert [one.t_s for one in findings.findings] == [4.0, 9.0]
+
+
+def test_another_answer_after_a_restart_is_a_finding_of_its_own(clock):
+    board = Board("alice")
+    keys = finding_keys("Alice", "patrol")
+    board.put(keys.findings, (Finding("alice/patrol/1", 4.0, "q", False, "none"),))
+    board.put(keys.again, frozenset({"alice/patrol/1"}))
+    findings = Findings(lambda topic, message: None, clock, board, "Alice", "patrol")
+    findings("answer", answered("alice/patrol/1", True, "there"))
+    assert [one.answer for one in findings.findings] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("message", "sentences", "skipped", "told"),
+    [
+        ("standing at the goal", [], [], "standing at the goal"),
+        ("", ["no: no hammer in the office"], [], "no: no hammer in the office"),
+        (
+            "",
+            ["no: no hammer in the office", "yes: hammer in the workshop"],
+            [],
+            "no hammer in the office; yes: hammer in the workshop",
+        ),
+        ("", ["no: nobody in the hall"] * 3, [], "nobody in the hall (3 times)"),
+        ("", ["no: not sure", "Robin says no: thank you"], [], "not sure; Robin says no: thank you"),
+        ("let go of the coke", ["yes: hammer"], [], "yes: hammer; let go of the coke"),
+        ("", ["yes: hammer"], ["go to the hall (no way)"], "yes: hammer; skipped: go to the hall (no way)"),
+        ("", ["a" * 200, "b" * 90, "c" * 90, "d"], [], f"{'a' * 200}; {'b' * 90}; and 2 more"),
+        ("", ["yes: " + "x" * 500, "b"], [], f"yes: {'x' * 294}…; and 1 more"),
+    ],
+)
+def test_the_claim_tells_the_answers_briefly(message, sentences, skipped, told):
+    assert claim(message, found(*sentences), skipped) == told
+
+
+def test_a_mission_that_only_looked_claims_what_it_found(compiled, run_tree, script):
+    script.seen_on = ("counter", "bedside table")
+    worst = run_tree(compiled(*CHECKS, name="patrol")).worst
+    assert worst.message == "yes: hammer in the kitchen; yes: drink in the bedroom"
+    assert [(one.answer, one.sentence) for one in worst.findings] == [
+        (True, "yes: hammer in the kitchen"),
+        (True, "yes: drink in the bedroom"),
+    ]
+    assert worst.answers == {one.path_id: True for one in worst.findings}
+    assert 0.0 < worst.findings[0].t_s < worst.findings[1].t_s
+
+
+def test_a_mission_that_also_brought_something_claims_both(compiled, run_tree, make):
+    worst = run_tree(compiled(CHECKS[0], *make.FETCH)).worst
+    assert (worst.outcome, worst.message) == (Outcome.SUCCESS, "yes: hammer in the kitchen; hand_over done")
+
+
+def test_a_mission_that_failed_says_what_it_found_before(compiled, run_tree, script):
+    def navigate(skill):
+        return Failed(Cause.PLANNING, "no way") if skill.inputs.goal.y_m > 3.0 else Succeeded("there")
+
+    script.ends["navigate"] = navigate
+    there = "Take [Nothing] to [bathroom] and do [Nothing] to [Nothing]"
+    worst = run_tree(compiled(CHECKS[0], there)).worst
+    assert worst.outcome is Outcome.FAILURE
+    assert worst.message.endswith("(found out: yes: hammer in the kitchen)")
+
+
+def test_a_pure_drive_keeps_its_sentence(compiled, run_tree):
+    worst = run_tree(compiled(CHECKS[2])).worst
+    assert (worst.message, worst.findings) == ("navigate done", ())
+
+
+class Repeated(Behaviour):
+    """Answers at three ticks, as a node in a loop does."""
+
+    def __init__(self, context):
+        super().__init__("repeated")
+        self.context, self.count, self.path_id = context, 0, "alice/loop/1"
+
+    def update(self):
+        self.count += 1
+        self.context.publish("answer", answered(self.path_id, self.count, f"{self.count} so far"))
+        return Status.SUCCESS if self.count == 3 else Status.RUNNING
+
+
+def test_answers_of_a_node_in_a_loop_are_all_in_the_result(compiled, run_tree, monkeypatch):
+    tree = compiled(CHECKS[2])
+    monkeypatch.setattr(type(tree), "build", lambda self, context: Repeated(context))
+    worst = run_tree(tree).worst
+    assert [one.answer for one in worst.findings] == [1, 2, 3]
+    assert worst.message == "1 so far; 2 so far; 3 so far"

@@ -1,0 +1,72 @@
+"""Trigger sources of other distributions: found by the name of their kind; what is missing or broken says so."""
+
+import sys
+
+import pytest
+
+from executive.mission.errors import InputError
+from executive.store.trigger_source import refuse_missing_source, trigger_source
+
+MODULE = """
+class Source:
+    def start(self, topics, fire): self.topics, self.fire = topics, fire
+    def stop(self): pass
+
+class Half:
+    def stop(self): pass
+
+def broken(): raise OSError("no broker")
+"""
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """A distribution that registers trigger sources."""
+    (tmp_path / "bells.py").write_text(MODULE)
+    info = tmp_path / "bells-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Name: bells\nVersion: 1.0\n")
+    lines = ("bell = bells:Source", "half = bells:Half", "broken = bells:broken", "gone = bells:Gone")
+    (info / "entry_points.txt").write_text("\n".join(("[errand.triggers]", *lines, "")))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield
+    sys.modules.pop("bells", None)
+
+
+def test_a_source_is_made_by_the_name_of_its_kind(installed):
+    refuse_missing_source("bell")
+    source = trigger_source("bell")
+    source.start(("door",), print)
+    assert source.topics == ("door",)
+    assert trigger_source("bell") is not source
+
+
+def test_a_missing_source_is_one_error_that_names_the_group(installed):
+    with pytest.raises(InputError) as error:
+        refuse_missing_source("mqtt")
+    assert str(error.value) == (
+        "there is no trigger source 'mqtt'; install a package that registers 'mqtt' in the entry-point group "
+        "'errand.triggers'; installed are bell, broken, gone and half"
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("broken", r"'broken' \(bells:broken\) cannot be made \(OSError: no broker\); repair or uninstall"),
+        ("gone", r"'gone' \(bells:Gone\) cannot be made \(AttributeError"),
+        ("half", r"'half' \(bells:Half\) has no start; see"),
+    ],
+)
+def test_a_source_that_cannot_be_used_says_why(installed, kind, words):
+    with pytest.raises(InputError, match=words):
+        trigger_source(kind)
+
+
+def test_two_sources_of_one_kind_are_refused(installed, tmp_path):
+    info = tmp_path / "more-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Name: more\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[errand.triggers]\nbell = more:Source\n")
+    with pytest.raises(InputError, match="bells:Source and more:Source both are trigger source 'bell'"):
+        refuse_missing_source("bell")

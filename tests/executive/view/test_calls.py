@@ -1,0 +1,103 @@
+"""HTTP calls: nothing without the token, small bodies only, and each refusal has its status."""
+
+import http.client
+import json
+import socket
+from http import HTTPStatus
+
+import pytest
+
+from executive.view.calls import CallError, CallServer
+from executive.view.serving import MAX_BODY
+
+TOKEN = "a-token-of-the-test"
+
+
+@pytest.fixture
+def calls():
+    return []
+
+
+@pytest.fixture
+def server(calls):
+    def called(name, body):
+        if name == "full":
+            raise CallError(HTTPStatus.TOO_MANY_REQUESTS, "100 wait already")
+        calls.append((name, body))
+        return {"missions": [7]}
+
+    with CallServer(called, token=TOKEN, host="127.0.0.1", port=0) as running:
+        yield running
+
+
+def ask(server, method="POST", name="patrol", body=b"", **headers):
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    connection.request(method, f"/missions/{name}", body, {"Authorization": f"Bearer {TOKEN}", **headers})
+    answer = connection.getresponse()
+    return answer.status, answer.read()
+
+
+def test_a_call_with_the_token_is_done_and_answered(server, calls):
+    status, answer = ask(server, body=b'{"room": "office"}')
+    assert (status, json.loads(answer)) == (202, {"missions": [7]})
+    assert calls == [("patrol", b'{"room": "office"}')]
+    assert server.url == f"http://127.0.0.1:{server.port}/missions/"
+
+
+@pytest.mark.parametrize(
+    "given",
+    ["", "Bearer", "Bearer ", "Bearer wrong", f"Bearer {TOKEN}x", f"Basic {TOKEN}", TOKEN, "Bearer \u00fc"],
+)
+@pytest.mark.parametrize("name", ["patrol", "unknown", "full"])
+def test_every_call_without_the_token_is_refused_in_the_same_way(server, calls, given, name):
+    status, answer = ask(server, name=name, Authorization=given.encode("latin-1"))
+    assert (status, "the token is missing or wrong" in json.loads(answer)["error"]) == (401, True)
+    assert calls == []
+
+
+def test_the_scheme_may_be_written_in_small_letters(server):
+    assert ask(server, Authorization=f"bearer {TOKEN}")[0] == 202
+
+
+def test_a_refusal_has_its_status_and_its_reason(server):
+    status, answer = ask(server, name="full")
+    assert (status, json.loads(answer)) == (429, {"error": "100 wait already"})
+
+
+def test_a_large_body_is_refused_whatever_length_it_claims(server, calls):
+    assert ask(server, body=b"x" * MAX_BODY)[0] == 202
+    calls.clear()
+    assert ask(server, body=b"x" * (MAX_BODY + 1))[0] == 413
+    assert ask(server, body=iter([b"x" * MAX_BODY, b"x"]))[0] == 413
+    assert calls == []
+
+
+def test_a_client_that_goes_away_in_the_middle_does_no_harm(server, calls, capfd):
+    with socket.create_connection(("127.0.0.1", server.port)) as client:
+        head = f"POST /missions/patrol HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {TOKEN}\r\nContent-Length: 9"
+        client.sendall(f"{head}\r\n\r\n{{".encode())
+    assert ask(server)[0] == 202
+    server.close()
+    assert (len(calls), capfd.readouterr().err) == (1, "")
+
+
+@pytest.mark.parametrize(("method", "name"), [("GET", "patrol"), ("PUT", "patrol"), ("POST", "a/b"), ("POST", "")])
+def test_nothing_else_is_served(server, calls, method, name):
+    assert ask(server, method, name)[0] in (404, 405)
+    assert calls == []
+
+
+def test_it_is_served_where_it_is_said_only(server):
+    assert server._serving._socket.getsockname()[0] == "127.0.0.1"
+
+
+def test_an_address_that_is_taken_is_an_error():
+    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use"):
+        CallServer(lambda name, body: {}, token=TOKEN, host="127.0.0.1", port=taken.getsockname()[1])
+
+
+def test_after_the_end_nothing_is_served(server):
+    server.close()
+    server.close()
+    with pytest.raises(OSError):
+        ask(server)

@@ -1,0 +1,101 @@
+"""The report of a run as one HTML file: complete, closed, and nothing in it that a text could break."""
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from executive.view.report_page import AnswerRow, PagePicture, ReportPage, SeenRow, StepRow, Verdict, to_report
+from executive.view.styles import Styles
+
+NASTY = "<script>alert(\"1\")</script> & 'x' \x1b[31m"
+JPEG = b"\xff\xd8 a picture"
+
+
+def page(**changes):
+    facts = {
+        "title": "patrol",
+        "request": "patrol and tell me what you saw",
+        "commands": ("Take [Nothing] to [office] and do [find] to [hammer]",),
+        "verdicts": (Verdict("The tree claims", True, "success", "no hammer in the office"),),
+        "facts": (("world", "flat"),),
+    }
+    return ReportPage(**{**facts, **changes})
+
+
+class Reader(HTMLParser):
+    """Notes tags and texts, and that every tag is closed in its turn."""
+
+    VOID = frozenset({"meta", "link", "img", "br"})
+
+    def __init__(self, html):
+        super().__init__()
+        self.tags, self.texts, self.open = [], [], []
+        self.feed(html)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.texts).split())
+
+
+def test_answers_stand_in_order_with_time_place_and_picture():
+    answers = (
+        AnswerRow(26.95, "hammer in the office", "office", False, "no: no hammer in the office"),
+        AnswerRow(127.3, "hammer in the workshop", "workshop", True, "yes: hammer in the workshop", JPEG),
+        AnswerRow(130.0, "Where is Robin?", "", "in the shed", "Robin is in the shed"),
+    )
+    read = Reader(to_report(page(answers=answers)))
+    parts = ("0:26.9", "office", "hammer in the office?", "no", "2:07.3", "workshop", "yes", "Where is Robin?", "shed")
+    places = [read.text.index(part, read.text.index("Answers")) for part in parts]
+    assert places == sorted(places)
+    (image,) = [attrs for tag, attrs in read.tags if tag == "img"]
+    assert image["src"].startswith("data:image/jpeg;base64,")
+    assert read.open == []
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"title": NASTY, "request": NASTY, "commands": (NASTY,), "facts": ((NASTY, NASTY),)},
+        {"verdicts": (Verdict(NASTY, None, NASTY, NASTY),)},
+        {"answers": (AnswerRow(0.0, NASTY, NASTY, NASTY, NASTY, JPEG),)},
+        {"said": ((1.0, NASTY),), "seen": (SeenRow(1.0, NASTY, NASTY),), "events": (NASTY,)},
+        {"steps": (StepRow(NASTY, Styles.FAILURE.value, NASTY, 2, (0.0, 1.0), NASTY),)},
+        {"map": PagePicture(NASTY, JPEG), "pictures": (PagePicture(NASTY, JPEG),)},
+    ],
+)
+def test_every_text_is_escaped(changes):
+    html = to_report(page(**changes))
+    read = Reader(html)
+    assert not any(tag == "script" for tag, _ in read.tags)
+    assert "\x1b" not in html
+    assert "alert" in html
+
+
+def test_it_needs_no_script_and_nothing_from_elsewhere():
+    html = to_report(page(map=PagePicture("map", JPEG), tree_svg="<svg></svg>"))
+    assert "<script" not in html
+    assert not re.search(r'(src|href)="(?!data:)|url\(|@import', html)
+
+
+def test_what_there_is_nothing_of_has_no_heading():
+    text = Reader(to_report(page())).text
+    assert not any(name in text for name in ("Answers", "Said", "Seen", "Pictures", "Behaviour tree"))
+
+
+def test_a_step_tells_status_cause_and_time():
+    steps = (StepRow("go to the hall", Styles.FAILURE.value, "failure (PLANNING)", 1, (61.0, 75.5), "no way"),)
+    text = Reader(to_report(page(steps=steps))).text
+    assert "go to the hall failure (PLANNING) 1:01.0–1:15.5 no way" in text

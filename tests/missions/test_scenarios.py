@@ -1,0 +1,48 @@
+"""Whole missions while something happens in the world, from the command line: they find another way."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from executive.record.reader import read_events
+
+pytestmark = pytest.mark.mission
+
+
+def errand_run(out, sentence, *arguments):
+    """The report of a run."""
+    command = [sys.executable, "-m", "executive.cli", "run", "--say", sentence, "--no-record", "--quiet", "--json"]
+    done = subprocess.run([*command, "--out", str(out), *arguments], capture_output=True, text=True, check=False)
+    assert done.stdout, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def told(out):
+    """What was logged of faults and events."""
+    events = read_events(out / "log.mcap")
+    return [event.data["message"] for event in events if event.topic == "control"]
+
+
+def test_where_a_door_closes_the_robot_takes_another(tmp_path):
+    file = tmp_path / "door.yaml"
+    file.write_text("events:\n  - {door: [kitchen, living room], closes: 1 s}\n", encoding="utf-8")
+    out = tmp_path / "out"
+    report = errand_run(out, "go to the kitchen", "--scenario", str(file))
+    assert (report["outcome"], report["referee"]["success"]) == ("success", True), report
+    assert report["referee"]["collisions"] == 0
+    assert "the door between kitchen and living room closes" in told(out)
+    poses = [event.data["pose"]["position"] for event in read_events(out / "log.mcap") if event.topic == "pose"]
+    assert min(pose["x"] for pose in poses) < 7.4  # through the hall
+
+
+def test_an_object_that_is_moved_before_it_is_grasped_is_found_where_it_is_now(tmp_path):
+    file = tmp_path / "moved.yaml"
+    file.write_text("events:\n  - {object: beer, at: 8 s, to: kitchen table}\n", encoding="utf-8")
+    out, fault = tmp_path / "out", "camera.hand: dropout 3 s at 12 s"
+    report = errand_run(out, "fetch me a beer from the kitchen", "--scenario", str(file), "--fault", fault)
+    assert (report["outcome"], report["referee"]["success"]) == ("success", True), report
+    assert "lifted from the kitchen table" in report["referee"]["why"]
+    assert (report["referee"]["collisions"], report["referee"]["drops"]) == (0, 0)
+    assert told(out)[:3] == ["somebody moves the beer to the kitchen table", f"{fault}: begins", f"{fault}: is over"]

@@ -1,0 +1,10 @@
+"""Spot's capabilities, for robots with an arm."""
+
+import pytest
+
+from plant.spot.capabilities import spot_capabilities
+
+
+@pytest.fixture(scope="session")
+def spot():
+    return spot_capabilities()

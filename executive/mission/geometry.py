@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -23,12 +24,12 @@ class Side:
 
 def inside(polygon: Sequence[Point], point: Point) -> bool:
     """Whether (x, y) lies within the outline."""
-    return bool(shapely.contains_xy(shapely.Polygon(polygon), *point))
+    return bool(shapely.contains_xy(_outline(tuple(polygon)), *point))
 
 
 def distance_m(polygon: Sequence[Point], point: Point) -> float:
     """How far (x, y) lies outside the outline; 0 within it."""
-    return float(shapely.distance(shapely.Polygon(polygon), shapely.Point(point)))
+    return float(shapely.distance(_outline(tuple(polygon)), shapely.Point(point)))
 
 
 def fits(outline: Sequence[Point], polygon: Sequence[Point], taken: Iterable[Sequence[Point]]) -> bool:
@@ -50,3 +51,9 @@ def _ends_off_m(side: tuple[Point, Point], middle: Point, length_m: float) -> fl
     dx, dy = (0.5 * length_m * (b - a) / way_m for a, b in ((x0, x1), (y0, y1)))
     ends = (middle[0] - dx, middle[1] - dy), (middle[0] + dx, middle[1] + dy)
     return sum(float(shapely.distance(shapely.LineString(side), shapely.Point(end))) for end in ends)
+
+
+@functools.lru_cache(maxsize=256)
+def _outline(polygon: tuple[Point, ...]) -> shapely.Polygon:
+    """The outline; rooms are asked for again and again while a mission is compiled."""
+    return shapely.Polygon(polygon)

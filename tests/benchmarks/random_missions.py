@@ -12,12 +12,15 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
+import functools
 import random
 import sys
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from executive.mission.command import parse_command
@@ -49,10 +52,14 @@ from executive.mission.file.model import (
     StepPolicy,
 )
 from executive.mission.knowledge import Knowledge
+from executive.mission.request import Request
 from executive.run.control import Control
+from executive.run.journal import TickNote
 from executive.run.outcome import Outcome, RunResult
 from executive.run.runner import Progress, RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
+from executive.store.missions import MissionStore
+from executive.store.resuming import resumed_tree
 from executive.tree.compiler import CompiledTree, compile_mission
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectObservation, Part, Running, Skill, Succeeded, Thing
 from tests.executive.conftest import KNOWLEDGE, PORTS, EmptyCostmap, ManualClock, Script, ScriptedRobot, StillLocaliser
@@ -89,6 +96,7 @@ BUTTONS = ("go", "stop")
 SKILLS = ("stow", "clear_costmap", "relocalise", "back_off")
 CAUSES = (Cause.PRECONDITION, Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION, Cause.TIMEOUT)
 INJECTED = "injected"
+REQUEST = Request("at random", seed=3, name="random", world_name="flat", robot="Alice", fingerprint="print")
 
 
 class MissionMaker:
@@ -417,19 +425,71 @@ def made_mission(seed: int) -> Mission:
 def ran(seed: int) -> Ran:
     """Make the mission of a seed and run it to its end. Raises InputError: it cannot be compiled."""
     clock = ManualClock()
-    robot = ScriptedRobot(clock)
+    robotics, tree, other = _compiled(seed, ScriptedRobot(clock))
+    return _run(seed, clock, robotics, tree, other)
+
+
+def resumed(seed: int, folder: Path) -> Ran | None:
+    """The same, killed in some tick and taken up again; None when it ended before. Raises InputError as `ran`."""
+    clock = ManualClock()
+    robotics, tree, other = _compiled(seed, ScriptedRobot(clock))
+    kill_after = int(80 ** robotics.rng.random())
+    with MissionStore(folder / f"{seed}.sqlite") as store:
+        mission = store.add(REQUEST, queued=False)
+        store.begin(mission.id)
+        try:
+            _run(seed, clock, robotics, tree, other, KillingJournal(store.journal(mission.id), kill_after))
+        except KilledError:
+            again, recollection = resumed_tree(tree, store.memory(mission.id))
+        else:
+            return None
+        journal = store.journal(mission.id)
+        journal.remembering(recollection)
+        store.begin(mission.id)
+        robotics.active.clear()
+        robotics.robot.holder, robotics.robot.driving = None, False
+        return _run(seed, clock, robotics, again, other, journal)
+
+
+class KilledError(BaseException):
+    """The process is gone."""
+
+
+class KillingJournal:
+    """Passes notes on, and kills after some of them."""
+
+    def __init__(self, journal: Any, kill_after: int) -> None:
+        self.journal, self.left = journal, kill_after
+
+    def note(self, note: TickNote) -> None:
+        """A tick is over."""
+        self.journal.note(note)
+        self.left -= 1
+        if self.left <= 0:
+            raise KilledError
+
+
+def _compiled(seed: int, robot: ScriptedRobot) -> tuple[Robotics, CompiledTree, CompiledTree]:
+    """What happens to the robot, the mission of a seed, and another that may come in between."""
     rng = random.Random(f"run {seed}")
     robotics = Robotics(rng, robot, failing=rng.choice([0.0, 0.1, 0.4]))
     registry = robotics.registry()
     tree = compile_mission(made_mission(seed), knowledge=WORLD, registry=registry)
     between = Mission("between", DEFAULT_WORLD, "Alice", (MissionStep(skill=SkillCall("stow")),))
-    other = compile_mission(between, knowledge=WORLD, registry=registry)
+    return robotics, tree, compile_mission(between, knowledge=WORLD, registry=registry)
+
+
+def _run(
+    seed: int, clock: ManualClock, robotics: Robotics, tree: CompiledTree, other: CompiledTree, journal: Any = None
+) -> Ran:
+    """Run a tree to its end."""
+    rng, robot = robotics.rng, robotics.robot
     control = Control(pace=None)
     operator = Operator(rng, control, robot, other)
     log: list[tuple[str, str]] = []
     with LockStepWorker(clock) as worker:
         result = run(
-            [RunEntry(tree, robot, StillLocaliser(), EmptyCostmap())],  # type: ignore[arg-type]
+            [RunEntry(tree, robot, StillLocaliser(), EmptyCostmap(), journal)],  # type: ignore[arg-type]
             clock=clock,
             worker=worker,
             publish=lambda topic, message: log.append((topic, repr(message))),
@@ -489,15 +549,19 @@ def topic_path(text: str) -> str:
     return text.split("'node': '", 1)[1].split("'", 1)[0]
 
 
-def benchmark(trees: int, seed: int, limit_s: float, tell: Callable[[str], None]) -> int:
-    """Run so many, or as many as the time (s) allows; the number of those with something wrong."""
+def benchmark(trees: int, seed: int, limit_s: float, tell: Callable[[str], None], *, kill: bool = False) -> int:
+    """Run so many, or as many as the time (s) allows; the number of those with something wrong.
+
+    With `kill`, each is killed in some tick and taken up again.
+    """
     begun, outcomes, bad, nodes, ticks, done = time.perf_counter(), Counter[str](), 0, 0, 0, 0
+    folder = tempfile.TemporaryDirectory()
     for number in range(seed * 1_000_000, seed * 1_000_000 + trees):
         if time.perf_counter() - begun > limit_s:
             break
         done += 1
         try:
-            one = ran(number)
+            one = resumed(number, Path(folder.name)) if kill else ran(number)
         except InputError as error:
             outcomes["not compiled: " + error.message.split("'")[0]] += 1
             continue
@@ -505,12 +569,15 @@ def benchmark(trees: int, seed: int, limit_s: float, tell: Callable[[str], None]
             bad += 1
             tell(f"seed {number}: {type(defect).__name__}: {defect}"[:300])
             continue
+        if one is None:
+            outcomes["over before the kill"] += 1
+            continue
         outcomes[one.result.outcome.value] += 1
         nodes, ticks = nodes + one.nodes, ticks + one.result.ticks
         if one.wrong:
             bad += 1
             tell(f"seed {number}: {'; '.join(one.wrong)}"[:600])
-        elif number % 10 == 0 and ran(number).log != one.log:
+        elif number % 10 == 0 and not kill and ran(number).log != one.log:
             bad += 1
             tell(f"seed {number}: its log differs the second time")
     tell(f"{done} missions in {time.perf_counter() - begun:.0f} s: {nodes} nodes, {ticks} ticks, {bad} with a defect")
@@ -524,8 +591,10 @@ def main() -> int:
     parser.add_argument("--trees", type=int, default=20_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--limit", type=float, default=480.0, help="seconds at most")
+    parser.add_argument("--kill", action="store_true", help="kill each in some tick, and take it up again")
     options = parser.parse_args()
-    return int(benchmark(options.trees, options.seed, options.limit, lambda text: print(text, flush=True)) > 0)
+    tell = functools.partial(print, flush=True)
+    return int(benchmark(options.trees, options.seed, options.limit, tell, kill=options.kill) > 0)
 
 
 if __name__ == "__main__":

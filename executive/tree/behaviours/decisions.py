@@ -13,6 +13,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
+from executive.mission.condition import READINGS
 from executive.mission.expression import Expression, ExpressionError, Template, Value
 from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.behaviours.board import Board
@@ -41,18 +42,26 @@ class View:
         self.begun_s, self.presses = self.context.clock.now(), self.context.presses()
 
     def values(self, keys: Keys) -> Mapping[str, Value]:
-        """The readings, and the values of names that are kept under blackboard keys; what has none is left out."""
-        context, board = self.context, self.context.board
-        now_s = context.clock.now()
-        minutes = int((context.day_began_s + now_s) % DAY_S // 60)
-        return {
-            "battery": context.robot.battery().charge,
-            "localised": context.localiser.estimate().localised,
-            "holding": context.robot.gripper().holding,
-            "elapsed": now_s - self.begun_s,
-            "clock": f"{minutes // 60:02d}:{minutes % 60:02d}",
-            **{name: board.get(key) for name, key in keys.items() if key in board},
-        }
+        """The readings, and the values of names that are kept under blackboard keys; what has none is left out.
+
+        Each is read when it is asked for.
+        """
+        return _Values(self, keys)
+
+    def reading(self, name: str) -> Value:
+        """A reading by its name."""
+        context = self.context
+        match name:
+            case "battery":
+                return context.robot.battery().charge
+            case "localised":
+                return context.localiser.estimate().localised
+            case "holding":
+                return context.robot.gripper().holding
+            case "elapsed":
+                return context.clock.now() - self.begun_s
+        minutes = int((context.day_began_s + context.clock.now()) % DAY_S // 60)
+        return f"{minutes // 60:02d}:{minutes % 60:02d}"
 
     def pressed(self, button: str) -> bool:
         """Whether a button has been pressed since."""
@@ -61,6 +70,29 @@ class View:
     def forget_presses(self) -> None:
         """Count presses of buttons from now on."""
         self.presses = self.context.presses()
+
+
+@dataclass(frozen=True)
+class _Values(Mapping[str, Value]):
+    """What expressions read."""
+
+    view: View
+    named: Keys
+
+    def __getitem__(self, name: str) -> Value:
+        if name in READINGS:
+            return self.view.reading(name)
+        value: Value = self.view.context.board.get(self.named[name])
+        return value
+
+    def __contains__(self, name: object) -> bool:
+        return name in READINGS or (name in self.named and self.named[str(name)] in self.view.context.board)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*READINGS, *filter(self.__contains__, self.named)))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
 
 
 class Decision(Protocol):

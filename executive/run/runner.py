@@ -300,7 +300,8 @@ class _Run:
 
     def _keep_pace(self, begun_wall_s: float) -> None:
         """Do not let simulated time run ahead of people who have something to decide."""
-        if self._control.pace is None or not self._control.slow:
+        people = self._control.attended and any(session.waits_for_people for session in self._sessions)
+        if self._control.pace is None or not (people or self._control.slow):
             return
         left_s = self._settings.tick_period_s / self._control.pace - (time.perf_counter() - begun_wall_s)
         if left_s > 0.0:

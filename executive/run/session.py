@@ -152,6 +152,11 @@ class Session:
         return changed
 
     @property
+    def waits_for_people(self) -> bool:
+        """True while the mission under way waits for somebody to press a button."""
+        return self.result is None and self._top.waits_for_people
+
+    @property
     def ends(self) -> bool:
         """True while missions that were ended early still do what is always done in the end."""
         return self.result is None and any(run.ends for run in self._stack)

@@ -16,6 +16,7 @@ from executive.run.journal import Journal, TickNote
 from executive.run.outcome import Outcome, RobotResult
 from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.context import Endings, RunContext
+from executive.tree.behaviours.decisions import Decide, WaitFor, buttons_of
 from executive.tree.behaviours.explained import Explained, message_of
 from executive.tree.behaviours.gate import Gate
 from executive.tree.behaviours.policies import Skip
@@ -56,6 +57,11 @@ class TreeRun:
         self._endings: list[str] = []
         self._observed = Observed(self.root)
         self._leaves = tuple(node for node in self._observed.nodes if isinstance(node, SkillLeaf))
+        buttons = {node.path_id for node in tree.root.walk() if any(buttons_of(node))}
+        waits = (node for node in self._observed.nodes if isinstance(node, WaitFor))
+        self._for_buttons = tuple(
+            n for n in waits if isinstance(n.decorated, Decide) and n.decorated.path_id in buttons
+        )
         self._skills = frozenset(leaf.path_id for leaf in self._leaves)
         if profile is not None:
             for leaf in self._leaves:
@@ -69,6 +75,11 @@ class TreeRun:
     def finished(self) -> bool:
         """True when the tree has come to an end, and all is done that is always done in the end."""
         return self.root.status in (Status.SUCCESS, Status.FAILURE) and self.context.endings.due is None
+
+    @property
+    def waits_for_people(self) -> bool:
+        """True while a node waits for somebody to press a button."""
+        return any(node.status is Status.RUNNING for node in self._for_buttons)
 
     @property
     def ends(self) -> bool:

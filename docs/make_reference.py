@@ -27,6 +27,7 @@ from skills.stack import SLOTS, components, skill_options, stack_schema
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from make_api import api_page
+from mission_constructs import constructs_text
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "reference"
@@ -37,13 +38,14 @@ NOTE = "<!-- Written by docs/make_reference.py; don't edit. -->\n\n"
 
 @dataclasses.dataclass(frozen=True)
 class SchemaPage:
-    """A page on one kind of YAML file: its schema, a few words, and a file of ours as the example."""
+    """A page on one kind of YAML file: its schema, a few words, more sections, and a file of ours as the example."""
 
     name: str
     title: str
     words: str
     model: type[BaseModel]
     example: str
+    more: str = ""
 
 
 SCHEMA_PAGES = (
@@ -54,6 +56,7 @@ SCHEMA_PAGES = (
         "`missions/mission.schema.json` is the same schema for editors.",
         MissionFile,
         "missions/guarded_delivery.yaml",
+        constructs_text(),
     ),
     SchemaPage(
         "knowledge",
@@ -107,7 +110,9 @@ def schema_page(page: SchemaPage) -> str:
     main = _section("The file", schema)
     example = (ROOT / page.example).read_text(encoding="utf-8")
     shown = f"## Example\n\n`{page.example}`:\n\n```yaml\n{example}```\n"
-    return f"{NOTE}# {page.title}\n\n{page.words} Unknown keys are refused.\n\n{main}{''.join(sections)}{shown}"
+    return (
+        f"{NOTE}# {page.title}\n\n{page.words} Unknown keys are refused.\n\n{page.more}{main}{''.join(sections)}{shown}"
+    )
 
 
 def _reachable(schema: Mapping[str, Any], parts: Mapping[str, Any]) -> list[str]:

@@ -227,28 +227,38 @@ def _longest_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     """What decides, then the branch that takes longest."""
     decides, *branches = node.children
     begun = _followed(decides, walk, first=first)
-    return begun + _side_by_side(branches, walk, first=first)[0]
+    return begun + _longest(branches, walk, first=first)
 
 
 def _together(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """All branches at once: the longest of them in time, all of them in distance and charge."""
-    longest, all_of = _side_by_side(node.children, walk, first=first)
-    return Estimate(longest.duration_s, all_of.distance_m, all_of.charge)
+    """All branches at once until as many as are needed are done; the others are broken off then.
 
-
-def _side_by_side(branches: Sequence[NodeSpec], walk: _Walk, *, first: bool) -> tuple[Estimate, Estimate]:
-    """The longest of some branches that begin at one place, and all of them; the walk goes on after the longest."""
-    longest, all_of = Estimate(), Estimate()
+    The walk goes on where the one that drives farthest has led.
+    """
     here, noted, drawn = walk.pose, dict(walk.noted), walk.drawn
+    branches = []
+    for branch in node.children:
+        walk.pose, walk.noted, walk.drawn = here, dict(noted), drawn
+        branches.append((_followed(branch, walk, first=first), (walk.pose, walk.noted, walk.drawn)))
+    ends_s = sorted(taken.duration_s for taken, _ in branches)[node.options["needed"] - 1]
+    shares = [min(1.0, ends_s / taken.duration_s) if taken.duration_s else 1.0 for taken, _ in branches]
+    distance_m = sum(share * taken.distance_m for share, (taken, _) in zip(shares, branches, strict=True))
+    charge = sum(share * taken.charge for share, (taken, _) in zip(shares, branches, strict=True))
+    walk.pose, walk.noted, walk.drawn = max(branches, key=lambda each: each[0].distance_m)[1]
+    return Estimate(ends_s, distance_m, charge)
+
+
+def _longest(branches: Sequence[NodeSpec], walk: _Walk, *, first: bool) -> Estimate:
+    """The longest of some branches that begin at one place; the walk goes on after it."""
+    longest, here, noted, drawn = Estimate(), walk.pose, dict(walk.noted), walk.drawn
     after = here, noted, drawn
     for branch in branches:
         walk.pose, walk.noted, walk.drawn = here, dict(noted), drawn
         taken = _followed(branch, walk, first=first)
-        all_of += taken
         if taken.duration_s >= longest.duration_s:
             longest, after = taken, (walk.pose, walk.noted, walk.drawn)
     walk.pose, walk.noted, walk.drawn = after
-    return longest, all_of
+    return longest
 
 
 def _rounds(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:

@@ -6,15 +6,21 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parent))
-from documents import DOCS
+from documents import DOCS, blocks
+
+from executive.cli.entry import app
+from executive.mission.file.condition_schema import ConditionFile
+from executive.mission.file.schema import BLOCKS
 
 SPEC = importlib.util.spec_from_file_location("make_reference", DOCS / "make_reference.py")
 assert SPEC is not None
 make_reference = importlib.util.module_from_spec(SPEC)
 sys.modules["make_reference"] = make_reference
 SPEC.loader.exec_module(make_reference)
+mission_constructs = sys.modules["mission_constructs"]
 PAGES = make_reference.pages()
 
 
@@ -49,3 +55,35 @@ def test_the_schema_of_mission_files_is_current_and_shows_the_ranges_of_the_port
     (navigate,) = (rule["then"] for rule in rules if rule["if"]["properties"]["skill"]["const"] == "navigate")
     speed, *_ = navigate["properties"]["with"]["properties"]["max_speed"]["anyOf"]
     assert speed == {"type": "number", "exclusiveMinimum": 0.0, "maximum": 3.0}
+
+
+CONSTRUCTS = (*mission_constructs.DECIDING, *mission_constructs.WATCHING, *mission_constructs.SMALL)
+
+
+def test_every_kind_of_step_is_explained():
+    told = {word.strip(",") for one in CONSTRUCTS for word in one.heading.split()}
+    assert set(BLOCKS) <= told
+    assert {"while", "when", "always", "done_when", "for_each"} <= told
+
+
+def test_every_condition_is_explained():
+    told = " ".join(what for what, *_ in mission_constructs.CONDITIONS)
+    keys = set(ConditionFile.model_json_schema(by_alias=True)["$defs"]["ConditionFile"]["properties"])
+    assert {key for key in keys - {"expression"} if f"`{key}`" not in told.replace(", ", "` `")} == set()
+
+
+def test_the_examples_of_the_kinds_of_steps_pass_the_check(tmp_path):
+    files = [tmp_path / f"{number}.yaml" for number in range(len(CONSTRUCTS))]
+    for file, one in zip(files, CONSTRUCTS, strict=True):
+        file.write_text(mission_constructs.file_of(one), encoding="utf-8")
+    result = CliRunner().invoke(app, ["check", *map(str, files)])
+    assert result.exit_code == 0, result.output
+
+
+def test_our_side_of_the_page_on_other_tools_passes_the_check(tmp_path):
+    shown = [block.text for block in blocks(DOCS / "coming-from.md") if block.text.startswith("name: ")]
+    files = [tmp_path / f"{number}.yaml" for number in range(len(shown))]
+    for file, text in zip(files, shown, strict=True):
+        file.write_text(text, encoding="utf-8")
+    result = CliRunner().invoke(app, ["check", *map(str, files)])
+    assert (result.exit_code, len(files)) == (0, 9), result.output

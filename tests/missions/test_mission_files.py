@@ -24,3 +24,31 @@ def test_it_is_achieved_and_takes_about_as_long_as_estimated(name, seed, tmp_pat
     assert report.referee.collisions == 0
     if "skipped" not in report.message:
         assert 0.6 < report.sim_time_s / Checker().check(file).estimate.duration_s < 1.6
+
+
+DECIDING = {
+    "beer_else_coke": (2, None),
+    "charge_then_go": (1, None),
+    "count_drinks": (1, "I counted 2 drinks."),
+    "find_hammer": (2, "The hammer is in the workshop."),
+    "guarded_round": (1, "Half a minute so far."),
+    "patrol_and_report": (1, "2 of 2 rooms are empty."),
+    "retry_elsewhere": (1, None),
+    "speak_while_driving": (1, "On my way to the hall."),
+    "tea_or_coffee": (1, "1 tea, please."),
+    "timed_visit": (1, "It is "),
+    "wait_for_button": (1, "Nobody pressed the button. I am going now."),
+    "watch_the_door": (1, "I looked 1 time. The bathroom door is open."),
+}
+"""The missions that decide, repeat, wait and speak: the seed, and what the robot says last."""
+
+
+@pytest.mark.parametrize("name", DECIDING)
+def test_what_it_decides_is_right_and_it_says_so(name, tmp_path):
+    seed, said = DECIDING[name]
+    file = MISSIONS / f"{name}.yaml"
+    report = run_simulated(prepare(Request(file=file, seed=seed, out=tmp_path, record=False))).report
+    assert report.outcome == "success", report.message
+    assert report.referee.success, report.referee.why
+    assert (report.referee.collisions, report.referee.drops) == (0, 0)
+    assert (said or "") in (report.said[-1].text if said else "")

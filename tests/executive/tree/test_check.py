@@ -7,6 +7,7 @@ import pytest
 
 from executive.mission.command import parse_command
 from executive.mission.errors import SourceLine
+from executive.mission.file.blocks import Together, Wait
 from executive.mission.file.model import Mission, MissionStep, SkillCall
 from executive.tree.check import Abilities, PlannedRoutes, check_tree
 from executive.tree.compiler import compile_mission
@@ -48,7 +49,8 @@ def check(knowledge, registry, tmp_path):
         for line, one in enumerate(steps, start=1):
             source = SourceLine(tmp_path / "m.yaml", line)
             command = (parse_command(one),) if isinstance(one, str) else ()
-            made.append(MissionStep(command, source, skill=None if command else one))
+            step = MissionStep(command, source, skill=None if command else one)
+            made.append(one if isinstance(one, MissionStep) else step)
         mission = Mission("m", "flat", "Alice", tuple(made))
         tree = compile_mission(mission, knowledge=knowledge, registry=registry)
         return check_tree(
@@ -65,6 +67,18 @@ def check(knowledge, registry, tmp_path):
 
 def told(checked):
     return [(error.line, error.message) for error in checked.errors]
+
+
+def test_steps_together_take_as_long_as_those_that_must_be_done(check):
+    drive, wait = MissionStep((parse_command(GO.format("kitchen")),)), MissionStep(block=Wait(seconds=300.0))
+    alone, either, both = (check(one).estimate for one in (drive, *(_together(drive, wait, n) for n in (1, 2))))
+    assert alone.duration_s < 60
+    assert either.duration_s == pytest.approx(alone.duration_s)
+    assert (both.duration_s, both.distance_m) == (300.0, pytest.approx(alone.distance_m))
+
+
+def _together(first, second, needed):
+    return MissionStep(block=Together((first, second), needed))
 
 
 def test_a_good_mission_has_no_errors_and_an_estimate(check, make):

@@ -9,9 +9,11 @@ from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Succeeded
 
 NAMES = (
-    "check_hammer", "clear_table", "deliver", "fetch_drink", "go_living_room", "go_to_pose", "guarded_delivery",
-    "hammer_to_kitchen", "look_and_approach", "patrol", "take_beer_to_bedroom", "tidy_cube", "tidy_table",
-    "two_drinks", "visit_room", "welcome",
+    "beer_else_coke", "charge_then_go", "check_hammer", "clear_table", "count_drinks", "deliver", "fetch_drink",
+    "find_hammer", "go_living_room", "go_to_pose", "guarded_delivery", "guarded_round", "hammer_to_kitchen",
+    "look_and_approach", "patrol", "patrol_and_report", "retry_elsewhere", "speak_while_driving",
+    "take_beer_to_bedroom", "tea_or_coffee", "tidy_cube", "tidy_table", "timed_visit", "two_drinks", "visit_room",
+    "wait_for_button", "watch_the_door", "welcome",
 )  # fmt: skip
 SURFACES_WITH_THINGS = ("kitchen counter", "kitchen table", "workbench", "tool trolley")
 
@@ -37,9 +39,22 @@ def run_mission(parser, flat, skills, run_tree, script, missions, make):
             return Failed(Cause.POSTCONDITION, "nothing is left")
         return make.default_end(script, "detect")(skill)
 
+    def charge(skill):
+        skill.context.robot._robot.charge = skill.inputs.level
+        return Succeeded("charged")
+
+    def somebody(skill):
+        return Succeeded("seen", {"observation": make.COKE, "observations": (make.COKE,)})
+
+    def scripted(name, skill):
+        made = make.scripted_skill(script, name, skill.Inputs, skill.outputs)
+        made.uses = skill.uses
+        return made
+
     script.seen_on = SURFACES_WITH_THINGS
-    script.ends |= {"place": put_down, "grasp": hold, "detect": look}
-    registry = {name: make.scripted_skill(script, name, one.Inputs, one.outputs) for name, one in skills.items()}
+    script.ends |= {"place": put_down, "grasp": hold, "detect": look, "charge": charge, "find_people": somebody}
+    script.ends["check_door"] = lambda skill: Succeeded("open", {"open": True, "free_m": 0.9})
+    registry = {name: scripted(name, skill) for name, skill in skills.items()}
 
     def run_file(name):
         loaded = load_mission(next(path for path in missions if path.stem == name))
@@ -60,6 +75,12 @@ def test_it_compiles_with_the_real_skills(compile_file, missions, name):
 def test_it_runs_to_success_with_scripted_skills(run_mission, name):
     result = run_mission(name)
     assert result.outcome is Outcome.SUCCESS, result.message
+
+
+def test_a_look_comes_to_its_end_before_what_it_decides_is_done(run_mission, script):
+    run_mission("beer_else_coke")
+    assert script.begun.count("grasp") == 1
+    assert script.ended == script.begun
 
 
 def test_a_raw_pose_is_driven_to(run_mission, script):

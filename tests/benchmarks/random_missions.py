@@ -533,6 +533,7 @@ def _wrong(
 
 def _not_done(log: tuple[tuple[str, str], ...], operator: Operator, tree: CompiledTree, message: str) -> list[str]:
     """What is always to be done in the end, and was not begun although its steps were."""
+    last_of = {topic_path(text): text for topic, text in log if topic == "transitions"}
     began = {topic_path(text) for topic, text in log if topic == "transitions" and "'to': 'INVALID'" not in text}
     if operator.insisted or "in the end, broken off" in message:
         return []
@@ -541,7 +542,13 @@ def _not_done(log: tuple[tuple[str, str], ...], operator: Operator, tree: Compil
         for node in tree.root.walk()
         if node.kind == "always"
     ]
-    return [f"not done in the end: {path}" for path, first, last in lasts if first in began and last not in began]
+    # one that came to its end and was reset in the same tick leaves no sentence
+    reset = {path for path, text in last_of.items() if "'message': ''" in text}
+    return [
+        f"not done in the end: {path}"
+        for path, first, last in lasts
+        if first in began and last not in began and path not in reset
+    ]
 
 
 def topic_path(text: str) -> str:

@@ -62,6 +62,8 @@ from executive.store.missions import MissionStore
 from executive.store.resuming import resumed_tree
 from executive.tree.compiler import CompiledTree, compile_mission
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectObservation, Part, Running, Skill, Succeeded, Thing
+from skills.check_door.skill import CheckDoorInputs
+from skills.speak.skill import SpeakInputs
 from tests.executive.conftest import KNOWLEDGE, PORTS, EmptyCostmap, ManualClock, Script, ScriptedRobot, StillLocaliser
 from tests.executive.conftest import default_end as usual_end
 
@@ -282,8 +284,8 @@ class Robotics:
         """The skills by name."""
         ports: dict[str, tuple[type, Mapping[str, type]]] = {
             **PORTS,
-            "speak": (dataclasses.make_dataclass("SpeakInputs", [("text", str)], frozen=True), {}),
-            "check_door": (DoorInputs, {"open": bool}),
+            "speak": (SpeakInputs, {}),
+            "check_door": (CheckDoorInputs, {"open": bool}),
         }
         return {name: self._skill(name, *both) for name, both in ports.items()}
 
@@ -337,14 +339,6 @@ class Robotics:
             self.robot.holding = False
         found: Any = usual_end(self.script, name)(skill)
         return found  # type: ignore[no-any-return]
-
-
-@dataclass(frozen=True)
-class DoorInputs:
-    """Where a door is."""
-
-    middle_W: tuple[float, float]
-    width_m: float
 
 
 class Operator:

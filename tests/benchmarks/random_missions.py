@@ -564,7 +564,7 @@ def benchmark(trees: int, seed: int, limit_s: float, tell: Callable[[str], None]
         try:
             one = resumed(number, Path(folder.name)) if kill else ran(number)
         except InputError as error:
-            outcomes["not compiled: " + error.message.split("'")[0]] += 1
+            outcomes["not compiled: " + error.message.rsplit(": ", 1)[-1].split("'")[0]] += 1
             continue
         except Exception as defect:
             bad += 1
@@ -582,7 +582,7 @@ def benchmark(trees: int, seed: int, limit_s: float, tell: Callable[[str], None]
             bad += 1
             tell(f"seed {number}: its log differs the second time")
     tell(f"{done} missions in {time.perf_counter() - begun:.0f} s: {nodes} nodes, {ticks} ticks, {bad} with a defect")
-    tell(", ".join(f"{name} {count}" for name, count in outcomes.most_common()))
+    tell(", ".join(f"{name} {count}" for name, count in outcomes.most_common(9)))
     return bad
 
 

@@ -52,7 +52,8 @@ def works(done):
                 self.count, self.checkpoint = 0, {"before": done.count(skill_name)}
 
             def resume(self, inputs):
-                self.count = 3 if done.count(skill_name) > self.checkpoint.get("before", 10**9) else 0
+                before = self.checkpoint.get("before", done.count(skill_name))
+                self.count, self.checkpoint = 3 if done.count(skill_name) > before else 0, {"before": before}
 
             def step(self):
                 self.count += 1

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 OURS = ("executive", "skills", "plant")
 WORDS = (
-    *("command", "condition", "errors", "expression", "file.blocks", "file.model", "geometry", "knowledge"),
+    *("command", "condition", "errors", "expression", "file.blocks", "file.model", "geometry", "knowledge", "written"),
     "yaml_source",
 )
 HOMES = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from py_trees.common import Status
@@ -11,6 +11,7 @@ from executive.mission.errors import listing
 from executive.mission.goal import Area, GoalCondition
 from executive.run.outcome import Outcome, RobotResult
 from executive.tree.compiler import CompiledTree, StepPart
+from executive.tree.node import NodeSpec
 from plant import referee
 from skills.speak.skill import Speak
 
@@ -59,13 +60,24 @@ def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.Goal
 
 def _done(tree: CompiledTree, result: RobotResult) -> list[StepPart]:
     """The parts that were done. Of a mission that succeeded, what failed or was not begun was not called for: it was
-    skipped, stands in a branch that was not taken, or something else was done in its place. What was only said leaves
-    nothing in the world to judge."""
+    skipped, stands in a branch that was not taken, or something else was done in its place; so was what stands below
+    a node that failed. What was only said leaves nothing in the world to judge."""
     parts = [part for part in tree.parts if part.skill is not Speak]
     if result.outcome is not Outcome.SUCCESS:
         return parts
     statuses = {path: state.status for path, state in result.states.items()}
-    return [part for part in parts if statuses.get(part.node or part.path_id) is Status.SUCCESS]
+    done = frozenset(_done_below(tree.mission, statuses))
+    return [part for part in parts if (part.node or part.path_id) in done]
+
+
+def _done_below(node: NodeSpec, statuses: Mapping[str, Status]) -> Iterator[str]:
+    """The path ids of nodes that succeeded, without those below one that failed."""
+    status = statuses.get(node.path_id)
+    if status is Status.SUCCESS:
+        yield node.path_id
+    if status is not Status.FAILURE:
+        for child in node.children:
+            yield from _done_below(child, statuses)
 
 
 def _joined(*sentences: str) -> str:

@@ -15,6 +15,7 @@ from executive.language import Status, Understanding, explain, load_parser, pars
 from executive.language.explain_views import arcs_svg, explanation_lines
 from executive.mission.errors import InputError
 from executive.mission.file.model import DEFAULT_WORLD
+from executive.mission.written import written
 
 __all__ = ["parse"]
 
@@ -70,6 +71,8 @@ def _show(meaning: Understanding, as_json: bool, explained: bool) -> None:
     """The commands on standard output, with the steps before them, or the reason on standard error."""
     if explained and meaning.trace is not None:
         _echo(explanation_lines(explain(meaning.trace)), as_json)
+    elif meaning.steps:
+        _echo(written(meaning.steps), as_json)
     elif meaning.commands:
         _echo(map(str, meaning.commands), as_json)
     if meaning.status is not Status.OK:

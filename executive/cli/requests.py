@@ -12,7 +12,6 @@ from executive.cli.plugins import usable_skills
 from executive.cli.worlds import knowledge_of, open_world, refuse_blocked, with_map
 from executive.language import Understanding, load_parser
 from executive.language.questions import Answerer
-from executive.mission.command import parse_command
 from executive.mission.errors import InputError, Problems
 from executive.mission.file.model import DEFAULT_WORLD, Mission
 from executive.mission.file.objects import import_folders
@@ -21,7 +20,7 @@ from executive.mission.file.people import routes_in
 from executive.mission.file.resolve import load_mission, mission_from_file
 from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import Knowledge, Pose
-from executive.mission.mission import mission_from_commands, mission_from_meaning, understood
+from executive.mission.mission import lines_of, mission_from_lines, mission_from_meaning, understood
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
 from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
@@ -144,12 +143,12 @@ def _own_world(loaded: MissionFile) -> World:
 
 
 def _commanded(request: Request, world: World) -> Mission:
-    """The mission of commands in their text form."""
+    """The mission of commands in their text form, or of steps in their written form."""
     try:
-        read = [parse_command(command) for command in request.commands]
+        mission = mission_from_lines(request.commands, world=world.name, robot_name=request.robot)
     except ValueError as error:
         raise InputError(f"the mission '{request.name}' cannot be read: {error}", hint="give it again") from error
-    return replace(mission_from_commands(read, world=world.name, robot_name=request.robot), name=request.name)
+    return replace(mission, name=request.name)
 
 
 def _prepared(
@@ -171,7 +170,7 @@ def replacing(request: Request, tree: CompiledTree) -> Request:
 
 
 def _of_tree(request: Request, tree: CompiledTree) -> Request:
-    commands = tuple(map(str, tree.commands))
+    commands = lines_of(tree.steps)
     return replace(request, name=tree.mission_name, commands=commands, fingerprint=fingerprint(tree))
 
 

@@ -12,8 +12,8 @@ from executive.cli.requests import Prepared
 from executive.conversation import Conversation, Speech
 from executive.language import Understanding, load_parser, understand
 from executive.language.reference import Memory
-from executive.mission.command import Command
-from executive.mission.mission import mission_from_commands
+from executive.mission.file.model import MissionStep
+from executive.mission.mission import mission_from_steps
 from executive.run.control import Control
 from executive.tree.compiler import CompiledTree, compile_mission
 
@@ -31,7 +31,7 @@ def conversation_of(prepared: Prepared, control: Control) -> Conversation:
         knowledge=prepared.knowledge,
         robot_name=prepared.mission.robot_name,
         understand=lambda text, memory: _understood(text, memory, prepared),
-        compile=lambda commands, taken: _compiled(commands, taken, prepared),
+        compile=lambda steps, taken: _compiled(steps, taken, prepared),
     )
     robot = prepared.knowledge.robot
     return Conversation(speech, control, require_wake=robot.require_wake, others=robot.others)
@@ -48,9 +48,9 @@ def _understood(text: str, memory: Memory | None, prepared: Prepared) -> Underst
     )
 
 
-def _compiled(commands: Sequence[Command], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
-    """The tree of a mission of these commands, under a name that is not taken. Raises InputError, as `check` does."""
-    mission = mission_from_commands(commands, world=prepared.world.name, robot_name=prepared.mission.robot_name)
+def _compiled(steps: Sequence[MissionStep], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
+    """The tree of a mission of these steps, under a name that is not taken. Raises InputError, as `check` does."""
+    mission = mission_from_steps(steps, world=prepared.world.name, robot_name=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)
     tree = compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=usable_skills())

@@ -11,6 +11,7 @@ from executive.language.questions import ClarifyingQuestion
 from executive.language.reference import Memory
 from executive.language.understand import Understanding
 from executive.mission.command import Command
+from executive.mission.file.model import MissionStep
 from executive.mission.knowledge import Knowledge
 from executive.tree.compiler import CompiledTree
 
@@ -25,13 +26,13 @@ class Speech:
     """How sentences become missions of one robot.
 
     `understand` takes a sentence without wake phrase and what was spoken of before; `compile` makes a mission of
-    commands under a name that is none of those given, and raises InputError.
+    steps under a name that is none of those given, and raises InputError.
     """
 
     knowledge: Knowledge
     robot_name: str
     understand: Callable[[str, Memory | None], Understanding]
-    compile: Callable[[Sequence[Command], frozenset[str]], CompiledTree]
+    compile: Callable[[Sequence[MissionStep], frozenset[str]], CompiledTree]
 
 
 class ReplyKind(enum.Enum):

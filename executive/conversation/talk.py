@@ -31,6 +31,8 @@ from executive.language.understand import Status, Understanding
 from executive.language.wake import heard_wake, strip_wake
 from executive.mission.command import Command, Task, Thing
 from executive.mission.errors import InputError
+from executive.mission.file.model import MissionStep
+from executive.mission.written import written
 from executive.run.control import Control, Mode
 from executive.run.runner import Progress
 from executive.tree.compiler import CompiledTree
@@ -43,12 +45,16 @@ REMEMBERED_S: Final = 60.0
 
 @dataclass(frozen=True)
 class _Spoken:
-    """A request: its commands, what it spoke of, when (s), and the mission that it became."""
+    """A request: its commands, what it spoke of, when (s), and the mission that it became.
+
+    `steps` is the whole of it, where that decides, repeats, waits or the like.
+    """
 
     commands: tuple[Command, ...]
     memory: Memory | None
     at_s: float
     mission: str
+    steps: tuple[MissionStep, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -96,7 +102,8 @@ class Conversation:
         """The run begins with a mission: it can be corrected, and spoken of, as any other."""
         with self._lock:
             self._names |= {tree.mission_name}
-            self._last = _Spoken(tree.commands, memory, now_s, tree.mission_name)
+            steps = tree.steps if any(step.block is not None for step in tree.steps) else ()
+            self._last = _Spoken(tree.commands, memory, now_s, tree.mission_name, steps)
 
     def observe(self, progress: Progress) -> None:
         """See how far the run is; an observer for the runner."""
@@ -221,7 +228,7 @@ class Conversation:
             and self._same_thing(meant.commands)
         ):
             when = _When.INSTEAD
-        return self._begin(meant.commands, when, now_s, notes=meant.notes, memory=meant.memory)
+        return self._begin(meant.commands, when, now_s, notes=meant.notes, memory=meant.memory, steps=meant.steps)
 
     def _not_ok(self, meant: Understanding, text: str, now_s: float) -> Reply:
         if meant.question is not None:
@@ -231,16 +238,18 @@ class Conversation:
     def _follow_up(self, text: str, now_s: float) -> Reply | None:
         """A sentence that goes on from the one before, while that is remembered."""
         last, follow_up = self._remembered(now_s), follow_up_of(text)
-        if follow_up is None or last is None:
+        if follow_up is None or last is None or self._understood(text, now_s).steps:
             return None
         when = _When.AFTERWARDS
         if follow_up.kind is FollowUpKind.AGAIN:
-            return self._begin(last.commands, when, now_s, memory=last.memory)
+            return self._begin(last.commands, when, now_s, memory=last.memory, steps=last.steps)
         if follow_up.kind is FollowUpKind.CORRECTION:
             when = _When.INSTEAD if self._can_be_changed(now_s) else _When.FIRST
         whole = self._understood(follow_up.whole, now_s)
         if whole.status is Status.OK:
-            return self._begin(whole.commands, when, now_s, notes=whole.notes, memory=whole.memory)
+            return self._begin(whole.commands, when, now_s, notes=whole.notes, memory=whole.memory, steps=whole.steps)
+        if last.steps:
+            return refused("I cannot change a part of what decides, repeats or waits; say it anew")
         named = self._named(follow_up, now_s)
         if isinstance(named, Understanding):
             return self._not_ok(named, text, now_s)
@@ -286,25 +295,26 @@ class Conversation:
         *,
         notes: Sequence[str] = (),
         memory: Memory | None = None,
+        steps: tuple[MissionStep, ...] = (),
     ) -> Reply:
-        """Have commands done, and remember them."""
+        """Have commands done, or steps that hold them, and remember them."""
         state = self._control.state
         if state.mode is Mode.ENDED:
             return refused(OVER)
         todo = tuple(commands)
-        if when is _When.INSTEAD:
+        if when is _When.INSTEAD and not steps:
             todo = without_fetching(todo, self._held(), self._speech.knowledge)
         try:
-            tree = self._speech.compile(todo, self._names)
+            tree = self._speech.compile(steps or (MissionStep(todo),), self._names)
         except InputError as error:
             return refused(str(error))
         give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, self._replace)
         still = "; I stand still until you say 'go on'" if state.mode in (Mode.PAUSED, Mode.STOPPED) else ""
-        text = "; ".join((*notes, f"{when.value}: {'; '.join(map(str, todo))}{still}"))
+        text = "; ".join((*notes, f"{when.value}: {'; '.join(written(steps) or map(str, todo))}{still}"))
         reply = self._tried(partial(give, tree), text, todo)
         if reply.kind is ReplyKind.DONE:
             self._names |= {tree.mission_name}
-            self._last = _Spoken(tuple(commands), memory, now_s, tree.mission_name)
+            self._last = _Spoken(tuple(commands), memory, now_s, tree.mission_name, steps)
         return reply
 
     def _replace(self, tree: CompiledTree) -> None:

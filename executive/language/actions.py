@@ -163,15 +163,14 @@ def _own_affair(verb: Verb | Being | Outside | None) -> bool:
 
 def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
     """Leave out "see" and "check" before "if there is": the question stands alone."""
-    before: Clause | None = None
+    asks = False
     for clause, after in zip_longest(clauses, clauses[1:]):
-        checks = _checks(clause)
-        tries = checks and after is not None and isinstance(after.verb, Verb) and _only_whether(clause)
-        if clause.whether and not _checks(before):
+        bare = _checks(clause) and _only_whether(clause)
+        if clause.whether and not asks:
             clause = replace(clause, verb=Outside(_IF))
-        if not (checks and after is not None and after.whether) and not tries:
+        asks = bare and after is not None and after.whether
+        if not asks and not (bare and after is not None and isinstance(after.verb, Verb)):
             yield clause
-        before = clause
 
 
 def _checks(clause: Clause | None) -> bool:

@@ -13,6 +13,7 @@ from executive.language.items import spoken_words
 from executive.language.parser import Token
 from executive.language.roles import Location
 from executive.language.steps import Trace
+from executive.mission.written import written
 
 __all__ = ["ActionRow", "Explanation", "ThingRow", "TokenRow", "explain", "tree_lines"]
 
@@ -69,6 +70,7 @@ class Explanation:
     stands_for: tuple[tuple[str, str], ...]
     frames: tuple[str, ...]
     commands: tuple[str, ...]
+    mission: tuple[str, ...]
     notes: tuple[str, ...]
     refused_at: str | None
     reason: str | None
@@ -85,11 +87,12 @@ def explain(trace: Trace) -> Explanation:
         plain=trace.opened,
         subject=_subject(trace),
         tokens=tuple(map(_token_row, trace.tokens)),
-        parts=tuple(map(_part, trace.clauses)),
+        parts=trace.parts or tuple(map(_part, trace.clauses)),
         actions=tuple(map(_action_row, trace.actions)),
         stands_for=trace.meanings,
         frames=tuple(str(spoken_command(frame)) for frame in trace.frames),
         commands=tuple(map(str, trace.commands)),
+        mission=written(trace.steps),
         notes=trace.notes,
         refused_at=trace.refused_at,
         reason=None if trace.refusal is None else trace.refusal.reason,

@@ -22,6 +22,7 @@ def explanation_lines(explained: Explanation) -> Iterator[str]:
     yield from _section("command frames", explained.frames)
     yield from _section("notes", explained.notes)
     yield from _section("commands", explained.commands)
+    yield from _section("mission", explained.mission)
     if explained.refused_at is not None:
         yield from _section(f"refused at {explained.refused_at!r}", [explained.reason or ""])
 

@@ -13,6 +13,7 @@ MAX_CHARACTERS: Final = 800
 _APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
 _ALLOWED: Final = re.compile(r"[^\w\s,.;:!?'\-]|_")
 _AND: Final = re.compile(r"(?<=\s)[&+](?=\s)")
+_PERCENT: Final = re.compile(r"(?<=\d)\s?%")
 _SIGNS: Final = r"$€£%#@&+=|\\/^~_{}<>\[\]"
 _PLACEHOLDER: Final = re.compile(
     rf"\$?(?:(?<!\{{)\{{++[^{{}}]*+\}}+|<[^<>]*+>|\[[^\[\]]*+\])|(?<!\S)[^\s{_SIGNS}]*+[{_SIGNS}]\S*"
@@ -24,7 +25,7 @@ def clean(text: str) -> str:
 
     Quotes become plain, and short forms stand in one piece ("i 'm" becomes "i'm").
     """
-    plain = unicodedata.normalize("NFKC", _AND.sub("and", text))
+    plain = unicodedata.normalize("NFKC", _PERCENT.sub(" percent", _AND.sub("and", text)))
     plain = plain.replace("\u2019", "'").replace("\u2018", "'").replace("...", ",")
     printable = "".join(" " if unicodedata.category(c).startswith(("C", "S", "Z")) else c for c in plain)
     spaced = " ".join(_ALLOWED.sub(" ", printable).split())
@@ -34,5 +35,5 @@ def clean(text: str) -> str:
 def placeholder(text: str) -> str | None:
     """The first piece that stands for a word which is not filled in ("${room}", "[object]", "ROOM_NAME"), or another
     piece with a sign that is no part of a sentence; None when there is none."""
-    found = _PLACEHOLDER.search(_AND.sub("and", text))
+    found = _PLACEHOLDER.search(_PERCENT.sub(" percent", _AND.sub("and", text)))
     return None if found is None else found[0]

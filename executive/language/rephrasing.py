@@ -9,9 +9,10 @@ from typing import Final
 
 from executive.language.lexicon import lexicon, read_table
 
-__all__ = ["rephrased"]
+__all__ = ["rephrased", "smoothed"]
 
 _Rule = tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]
+_SMOOTHED: Final = "smoothed"
 _TABLES: Final = tuple("short_forms asides hesitations praises refusals searches requests openers".split())  # noqa: SIM905
 
 
@@ -26,8 +27,16 @@ def rephrased(text: str) -> str:
     return " ".join(text.split()).strip(" ,;:-.")
 
 
+def smoothed(text: str) -> str:
+    """The sentence in full forms, without hesitations, asides and words said twice; else as it was spoken."""
+    for pattern, instead in _rules(_SMOOTHED):
+        text = pattern.sub(instead, text)
+    text = re.sub(r"\b([ap])\.\s?m\.?(?![\w'])", r"\1m", text, flags=re.IGNORECASE)
+    return " ".join(text.split()).strip(" ,;:-.")
+
+
 @cache
-def _rules() -> tuple[_Rule, ...]:
+def _rules(family: str | None = None) -> tuple[_Rule, ...]:
     tables = {f"<{name}>": getattr(lexicon(), name) for name in _TABLES}
     tables["<verbs>"] = [first for first, *rest in lexicon().verbs if not rest]
     phrases = {mark: "|".join(map(re.escape, table)) for mark, table in tables.items()}
@@ -37,7 +46,8 @@ def _rules() -> tuple[_Rule, ...]:
             re.compile(filled.sub(lambda mark: phrases[mark[0]], pattern), re.IGNORECASE),
             _FUNCTIONS.get(instead, instead),
         )
-        for rules in read_table("rephrasing.yaml").values()
+        for name, rules in read_table("rephrasing.yaml").items()
+        if family in (None, name)
         for pattern, instead in rules
     )
 

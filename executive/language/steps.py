@@ -28,6 +28,7 @@ from executive.language.rephrasing import rephrased
 from executive.language.similar import WordFacts
 from executive.mission.command import Command, is_attribute
 from executive.mission.errors import listing
+from executive.mission.file.model import MissionStep
 from executive.mission.knowledge import Knowledge
 
 __all__ = ["Trace", "trace_sentence"]
@@ -39,7 +40,8 @@ class Trace:
 
     `unwanted` is what stands behind "not", `meanings` are pronouns with what each stood for, `notes` say which name was
     taken for which. `refused_at` names the step that refused. `memory` is what was spoken of before, and afterwards
-    what was spoken of last.
+    what was spoken of last. `steps` is the mission of a sentence that decides, repeats, waits or the like, and `parts`
+    are its clauses.
     """
 
     text: str
@@ -57,6 +59,8 @@ class Trace:
     refusal: RefusalError | None = None
     refused_at: str | None = None
     memory: Memory = field(default_factory=Memory)
+    parts: tuple[str, ...] = ()
+    steps: tuple[MissionStep, ...] = ()
 
 
 @dataclass(frozen=True)

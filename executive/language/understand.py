@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from executive.language.foreign import foreign_reason
@@ -14,10 +14,12 @@ from executive.language.questions import Answerer, ClarifyingQuestion, RefusalEr
 from executive.language.reference import Memory
 from executive.language.similar import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
+from executive.language.structure import Structured, structured
 from executive.language.wake import strip_wake
 from executive.mission.command import Command
 from executive.mission.file.model import MissionStep
 from executive.mission.knowledge import Knowledge
+from executive.mission.written import written
 
 __all__ = ["Status", "Understanding", "parse_lines", "understand", "understand_asking"]
 
@@ -61,6 +63,7 @@ class Understanding:
             "question": None if self.question is None else self.question.to_json(),
             "notes": list(self.notes),
             "commands": [command.to_json() for command in self.commands],
+            "written": list(written(self.steps)),
         }
 
 
@@ -102,12 +105,34 @@ def understand(
     if correct and knowledge is not None and facts is not None:
         corrected = correct_spelling(wake.text, knowledge, facts)
     trace = trace_sentence(corrected.text, parser=parser, knowledge=knowledge, memory=memory)
+    if knowledge is not None:
+        trace = _with_structure(trace, corrected.text, parser, knowledge, memory)
     refusal, notes = trace.refusal, (*corrected.notes, *trace.notes)
     if refusal is None:
-        return Understanding(sentence, Status.OK, trace.commands, notes=notes, memory=trace.memory, trace=trace)
+        found = Understanding(sentence, Status.OK, trace.commands, notes=notes, memory=trace.memory, trace=trace)
+        return replace(found, steps=trace.steps)
     status = Status.QUESTION if refusal.question else Status.REFUSED
     reason = foreign_reason(wake.text) or refusal.reason
     return Understanding(sentence, status, (), reason, refusal.unknown, refusal.question, notes, trace=trace)
+
+
+def _with_structure(
+    plain: Trace, text: str, parser: DependencyParser, knowledge: Knowledge, memory: Memory | None
+) -> Trace:
+    """What a sentence that is no list of plain commands means, if it decides, repeats, waits, says or asks."""
+    try:
+        read = plain.refusal is None
+        found = structured(text, parser=parser, knowledge=knowledge, memory=memory, plain=read)
+    except RefusalError as refusal:
+        return replace(plain, refusal=refusal, refused_at="structure")
+    return plain if found is None else _traced(plain, found)
+
+
+def _traced(plain: Trace, found: Structured) -> Trace:
+    """The trace of the whole sentence, with what its parts became."""
+    commands = tuple(command for step in found.steps for each in step.walk() for command in each.commands)
+    trace = Trace(plain.text, plain.opened, plain.tokens, commands=commands, notes=found.notes, memory=found.memory)
+    return replace(trace, parts=found.parts, steps=found.steps)
 
 
 def parse_lines(

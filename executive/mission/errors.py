@@ -23,6 +23,7 @@ __all__ = [
 
 NEAREST: Final = 3
 FEW: Final = 5
+MOST_LETTERS: Final = 1000
 _USED_BY: Final = "used by"
 _MOST_USERS: Final = 3
 
@@ -39,7 +40,7 @@ class InputError(Exception):
     """Something that the user wrote cannot be used.
 
     `message` says what is wrong, `hint` what to do about it; `file` and `line` (from 1) name the place where known.
-    `others` are more errors that were found at once.
+    A message that repeats something endless is cut off. `others` are more errors that were found at once.
     """
 
     def __init__(
@@ -51,7 +52,7 @@ class InputError(Exception):
         line: int | None = None,
         others: Iterable[InputError] = (),
     ) -> None:
-        self.message = message
+        self.message = message if len(message) <= MOST_LETTERS else f"{message[:MOST_LETTERS]}..."
         self.others = tuple(others)
         self.hint = hint
         self.file = None if file is None else Path(file)

@@ -8,12 +8,20 @@ from dataclasses import replace
 from executive.language import DependencyParser, Status, Understanding
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
 from executive.language.understand import understand_asking
-from executive.mission.command import Command
+from executive.mission.command import Command, parse_command
 from executive.mission.errors import InputError
 from executive.mission.file.model import Mission, MissionStep
 from executive.mission.knowledge import Knowledge
+from executive.mission.written import parse_written, written
 
-__all__ = ["mission_from_commands", "mission_from_meaning", "understood"]
+__all__ = [
+    "lines_of",
+    "mission_from_commands",
+    "mission_from_lines",
+    "mission_from_meaning",
+    "mission_from_steps",
+    "understood",
+]
 
 
 def understood(
@@ -40,16 +48,46 @@ def understood(
 
 def mission_from_meaning(meant: Understanding, *, world: str, robot_name: str) -> Mission:
     """The mission of a sentence that was understood."""
-    mission = mission_from_commands(meant.commands, world=world, robot_name=robot_name)
-    return replace(mission, notes=meant.notes)
+    steps = meant.steps or (MissionStep(meant.commands),)
+    return replace(mission_from_steps(steps, world=world, robot_name=robot_name), notes=meant.notes)
 
 
 def mission_from_commands(commands: Sequence[Command], *, world: str, robot_name: str) -> Mission:
     """A mission of these commands, named for the first of them."""
-    return Mission(_name(commands), world, robot_name, (MissionStep(tuple(commands)),))
+    return mission_from_steps((MissionStep(tuple(commands)),), world=world, robot_name=robot_name)
 
 
-def _name(commands: Sequence[Command]) -> str:
+def mission_from_steps(steps: Sequence[MissionStep], *, world: str, robot_name: str) -> Mission:
+    """A mission of these steps, named for the first command, or else for the first block."""
+    mission = Mission("", world, robot_name, tuple(steps))
+    return replace(mission, name=_name(mission))
+
+
+def mission_from_lines(lines: Sequence[str], *, world: str, robot_name: str) -> Mission:
+    """The mission of commands in their text form, or of steps in their written form. Raises ValueError."""
+    try:
+        steps: tuple[MissionStep, ...] = (MissionStep(tuple(map(parse_command, lines))),)
+    except ValueError:
+        steps = parse_written(lines)
+    return mission_from_steps(steps, world=world, robot_name=robot_name)
+
+
+def lines_of(steps: Sequence[MissionStep]) -> tuple[str, ...]:
+    """What `mission_from_lines` reads: the commands where there are only such, else the written form.
+
+    Of a mission file, whose steps can be more than that, only the commands.
+    """
+    walked = [step for one in steps for step in one.walk()]
+    if all(step.block is None for step in walked) or any(step.source is not None for step in walked):
+        return tuple(str(command) for step in walked for command in step.commands)
+    return written(steps)
+
+
+def _name(mission: Mission) -> str:
     """A few words for the whole: the verb and the thing or place of the first command."""
+    commands = mission.commands
+    block = mission.steps[0].block if mission.steps else None
+    if not commands and block is not None:
+        return type(block).__name__.lower()
     first = commands[0] if commands else Command()
     return " ".join(filter(None, (first.verb or "do", str(first.object or first.item or first.goal or ""))))

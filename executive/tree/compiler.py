@@ -8,7 +8,7 @@ from py_trees.behaviour import Behaviour
 
 from executive.mission.command import Command
 from executive.mission.errors import InputError
-from executive.mission.file.model import Mission
+from executive.mission.file.model import Mission, MissionStep
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decisions import buttons_of
@@ -24,7 +24,8 @@ __all__ = ["CompiledTree", "StepPart", "compile_mission", "step_name"]
 
 @dataclass(frozen=True)
 class CompiledTree:
-    """A mission's tree for one robot, as data; `parts` are its steps with their goal conditions, in order.
+    """A mission's tree for one robot, as data; `parts` are its steps with their goal conditions, in order, and
+    `steps` what it was compiled from.
 
     Its root watches over the mission itself: see `executive.tree.compiling.interrupts`.
     """
@@ -34,6 +35,7 @@ class CompiledTree:
     commands: tuple[Command, ...]
     root: NodeSpec
     parts: tuple[StepPart, ...] = ()
+    steps: tuple[MissionStep, ...] = ()
 
     @property
     def mission(self) -> NodeSpec:
@@ -72,4 +74,4 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
     start = start_key(mission.robot_name, mission.name)
     root = watched(PlanBuilder(knowledge, registry, body.path_id, start, Command(), mission.source), body)
     check_wiring(root)
-    return CompiledTree(mission.robot_name, mission.name, mission.commands, root, parts)
+    return CompiledTree(mission.robot_name, mission.name, mission.commands, root, parts, mission.steps)

@@ -15,6 +15,7 @@ from executive.mission.mission import mission_from_meaning, understood
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from plant.worlds.world import load_world
+from tests.benchmarks.structured_sentences import TABLES, measured
 
 SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
 FAMILIES = Path(__file__).parents[1] / "executive" / "language" / "sentences"
@@ -22,6 +23,7 @@ MEDIAN_S = 0.010
 P99_S = 0.040
 LOADING_S = 2.0
 ODD_S = 1.0
+LEAST_RIGHT = 0.97
 
 
 @pytest.fixture(scope="module")
@@ -79,3 +81,10 @@ def test_the_parser_loads_in_a_fresh_process():
 @pytest.mark.parametrize("sentence", ["fetch " * 10_000, "a" * 100_000, "no, " * 2500, "the " * 59 + "cup", "'" * 9999])
 def test_odd_input_takes_no_longer_than_a_second(parser, sentence):
     assert seconds_for(sentence, parser) < ODD_S
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table.stem)
+def test_structured_sentences_are_right_or_refused(table):
+    score = measured(table)
+    assert score.wrongly_accepted == ()
+    assert score.right / score.sentences >= LEAST_RIGHT

@@ -100,7 +100,7 @@ def with_parameters(source: YamlSource, given: Given) -> YamlSource:
         values[name] = value
     filled = {
         name: {**each, "default": values[name]} if isinstance(each, dict) else values[name]
-        for name, each in (source.data.get(DECLARED) or {}).items()
+        for name, each in (source.data[DECLARED] if declared else {}).items()
         if name in values
     }
     data = {

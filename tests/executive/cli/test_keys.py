@@ -4,11 +4,14 @@ import os
 import pty
 import termios
 import time
+from dataclasses import replace
 
 import pytest
 
 from executive.cli.keys import HELP, SAY_HELP, Keys, Typing, keys_available, keys_pressed, prompt_lines
 from executive.run.control import Control, Mode
+from executive.tree.behaviours.decisions import AnyHolds, DoesNotHold, Pressed
+from executive.tree.node import NodeSpec
 from skills.api import Question
 from skills.testing.clock import VirtualClock
 
@@ -159,3 +162,36 @@ def test_keys_act_again_after_a_sentence(control):
 def test_a_sentence_being_typed_and_its_answer_stand_below_the_tree(control):
     assert prompt_lines(control.state, 0.0, Typing("go o", True, can_say=True))[0] == ": go o_"
     assert prompt_lines(control.state, 0.0, Typing(reply="I go on", can_say=True)) == ["I go on", SAY_HELP]
+
+
+@pytest.fixture
+def waiting(compiled, make):
+    """A control of a mission that waits for two buttons."""
+    hands, tree = Control(), compiled(*make.FETCH)
+    either = AnyHolds((Pressed("go"), DoesNotHold(Pressed("hold on"))))
+    decide = NodeSpec("decide", "alice/fetch-drink/decide", "either?", {"decision": either})
+    hands.begin({"Alice": replace(tree, root=replace(tree.root, children=(*tree.root.children, decide)))})
+    return hands
+
+
+def test_a_digit_presses_the_button_of_that_number(waiting):
+    # key   1  2  2  3
+    # go    1  1  1  1
+    # hold  0  1  2  2
+    assert pressed(waiting, "1223").buttons == ("go", "hold on")
+    assert waiting.presses == {"go": 1, "hold on": 2}
+
+
+def test_a_digit_answers_a_question_rather_than_pressing_a_button(waiting):
+    waiting.ask(QUESTION, VirtualClock())
+    pressed(waiting, "1")
+    assert (waiting.presses, waiting.state.questions) == ({}, ())
+
+
+def test_the_buttons_stand_below_the_tree(waiting):
+    assert "buttons: [1] go  [2] hold on" in prompt_lines(waiting.state, 0.0)
+
+
+def test_a_button_that_no_mission_has_cannot_be_pressed(waiting):
+    with pytest.raises(ValueError, match="the run has no button 'stop'; there are: go, hold on"):
+        waiting.press("stop")

@@ -40,6 +40,27 @@ def test_without_explain_there_are_no_steps():
     assert "steps" not in json.loads(invoke(SENTENCE, "--json").stdout.splitlines()[-1])
 
 
+DECIDES = "if there is a beer in the kitchen, tell Robin"
+MISSION = (
+    "If (Take [Nothing] to [kitchen] and do [find] to [beer])"
+    ' {Take [Nothing] to [Robin] and do [Nothing] to [Nothing]; Say "there is a beer in the kitchen"}'
+)
+
+
+def test_what_decides_is_shown_in_its_written_form():
+    result = CliRunner().invoke(entry.app, ["parse", DECIDES, "--json"])
+    values = json.loads(result.stdout.splitlines()[-1])
+    assert values["written"] == [MISSION]
+    assert [command["goal"] for command in values["commands"]] == ["Robin"]
+    assert CliRunner().invoke(entry.app, ["parse", DECIDES]).stdout.splitlines() == [MISSION]
+
+
+def test_explain_shows_the_clauses_and_the_mission():
+    result = CliRunner().invoke(entry.app, ["parse", DECIDES, "--explain"])
+    assert "parts:\n  if | there is a beer in the kitchen\n  tell Robin\n" in result.stdout
+    assert result.stdout.rstrip().endswith(MISSION)
+
+
 def test_the_arcs_are_drawn(tmp_path: Path):
     result = invoke(SENTENCE, "--svg", str(tmp_path / "arcs.svg"))
     assert result.exit_code == 0

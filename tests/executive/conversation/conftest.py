@@ -4,7 +4,8 @@ import pytest
 
 from executive.conversation import Conversation, Speech
 from executive.language import load_parser, understand
-from executive.mission.mission import mission_from_commands
+from executive.mission.file.model import MissionStep
+from executive.mission.mission import mission_from_steps
 from executive.run.control import Control
 from executive.tree.compiler import compile_mission
 
@@ -19,8 +20,8 @@ def speech(parser, knowledge, registry):
     def heard(text, memory):
         return understand(text, parser=parser, knowledge=knowledge, require_wake=False, memory=memory)
 
-    def compiled(commands, taken):
-        mission = mission_from_commands(commands, world="test", robot_name="Alice")
+    def compiled(steps, taken):
+        mission = mission_from_steps(steps, world="test", robot_name="Alice")
         number = 1 + sum(name.startswith(mission.name) for name in taken)
         named = mission if number == 1 else replace(mission, name=f"{mission.name} {number}")
         return compile_mission(named, knowledge=knowledge, registry=registry)
@@ -40,7 +41,7 @@ def talk(speech, control):
     def begin(sentence="fetch me a coke from the kitchen", **options):
         conversation = Conversation(speech, control, **options)
         meant = speech.understand(sentence, None)
-        tree = speech.compile(meant.commands, frozenset())
+        tree = speech.compile(meant.steps or (MissionStep(meant.commands),), frozenset())
         control.begin({"Alice": tree})
         conversation.begun(tree, memory=meant.memory)
         return conversation

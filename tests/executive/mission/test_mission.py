@@ -3,11 +3,20 @@ from pathlib import Path
 import pytest
 
 from executive.language import load_parser
-from executive.mission.command import parse_command
+from executive.mission.command import Command, parse_command
 from executive.mission.errors import InputError
+from executive.mission.file.blocks import Repeat
+from executive.mission.file.model import MissionStep, SourceLine
 from executive.mission.file.resolve import load_mission, mission_from_file
 from executive.mission.knowledge import load_knowledge
-from executive.mission.mission import mission_from_commands, mission_from_meaning, understood
+from executive.mission.mission import (
+    lines_of,
+    mission_from_commands,
+    mission_from_lines,
+    mission_from_meaning,
+    understood,
+)
+from executive.mission.written import written
 
 WORLD = Path(__file__).parents[1] / "language" / "world.yaml"
 MISSION = """\
@@ -174,6 +183,36 @@ def test_a_sentence_that_is_not_understood_says_why(parser, knowledge, sentence,
 def test_commands_become_a_mission_named_for_the_first():
     command = parse_command("Take [Nothing] to [hall] and do [Nothing] to [Nothing]")
     assert mission_from_commands([command], world="flat", robot_name="Alice").name == "do hall"
+
+
+STRUCTURED = "if there is a beer in the kitchen bring it, otherwise wait until half past two"
+
+
+def test_a_sentence_that_decides_becomes_a_mission_of_its_steps(parser, knowledge):
+    meant = understood(STRUCTURED, parser=parser, knowledge=knowledge)
+    mission = mission_from_meaning(meant, world="flat", robot_name="Alice")
+    assert mission.steps == meant.steps
+    assert mission.name == "bring beer"
+
+
+def test_a_mission_without_commands_is_named_for_its_first_block(parser, knowledge):
+    meant = understood("wait until half past two", parser=parser, knowledge=knowledge)
+    assert mission_from_meaning(meant, world="flat", robot_name="Alice").name == "wait"
+
+
+@pytest.mark.parametrize("sentence", [STRUCTURED, "fetch me a drink"])
+def test_what_a_sentence_asks_for_comes_back_from_its_lines(parser, knowledge, sentence):
+    meant = understood(sentence, parser=parser, knowledge=knowledge)
+    mission = mission_from_meaning(meant, world="flat", robot_name="Alice")
+    again = mission_from_lines(lines_of(mission.steps), world="flat", robot_name="Alice")
+    assert (again.world, again.robot_name) == ("flat", "Alice")
+    assert written(again.steps) == written(mission.steps)
+    assert lines_of(again.steps) == lines_of(mission.steps)
+
+
+def test_of_a_file_only_the_commands_are_lines():
+    step = MissionStep((Command(goal="hall"),), SourceLine(Path("mission.yaml"), 3))
+    assert lines_of((MissionStep(block=Repeat((step,), times=2), source=step.source),)) == (str(step.commands[0]),)
 
 
 MISSIONS = sorted((Path(__file__).parents[3] / "missions").glob("*.yaml"))

@@ -230,3 +230,130 @@ MUTATIONS: dict[str, Callable[[str, np.random.Generator], bytes | None]] = {
         doubled_key, not_utf8, binary, control_character, empty, huge, cut_off, two_documents,
     )
 }  # fmt: skip
+
+
+# Mutations at random, of which some leave a good file.
+
+PARTS = (
+    "steps", "if", "then", "else", "repeat", "for_each", "as", "times", "until", "while", "every", "try", "together",
+    "done_when", "wait", "for", "seconds", "until_clock", "check", "dock", "level", "group", "always", "when", "holds",
+    "ask", "choices", "match", "limit", "default", "gives", "answer", "set", "variables", "all", "any", "not", "button",
+    "object", "person", "door", "at", "look", "to", "take", "do", "skill", "use", "with", "on_failure", "timeout",
+)  # fmt: skip
+VALUES = (
+    None, True, False, 0, 1, -1, 3.5, 10**9, 10**400, 1e300, float("inf"), float("nan"), "", " ", "kitchen", "mars",
+    "start", "count + 1", "count >", "1 / 0", "battery < 0.3", "holding", "'a' * 9", "{count}", "{", "${room}", "${",
+    "$${room}", "beer", "tea", "dock", "rooms", "people in hall", "14:30", "2 s", "9" * 400, "x" * 3000, "\u0000",
+    "\ud7ff", "🙂", "a\nb", "__import__('os')", "every_block.yaml", "../x.yaml", [], {}, [[]], [None], {"a": 1},
+    ["dock"], [{}], [{"to": "hall"}], {"times": 2}, {"expression": "true"}, {"all": ["holding"]}, {"answer": "count"},
+    {1: 2}, {True: []},
+)  # fmt: skip
+
+
+def mutated_files(good: list[Path], count: int, seed: int) -> Iterator[tuple[str, bytes]]:
+    """`count` files with one to three random changes each, as a name and the bytes."""
+    rng = np.random.default_rng(seed)
+    texts = [file.read_text(encoding="utf-8") for file in good]
+    for number in range(count):
+        chosen_file = int(rng.integers(len(texts)))
+        raw = texts[chosen_file].encode()
+        ways = [RANDOM_CHANGES[int(rng.integers(len(RANDOM_CHANGES)))] for _ in range(chosen(rng, [1, 1, 1, 2, 3]))]
+        for way in ways:
+            raw = way(raw, rng)
+        yield f"{good[chosen_file].stem}-{number}-{'-'.join(way.__name__ for way in ways)}", raw
+
+
+def some_bytes(raw, rng):
+    """Some bytes changed, added or left out."""
+    data = bytearray(raw)
+    for _ in range(int(rng.integers(1, 6))):
+        at, kind = int(rng.integers(len(data) + 1)), int(rng.integers(3))
+        letter = int(rng.integers(256)) if rng.random() < 0.2 else ord(chosen(rng, list(" :-{}[]'\"#,&*!|>%@0a\n\t")))
+        data[at : at + (kind != 1)] = b"" if kind == 0 else bytes([letter])
+    return bytes(data) or b" "
+
+
+def some_lines(raw, rng):
+    """A line left out, doubled, moved, indented anew, or cut off."""
+    lines = raw.split(b"\n")
+    at, other, kind = int(rng.integers(len(lines))), int(rng.integers(len(lines))), int(rng.integers(5))
+    line = lines[at]
+    if kind == 0:
+        del lines[at]
+    elif kind == 1:
+        lines.insert(other, line)
+    elif kind == 2:
+        lines[at], lines[other] = lines[other], lines[at]
+    elif kind == 3:
+        lines[at] = b" " * int(rng.integers(9)) + line.lstrip()
+    else:
+        lines[at] = line[: int(rng.integers(len(line) + 1))]
+    return b"\n".join(lines) or b" "
+
+
+def some_key(raw, rng):
+    """A key that is another's, left out, or added."""
+
+    def change(node, key, rng):
+        kind, part = int(rng.integers(3)), chosen(rng, list(PARTS))
+        if kind == 0 or not isinstance(node, dict):
+            node[key] = {part: node[key]}
+        elif kind == 1:
+            node[part] = node.pop(key)
+        else:
+            node[part] = chosen(rng, list(VALUES))
+
+    return _tree_changed(raw, rng, change)
+
+
+def some_value(raw, rng):
+    """A value that is another's."""
+
+    def change(node, key, rng):
+        node[key] = chosen(rng, list(VALUES))
+
+    return _tree_changed(raw, rng, change)
+
+
+def some_branch(raw, rng):
+    """A part of the file in the place of another."""
+    data = _plain(raw)
+    places = list(positions(data)) if isinstance(data, dict) else []
+    if not places:
+        return some_bytes(raw, rng)
+    source, target = chosen(rng, places), chosen(rng, places)
+    value = copy.deepcopy(parent(data, source)[source[-1]])
+    parent(data, target)[target[-1]] = value
+    return _dumped(data)
+
+
+def _tree_changed(raw, rng, change):
+    data = _plain(raw)
+    places = list(positions(data)) if isinstance(data, dict) else []
+    if not places:
+        return some_bytes(raw, rng)
+    path = chosen(rng, places)
+    change(parent(data, path), path[-1], rng)
+    return _dumped(data)
+
+
+def _plain(raw):
+    try:
+        return yaml.safe_load(raw)
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return None
+
+
+def _dumped(data):
+    text = yaml.dump(data, sort_keys=False, allow_unicode=True, Dumper=_Dumper)
+    return text.encode("utf-8", "surrogatepass")
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes a thing twice instead of an alias."""
+
+    def ignore_aliases(self, data):
+        return True
+
+
+RANDOM_CHANGES = (some_bytes, some_lines, some_key, some_value, some_value, some_branch)

@@ -1,17 +1,22 @@
-"""500 broken mission files, made by seeded mutation of good ones: each gives a located message, never a traceback."""
+"""Broken mission files, made by seeded mutation of good ones: each gives a located message, never a traceback."""
 
 import importlib.util
+import shutil
+import time
 from pathlib import Path
 
 import pytest
 
 from executive.cli.check_command import Checker
+from executive.mission.errors import InputError
 
 _spec = importlib.util.spec_from_file_location("mission_mutations", Path(__file__).with_name("mutations.py"))
 mutations = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(mutations)
 
 COUNT, SEED = 500, 7
+RANDOM = 150
+EVERY_BLOCK = Path(__file__).with_name("every_block.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -42,4 +47,28 @@ def test_every_broken_file_is_refused_with_a_place_and_a_hint(checker, mission_f
             lines = error.file.read_bytes().count(b"\n") + 1 if error.file is not None else 0
             if error.line is not None and not 1 <= error.line <= lines:
                 wrong.append((name, f"line {error.line} of {lines}"))
+    assert not wrong, f"{len(wrong)}: {wrong[:10]}"
+
+
+def test_every_construct_is_in_the_example_and_it_compiles(compile_file):
+    text = EVERY_BLOCK.read_text(encoding="utf-8")
+    assert compile_file(EVERY_BLOCK).path_ids
+    assert not [part for part in mutations.PARTS if part not in text and part not in ("use", "door", "look")]
+
+
+def test_files_with_random_changes_are_refused_in_their_lines_or_compile(compile_file, mission_folder, missions):
+    shutil.copy(EVERY_BLOCK, mission_folder)
+    path, wrong = mission_folder / "mission.yaml", []
+    for name, raw in mutations.mutated_files([*missions, EVERY_BLOCK, EVERY_BLOCK], RANDOM, SEED):
+        path.write_bytes(raw)
+        begun = time.process_time()
+        try:
+            compile_file(path)
+        except InputError as error:
+            for each in (error, *error.others):
+                lines = 0 if each.file is None else each.file.read_bytes().count(b"\n") + 1
+                if each.line is None or not 1 <= each.line <= lines or len(str(each)) > 2000:
+                    wrong.append((name, str(each)[:300]))
+        if time.process_time() - begun > 1.0:
+            wrong.append((name, "it takes too long"))
     assert not wrong, f"{len(wrong)}: {wrong[:10]}"

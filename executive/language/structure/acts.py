@@ -1,0 +1,371 @@
+"""One clause that is more than a plain command: waiting, saying, asking, looking, for everyone, in every room."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from executive.language.questions import RefusalError
+from executive.language.structure.conditions import suppose
+from executive.language.structure.cutting import (
+    Behind,
+    Clause,
+    Kind,
+    behind,
+    cut,
+    pattern,
+    spoken,
+)
+from executive.language.structure.each import (
+    EVERY_ROOM,
+    GOES_EVERYWHERE,
+    everywhere,
+    for_everyone,
+    look_for,
+    serves_all,
+)
+from executive.language.structure.leaves import Leaves, State
+from executive.language.structure.rounds import Repeats
+from executive.language.structure.row import (
+    SPEAKS,
+    LookedAt,
+    Row,
+    Steps,
+    checked,
+    end_of,
+    sentence_of,
+)
+from executive.language.structure.telling import Asked, Listener, asked_of, bare, said_by, template
+from executive.language.structure.waiting import charged, waited
+from executive.mission.command import Task
+from executive.mission.condition import Look
+from executive.mission.expression import Template
+from executive.mission.file.blocks import Ask, Check, Speak, Wait
+from executive.mission.file.model import MissionStep
+
+
+class Acts(Repeats):
+    """Reads one clause. Its methods raise RefusalError."""
+
+    def one_clause(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
+        """Take the clause at `at`, which begins with what is to be done; the index of the one behind."""
+        clause = clauses[at]
+        if clause.begins and not _tells_only(row.plain):
+            self.settle(row)
+        if self.verb is not None and at == 0 and _NO_VERB.match(clause.text):
+            clause = replace(clause, text=f"{self.verb} {clause.text}")
+            clauses = [clause, *clauses[1:]]
+        if (match := _LOOKS_AT.fullmatch(clause.text)) is not None and row.state.memory.things:
+            clause = replace(clause, text=f"look for it {match[1]}")
+            clauses = [*clauses[:at], clause, *clauses[at + 1 :]]
+        text = clause.text
+        self.verb = match[0] if (match := _GIVING.match(text)) is not None else self.verb
+        if _is_reported(text) and self._reported(row):
+            return at + 1
+        if _IDLE.fullmatch(text) is not None:
+            self.flush(row)
+            return at + 1
+        for act in (self._waits, self._asks, self._says, self._checks):
+            if (end := act(row, clauses, at)) is not None:
+                return end
+        found = behind(text)
+        if found is not None and not EVERY_ROOM.search(text):
+            self.modified(row, clause, found)
+            return at + 1
+        for act in (self._everyone, self._rooms):
+            if (end := act(row, clauses, at)) is not None:
+                return end
+        row.plain.append(clause)
+        return at + 1
+
+    def _reported(self, row: Row) -> bool:
+        """Whether what was looked at before is answered anyway."""
+        self.flush(row)
+        last = row.steps[-1] if row.steps else None
+        looked = last is not None and (
+            isinstance(last.block, Check) or (bool(last.commands) and last.commands[-1].task is Task.FIND)
+        )
+        self.special = self.special or looked
+        return looked
+
+    def _waits(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        text = clauses[at].text
+        if not re.match(r"(?:wait|stay|remain|pause|hold|stand|linger|go|charge|recharge|dock)\b", text, re.IGNORECASE):
+            return None
+        if row.plain and not re.search(r"\b(?:until|till|for|while|as long as|to)\b", text, re.IGNORECASE):
+            return None
+        state = self.known(row)
+        done = charged(text, state) or waited(text, state, self.leaves)
+        if done is None:
+            return None
+        self.flush(row)
+        steps, row.state, notes = done
+        row.steps += steps
+        row.asked = None
+        self.notes += notes
+        return at + 1
+
+    def known(self, row: Row) -> State:
+        """What is known behind the clauses that are still to be understood."""
+        if not row.plain:
+            return row.state
+        return self.leaves.leaf(spoken([replace(row.plain[0], joint=""), *row.plain[1:]]), row.state).state
+
+    def _says(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        clause = clauses[at]
+        if (match := _TELLS_WHEN.fullmatch(clause.text)) is not None:
+            return self._tells_when(row, match, at)
+        if not SPEAKS.match(clause.text) or _asks_back(clause.text, self.leaves):
+            return None
+        if (everywhere_said := _SAYS_EVERYWHERE.fullmatch(clause.text)) is not None:
+            there = [Clause("", "visit every room"), Clause("", everywhere_said[1])]
+            self._in_each(row, there, 0)
+            return at + 1
+        found = behind(clause.text)
+        if found is not None and not _spoken_of(found, clause.text):
+            self.modified(row, clause, found)
+            return at + 1
+        said = said_by(clause.text, self.leaves.knowledge, self.leaves.parser)
+        if said is None:
+            return None
+        text = said.text if said.text is not None else self.told
+        if text is None:
+            raise RefusalError(f"what am I to say in '{clause.text}'?", [clause.text])
+        self.flush(row)
+        self._to(row, said.to)
+        self.put(row, Speak(Template(template(text))), row.state)
+        return at + 1
+
+    def _tells_when(self, row: Row, match: re.Match[str], at: int) -> int:
+        """ "Tell me when Robin comes" waits for that, and then tells it."""
+        self.flush(row)
+        supposed = suppose(match["what"], row.state, self.leaves)
+        told = sentence_of(supposed)
+        if told is None:
+            raise RefusalError(f"what am I to say in '{match[0]}'?", [match[0]])
+        self.put(row, Wait(supposed.condition), supposed.holds)
+        who = re.sub(r"^let|^warn", "tell", match["tell"].removesuffix(" know"))
+        steps, row.state = self.sequence([Clause("", f"{who} that {told}")], row.state)
+        row.steps += steps
+        return at + 1
+
+    def _to(self, row: Row, listener: Listener | None) -> None:
+        """Go to whom something is said."""
+        if listener is None or listener.goal is None:
+            return
+        leaf = self.leaves.leaf(listener.goal, row.state)
+        if leaf.commands[-1].goal != row.state.goal or leaf.commands[-1].goal_at is not None:
+            self.add(row, leaf)
+
+    def _asks(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        asked = asked_of(_of_whom(clauses[at].text, row.state), self.leaves.knowledge)
+        if asked is None:
+            return None
+        self.flush(row)
+        self._to(row, asked.of)
+        choices: dict[str, Steps]
+        if asked.yes_or_no:
+            choices, end = self._agreed(asked, row.state, clauses, at + 1)
+        else:
+            choices, end = self._chosen(asked, row.state, clauses, at + 1)
+        self.put(row, Ask(Template(template(asked.text)), choices), replace(row.state, goal=None, at=None))
+        return end
+
+    def _agreed(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
+        """What is done where the answer is yes, and where it is no."""
+        found: dict[str, Steps] = {"yes": (), "no": ()}
+        while at < len(clauses):
+            clause = clauses[at]
+            match = _ANSWERS.match(clause.text) if clause.kind is Kind.IF else None
+            answer = "yes" if clause.kind is Kind.SO else "no" if clause.kind in (Kind.NOT, Kind.OTHERWISE) else None
+            rest = clause.text
+            if match is not None:
+                answer = "no" if match["no"] else "yes"
+                rest = clause.text[match.end() :].strip(" ,")
+            if answer is None or found[answer]:
+                break
+            end = end_of(clauses, at + 1, branch=True)
+            body = [*cut(rest), *clauses[at + 1 : end]]
+            if not body:
+                raise RefusalError(f"what am I to do {clause.cue} {clause.text}?", [clause.cue])
+            wanted = [replace(each, text=_instead(each.text, asked.choices[0], asked)) for each in body]
+            found[answer], _ = self.sequence([replace(wanted[0], joint=""), *wanted[1:]], state)
+            at = end
+        if at < len(clauses) and not found["yes"] and _brings(clauses[at]):
+            raise RefusalError("say 'if yes' before what is to be done then", [clauses[at].text])
+        return found, at
+
+    def _chosen(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
+        """What is done for each of the choices: it is brought, where that was said."""
+        names = [bare(choice) for choice in asked.choices]
+        if at >= len(clauses) or clauses[at].kind is not None or not _brings(clauses[at]):
+            return dict.fromkeys(names, ()), at
+        texts = [_instead(clauses[at].text, choice, asked) for choice in asked.choices]
+        found = [self.sequence([Clause("", text)], state)[0] for text in texts]
+        return dict(zip(names, found, strict=True)), at + 1
+
+    def _checks(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        """ "Look whether the door is open", "is the battery low": what only blocks can check."""
+        text = checked(clauses[at].text)
+        if text is None:
+            return None
+        state = self.known(row)
+        found = behind(text)
+        try:
+            self.leaves.leaf(f"check if {text}", state)
+        except RefusalError as refusal:
+            plain = refusal
+        else:
+            return None
+        if found is not None:
+            return None
+        try:
+            supposed = suppose(text, state, self.leaves)
+        except RefusalError as refusal:
+            raise (refusal if refusal.question is not None or "door" in text else plain) from None
+        self.flush(row)
+        self.notes += supposed.notes
+        look = supposed.condition.command if isinstance(supposed.condition, Look) else None
+        row.steps.append(MissionStep(block=Check(supposed.condition)) if look is None else MissionStep((look,)))
+        row.state, row.asked = supposed.holds, LookedAt(supposed, looked=True)
+        return at + 1
+
+    def _everyone(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        if not serves_all(clauses[at].text):
+            return None
+        done = for_everyone(clauses[at].text, self.known(row), self.leaves)
+        if done is None:
+            return None
+        self.flush(row)
+        row.steps += done[0]
+        row.state, row.asked, self.special = done[1], None, True
+        return at + 1
+
+    def _rooms(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        text = clauses[at].text
+        if not EVERY_ROOM.search(text):
+            return None
+        leaf, end = everywhere(text, self.known(row), self.leaves), at + 1
+        follow = clauses[at + 1].text if at + 1 < len(clauses) and clauses[at + 1].kind is None else ""
+        if leaf is None and GOES_EVERYWHERE.fullmatch(text) is not None:
+            if (match := _WHAT_THERE.fullmatch(follow)) is not None:
+                what = next(filter(None, match.groups()))
+                leaf, end = look_for(what, self.known(row), self.leaves), at + 2
+            elif SPEAKS.match(follow):
+                return self._in_each(row, clauses, at)
+        if leaf is None:
+            return None
+        self.flush(row)
+        self.add(row, leaf)
+        self.special = True
+        return end
+
+    def _in_each(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
+        """Say something in every room."""
+        self.flush(row)
+        for room in self.leaves.knowledge.places:
+            visit = [Clause("", f"go to the {room}"), replace(clauses[at + 1], joint="")]
+            steps, row.state = self.sequence(visit, replace(row.state, goal=None))
+            row.steps += steps
+        row.asked = None
+        return at + 2
+
+
+_IDLE: Final = re.compile(
+    r"(?:do nothing|leave (?:it|them) (?:there|alone|where (?:it|they) (?:is|are)))", re.IGNORECASE
+)
+
+
+_GIVING: Final = re.compile(
+    r"(?:bring|get|fetch|give|hand|take|grab)(?: (?:me|us|him|her|them))?(?![\w'])", re.IGNORECASE
+)
+
+
+_LOOKS_AT: Final = re.compile(r"(?:look|search)(?: for (?:it|one))? ((?:in|on|at) [\w ]+)", re.IGNORECASE)
+
+
+_NO_VERB: Final = re.compile(r"(?:a|an|some|the|two|three) [\w ]+$", re.IGNORECASE)
+
+
+_TELLS_WHEN: Final = re.compile(
+    r"(?P<tell>(?:tell|let|warn|inform) (?:me|us|him|her|[A-Z]\w*)(?P<know> know)?) (?:when|once"
+    r"|as soon as) (?P<what>.+)"
+)
+
+
+_SAYS_EVERYWHERE: Final = re.compile(rf"((?:say|announce) .+?) in (?:{EVERY_ROOM.pattern})", re.IGNORECASE)
+
+
+_WHAT_THERE: Final = re.compile(
+    r"(?:tell me|see|look|check|find out|let me know|report) where (.+?) (?:is|are)(?: now)?|(?:tell me|see"
+    r"|look|check) where is (.+)"
+    r"|(?:tell me|see|check|find out|look|let me know) (?:if|whether) (?:there (?:is|are) )?(.+?)(?: (?:is"
+    r"|are) (?:there|in it|in there))?"
+    r"|(?:look|search) for (.+?)(?: there| in it)?|find (.+?)(?: there| in it)?",
+    re.IGNORECASE,
+)
+
+
+_ANSWERS: Final = re.compile(
+    r"(?:(?:he|she|they|[A-Z]\w+) (?:(?P<no>(?:does not|doesn't|do not|don't)(?: want(?: it| one)?)?|says? no"
+    r"|answers? no|refuses)"
+    r"|says? (?:yes|so)|answers? yes|does|do|wants?(?: it| one)?|agrees?|accepts?)|yes|(?P<not>no)\b)",
+    re.IGNORECASE,
+)
+
+
+def _tells_only(plain: Sequence[Clause]) -> bool:
+    """Whether it is a statement before a request: "there is a hammer on the bench. bring it"."""
+    return bool(plain) and all(re.match(r"(?:there|the|my|i|it|he|she)\b", one.text, re.IGNORECASE) for one in plain)
+
+
+def _is_reported(text: str) -> bool:
+    more = (
+        r"|tell me how many(?: (?:there are|of them|you (?:see|find)))*"
+        r"|tell me where (?:it|he|she|they) (?:is|are)|tell me (?:if|whether) (?:it|he|she) is"
+    )
+    return re.fullmatch(pattern("reported").pattern + more, text, re.IGNORECASE) is not None
+
+
+def _asks_back(text: str, leaves: Leaves) -> bool:
+    """Whether it asks the robot for something: "tell me where the hammer is", "let me know whether ..."."""
+    return (
+        re.match(
+            r"(?:tell|let) (?:me|us) (?:know )?(?:where|if|whether|what|how|who|which|when)\b", text, re.IGNORECASE
+        )
+        is not None
+    )
+
+
+def _spoken_of(found: Behind, text: str) -> bool:
+    """Whether what would stand behind a clause is a part of what is said."""
+    return found.kind in (Kind.TIMES, Kind.EVERY) and bool(found.text) and not re.match(r"for|until|every", found.text)
+
+
+def _of_whom(text: str, state: State) -> str:
+    """The clause with the name of who is asked, where that is "him"."""
+    person = state.memory.person
+    return text if person is None else re.sub(r"^(ask) (?:him|her)\b", rf"\1 {person.name}", text, flags=re.IGNORECASE)
+
+
+def _brings(clause: Clause) -> bool:
+    return re.match(r"(?:bring|get|fetch|give|take|hand|serve)\b", clause.text, re.IGNORECASE) is not None
+
+
+def _instead(text: str, choice: str, asked: Asked) -> str:
+    """What is to be brought, said by its name, and to whom."""
+    if not re.match(r"(?:bring|get|fetch|give|take|hand|serve)\b", text, re.IGNORECASE):
+        return text
+    name = asked.of.name or ""
+    words = re.sub(
+        r"\b(?:what(?:ever)? (?:he|she|they) (?:wants?|says?|chooses?|likes?)|it|that|one)\b",
+        choice,
+        text,
+        count=1,
+        flags=re.IGNORECASE,
+    )
+    words = re.sub(r"\b(?:him|her|them)\b", name, words, flags=re.IGNORECASE)
+    to_whom = re.search(rf"\b(?:me|us|to|for|{re.escape(name)})\b", words, re.IGNORECASE)
+    return words if to_whom else f"{words} to {name}"

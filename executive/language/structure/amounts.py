@@ -1,0 +1,144 @@
+"""Numbers, spans of time, times of day and shares as they are spoken."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+from executive.language.lexicon import lexicon
+
+__all__ = ["SHARE", "SPAN", "TIMES", "TimeOfDay", "count_of", "seconds_of", "share_of", "time_of", "times_of"]
+
+
+@cache
+def _number_pattern() -> str:
+    words = "|".join(sorted((w for w in lexicon().numbers if w not in ("couple", "dozen")), key=len, reverse=True))
+    return rf"(?:\d+(?:\.\d+)?|(?:{words})(?:[ -](?:{words}))?)"
+
+
+_NUMBER: Final = _number_pattern()
+_UNIT: Final = r"(?:seconds?|secs?|minutes?|mins?|hours?)"
+SPAN: Final = (
+    rf"(?:{_NUMBER} and a half {_UNIT}|half an? {_UNIT}|half hour|(?:a )?quarter(?: of an)? hour"
+    rf"|three quarters of an hour|(?:a couple of|{_NUMBER}|an?) {_UNIT}(?: and a half)?|other minute|hour|minute)"
+)
+"""A span of time, as behind "for" and "every"."""
+TIMES: Final = rf"(?:twice|(?:{_NUMBER}|a couple of) times)(?: in a row)?"
+_DAYTIME: Final = r"(?: ?(?P<half>a\.?m\.?|p\.?m\.?|in the morning|in the afternoon|in the evening|at night|this \w+))?"
+_CLOCK: Final = re.compile(rf"(?P<hour>\d{{1,2}})[:.](?P<minute>\d\d){_DAYTIME}")
+_RELATIVE: Final = re.compile(
+    rf"(?P<part>half|(?:a )?quarter|{_NUMBER})(?: minutes)? (?P<side>past|to|after|before) (?P<hour>{_NUMBER})"
+    rf"(?: o'? ?clock)?{_DAYTIME}"
+)
+_FULL: Final = re.compile(
+    rf"(?P<hour>\d{{1,2}}|[a-z]+)(?: (?P<minute>fifteen|thirty|forty five))?(?: o'? ?clock)?{_DAYTIME}"
+)
+_NAMED: Final = {"noon": 12, "midday": 12, "midnight": 0}
+SHARE: Final = rf"(?:(?:{_NUMBER}|fifty) ?percent|half(?: full| charge| of its charge)?)"
+_UNITS_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
+
+
+@dataclass(frozen=True)
+class TimeOfDay:
+    """A time of day (s after midnight); `taken` says that it could be one of two half days."""
+
+    seconds: float
+    taken: bool = False
+
+    @property
+    def text(self) -> str:
+        """As "14:30"."""
+        return f"{int(self.seconds // 3600):02d}:{int(self.seconds % 3600 // 60):02d}"
+
+
+def count_of(text: str) -> float | None:
+    """The number that digits or words make."""
+    words = text.lower().replace("-", " ").split()
+    if len(words) == 1 and re.fullmatch(r"\d+(?:\.\d+)?", words[0]):
+        return float(words[0])
+    numbers = [lexicon().numbers.get(word) for word in words]
+    if not numbers or any(number is None for number in numbers) or len(numbers) > 2:
+        return None
+    first, *rest = (number for number in numbers if number is not None)
+    if rest and not (first in range(20, 100, 10) and 0 < rest[0] < 10):
+        return None
+    return float(first + sum(rest))
+
+
+def times_of(text: str) -> int | None:
+    """How often "three times" or "twice" is; None for what is no whole number from 1 to 100."""
+    words = re.sub(r" in a row$", "", text.lower())
+    if words == "twice" or words == "a couple of times":
+        return 2
+    number = count_of(re.sub(r" times$", "", words))
+    return int(number) if number is not None and number == int(number) and 1 <= number <= 100 else None
+
+
+def seconds_of(text: str) -> float | None:
+    """How long a span is (s)."""
+    words = text.lower().strip()
+    fixed = {"half hour": 1800.0, "hour": 3600.0, "minute": 60.0, "other minute": 120.0}
+    if words in fixed:
+        return fixed[words]
+    if re.fullmatch(r"(?:a )?quarter(?: of an)? hour", words):
+        return 900.0
+    if words == "three quarters of an hour":
+        return 2700.0
+    match = re.fullmatch(r"(half an?|a couple of|.+?) ?(and a half )?([smh])[a-z]*( and a half)?", words)
+    if match is None:
+        return None
+    count = {"a": 1.0, "an": 1.0, "half a": 0.5, "half an": 0.5, "a couple of": 2.0}.get(match[1], count_of(match[1]))
+    half = 0.5 if match[2] or match[4] else 0.0
+    return None if count is None or count + half <= 0 else (count + half) * _UNITS_S[match[3]]
+
+
+def share_of(text: str) -> float | None:
+    """The share from 0 to 1 of "thirty percent" or "half"."""
+    words = text.lower().strip()
+    if words.startswith("half"):
+        return 0.5
+    number = count_of(re.sub(r" ?percent$", "", words))
+    return number / 100 if number is not None and 0 < number <= 100 else None
+
+
+def time_of(text: str) -> TimeOfDay | None:
+    """The time of day that is spoken of; one to six without more are in the afternoon."""
+    words = " ".join(text.lower().replace("o' clock", "o'clock").split())
+    if words in _NAMED:
+        return TimeOfDay(3600.0 * _NAMED[words])
+    for pattern in (_CLOCK, _RELATIVE, _FULL):
+        match = pattern.fullmatch(words)
+        if match is not None and (found := _time(match, words)) is not None:
+            return found
+    return None
+
+
+def _time(match: re.Match[str], words: str) -> TimeOfDay | None:
+    groups = match.groupdict()
+    hour, minute = count_of(groups["hour"]), count_of(groups.get("minute") or "0")
+    if groups.get("part"):
+        part = groups["part"]
+        minute = 30.0 if part == "half" else 15.0 if part.endswith("quarter") else count_of(part)
+        if minute is not None and groups["side"] in ("to", "before"):
+            minute = -minute
+            if part == "half":
+                return None
+    if hour is None or minute is None or not (0 <= hour <= 24 and abs(minute) < 60 and hour == int(hour)):
+        return None
+    half = (groups["half"] or "").replace(".", "")
+    if half and not 1 <= hour <= 12:
+        return None
+    sure = hour > 12 or hour == 0 or words.startswith("0") or bool(half)
+    if half in ("pm", "in the afternoon", "in the evening", "this afternoon", "this evening"):
+        hour = hour % 12 + 12
+    elif half in ("am", "in the morning", "this morning"):
+        hour = hour % 12
+    elif half == "at night":
+        hour = hour % 12 + 12 if hour >= 6 and hour != 12 else hour % 12
+    elif half:
+        return None
+    elif not sure and hour <= 6:
+        hour += 12
+    return TimeOfDay((3600.0 * hour + 60.0 * minute) % 86400.0, taken=not sure and hour != 12)

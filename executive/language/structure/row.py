@@ -1,0 +1,218 @@
+"""Steps as they are put together from clauses, and what is asked of clauses, conditions and commands on the way."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from executive.language.lexicon import VerbKind
+from executive.language.questions import RefusalError
+from executive.language.roles import HERE
+from executive.language.structure.conditions import negated
+from executive.language.structure.cutting import (
+    Behind,
+    Clause,
+    Kind,
+    pattern,
+)
+from executive.language.structure.leaves import Leaf, Leaves, State, Supposed
+from executive.language.structure.telling import template
+from executive.mission.command import Command, Task
+from executive.mission.condition import AllOf, Condition, Look, Not
+from executive.mission.expression import Template
+from executive.mission.file.blocks import Repeat, Speak
+from executive.mission.file.model import MissionStep
+from executive.mission.written import written_condition
+
+Steps = tuple[MissionStep, ...]
+
+
+@dataclass
+class Row:
+    """Steps as they are put together: those that are done, and clauses that are still to be understood as one.
+
+    `asked` is what was looked at or fetched last; `begun` is where in the steps the present sentence begins.
+    """
+
+    state: State
+    steps: list[MissionStep] = field(default_factory=list)
+    plain: list[Clause] = field(default_factory=list)
+    asked: LookedAt | None = None
+    begun: int = 0
+
+
+@dataclass(frozen=True)
+class LookedAt:
+    """A condition that the last step looked at (`looked`), or that must hold for it; `before` is the rest of it.
+
+    `decided` says that the last step is done only if it holds.
+    """
+
+    supposed: Supposed
+    looked: bool
+    decided: bool = False
+    before: Steps = ()
+
+
+@dataclass(frozen=True)
+class Rounds:
+    """A block without its steps, and what is known where a round begins."""
+
+    block: Repeat
+    state: State
+
+
+SPEAKS: Final = re.compile(r"(?:say|tell|announce|greet|inform|remind|let|ask)\b", re.IGNORECASE)
+
+
+_PRONOUN: Final = re.compile(r"(?:it|he|she|they|that|there is one|so)\b", re.IGNORECASE)
+
+
+def end_of(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: bool = False) -> int:
+    """Where the clauses end that belong to a condition or to rounds which begin before `at`.
+
+    `branch` says that it is a second branch, behind which "then" goes on with what is done in either case.
+    """
+    attached = (Kind.SO, Kind.NOT, Kind.OTHERWISE, Kind.FAILED)
+    first = any(re.search(r"\bfirst\b", one.joint, re.IGNORECASE) for one in clauses[at : at + 1])
+    for n in range(at, len(clauses)):
+        one = clauses[n]
+        if rounds:
+            goes_on = one.kind in attached or (one.kind is Kind.IF and _PRONOUN.match(one.text) is not None)
+            if (one.begins and n > at and not goes_on) or (n > at and (_after_all(one, first) or one.anyway)):
+                return n
+            continue
+        if one.kind in attached or one.kind in (Kind.IF, Kind.UNLESS, Kind.SOON):
+            return n
+        if n > at and (one.begins or _after_all(one, first) or one.anyway or (branch and one.then)):
+            return n
+        if n == at and one.begins:
+            return n
+    return len(clauses)
+
+
+def _after_all(clause: Clause, first: bool) -> bool:
+    """Whether a clause is done after the whole; in "first ..., finally ..." it is one of the row."""
+    return clause.outer and not first
+
+
+def same(one: Condition, other: Condition) -> bool:
+    """Whether they look at the same, whatever the verb was."""
+    return written_condition(one) in (written_condition(other), written_condition(negated(other)))
+
+
+def turned(supposed: Supposed) -> Supposed:
+    """The contrary, with what is known then."""
+    return Supposed(negated(supposed.condition), f"not {supposed.said}", supposed.fails, supposed.holds, supposed.notes)
+
+
+def sentence_of(supposed: Supposed) -> str | None:
+    """What was found, as it is told; None where it was said otherwise."""
+    said = supposed.said
+    plain = (
+        not said.startswith("not ") and not pattern("deictic").search(said) and not re.match(r"it\b|there is one", said)
+    )
+    return said if said and plain else None
+
+
+def merged(one: State, other: State) -> State:
+    """What is known behind two branches."""
+    held = one.held if one.held == other.held else None
+    goal = one.goal if one.goal == other.goal else None
+    at = one.at if one.at == other.at else None
+    return replace(one, held=held, goal=goal, at=at)
+
+
+def one_errand(leaf: Leaf) -> bool:
+    """Whether the commands are all about one thing, or only go somewhere and back."""
+    things = {str(thing) for command in leaf.commands for thing in (command.item, command.object) if thing is not None}
+    going = [action for action in leaf.trace.resolved if action.kind is VerbKind.GO]
+    bare_goes = [command for command in leaf.commands if command.item is None and command.task is None]
+    if not bare_goes:
+        return len(things) == 1
+    back = going[-1].goal == HERE if going else False
+    return not things and len(bare_goes) <= 2 and back
+
+
+def asked_by(leaf: Leaf, before: State, leaves: Leaves) -> LookedAt | None:
+    """What the last command looked at, or takes."""
+    last = leaf.commands[-1] if leaf.commands else None
+    taken = next((c for c in reversed(leaf.commands) if c.task is Task.GRASP), None)
+    memory = leaf.state.memory
+    if last is not None and last.task is Task.FIND:
+        looks = [c for c in leaf.commands if c.task is Task.FIND]
+        others = leaf.commands[: -len(looks)]
+        conditions = tuple(map(Look, looks))
+        known = leaves.seen(leaf, leaf.state)
+        fails = replace(known, memory=replace(known.memory, where=None, told=before.memory.told))
+        condition: Condition = conditions[0] if len(conditions) == 1 else AllOf(conditions)
+        steps = (MissionStep(others),) if others else ()
+        return LookedAt(Supposed(condition, "", known, fails), looked=True, before=steps)
+    if taken is None:
+        return None
+    look = Look(
+        Command(goal=taken.goal, task=Task.FIND, object=taken.object, object_count=taken.object_count, verb="find")
+    )
+    fails = replace(
+        leaf.state, memory=replace(memory, where=None, told=before.memory.told), held=None, goal=None, at=None
+    )
+    return LookedAt(Supposed(look, "", leaf.state, fails), looked=False)
+
+
+def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
+    """The condition at the place from where the thing is taken, when it says none of its own ("if there is one")."""
+    taken = next((c for step in steps for c in step.commands if c.task is Task.GRASP), None)
+    condition = supposed.condition
+    look = condition.part if isinstance(condition, Not) else condition
+    placed = re.search(r"\b(?:in|on|at|inside|near)\b", text, re.IGNORECASE)
+    if taken is None or placed or not isinstance(look, Look) or look.command.object != taken.object:
+        return supposed
+    there = Look(replace(look.command, goal=taken.goal))
+    return replace(supposed, condition=Not(there) if isinstance(condition, Not) else there)
+
+
+_CHECKED: Final = re.compile(
+    r"(?:(?P<verb>{checks})(?: if| whether| that) )(?P<what>.+)|(?:is|are) (?P<asked>(?:the|your|that) .+"
+    r"|you .+|it .+)",
+    re.IGNORECASE,
+)
+
+
+def checked(text: str) -> str | None:
+    """What is checked, as a statement: "is the door open" becomes "the door is open"."""
+    match = re.fullmatch(_CHECKED.pattern.replace("{checks}", pattern("checks").pattern), text, re.IGNORECASE)
+    if match is None:
+        return None
+    if match["what"] is not None:
+        return match["what"]
+    asked = match["asked"]
+    for form in (
+        r"((?:the|that) (?:.*? )?door(?: .+?)?) (open|closed|shut|locked)",
+        r"((?:the|your) (?:battery|charge).*?) (low|full|charged|below .+|above .+|over .+|under .+|at .+)",
+    ):
+        if (found := re.fullmatch(form, asked, re.IGNORECASE)) is not None:
+            return f"{found[1]} is {found[2]}"
+    found = re.fullmatch(
+        r"(you) ((?:holding|carrying|lost|low on).*)|(it) ((?:after|before|past) .+)", asked, re.IGNORECASE
+    )
+    if found is not None:
+        return f"{found[1] or found[3]} {'are' if found[1] else 'is'} {found[2] or found[4]}"
+    return None
+
+
+def say(text: str) -> MissionStep:
+    """A step that says a text."""
+    return MissionStep(block=Speak(Template(template(text))))
+
+
+def unclear(found: Behind) -> RefusalError:
+    """The refusal of what could belong to more than one thing."""
+    said = f"{found.cue} {found.text}".strip()
+    return RefusalError(f"it is not clear to what '{said}' belongs; say it first", [said])
+
+
+def was_not(clauses: Sequence[Clause], at: int) -> bool:
+    """Whether "if not" stood before."""
+    return any(one.kind is Kind.NOT for one in clauses[:at])

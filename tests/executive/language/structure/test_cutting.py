@@ -1,0 +1,43 @@
+import pytest
+
+from executive.language.structure.cutting import Kind, behind, cut
+
+
+def cues(text):
+    return [(one.kind, one.cue, one.text) for one in cut(text)]
+
+
+def test_clauses_begin_with_verbs_and_with_words_that_decide():
+    assert cues("go to the hall, and if there is a beer bring it, otherwise get a coke") == [
+        (None, "", "go to the hall"),
+        (Kind.IF, "if", "there is a beer bring it"),
+        (Kind.OTHERWISE, "otherwise", "get a coke"),
+    ]
+
+
+@pytest.mark.parametrize(
+    "text", ["go and charge", "bring a beer and a coke", "say please step aside", "wait until 14:30"]
+)
+def test_what_is_one_clause_stays_whole(text):
+    assert [one.text for one in cut(text)] == [text]
+
+
+@pytest.mark.parametrize(
+    ("text", "before", "kind", "rest"),
+    [
+        ("bring a beer if there is one", "bring a beer", Kind.IF, "there is one"),
+        ("go to the hall every ten minutes for an hour", "go to the hall", Kind.EVERY, "for an hour"),
+        ("go to the hall three times", "go to the hall", Kind.TIMES, ""),
+        ("look for it until you find it", "look for it", Kind.UNTIL, "you find it"),
+    ],
+)
+def test_what_stands_behind_is_told_apart(text, before, kind, rest):
+    found = behind(text)
+    assert (found.before, found.kind, found.text) == (before, kind, rest)
+
+
+@pytest.mark.parametrize(
+    "text", ["check if there is a beer", "ask Robin if he wants a beer", "bring a beer", "tell me if it is there"]
+)
+def test_an_indirect_question_stands_behind_nothing(text):
+    assert behind(text) is None

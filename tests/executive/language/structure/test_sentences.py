@@ -1,0 +1,122 @@
+"""Sentences that decide, repeat, wait and go on: the mission of each, and what near misses are refused for."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from executive.language import Status, understand
+from executive.language.structure.sentence import MOST_NESTED
+from executive.language.understand import understand_asking
+from executive.mission.written import parse_written, written
+
+HERE = Path(__file__).parent
+
+
+def rows(file, kind=None):
+    tables = yaml.safe_load((HERE / file).read_text(encoding="utf-8"))
+    found = (
+        (world, text, expected)
+        for world, table in tables.items()
+        for text, expected in (table[kind] if kind else table).items()
+    )
+    return [pytest.param(*row, id=f"{row[0]}: {row[1]}") for row in found]
+
+
+@pytest.mark.parametrize(("world", "sentence", "lines"), rows("sentences.yaml", "understood"))
+def test_a_sentence_becomes_its_mission(meant, world, sentence, lines):
+    answer = meant(sentence, world)
+    assert (answer.reason, list(written(answer.steps))) == (None, lines)
+
+
+@pytest.mark.parametrize(("world", "sentence", "lines"), rows("sentences.yaml", "understood"))
+def test_its_written_form_reads_back(world, sentence, lines):
+    assert list(written(parse_written(lines))) == lines
+
+
+@pytest.mark.parametrize(("world", "sentence", "part"), rows("refused.yaml"))
+def test_a_near_miss_is_refused_with_its_words(meant, world, sentence, part):
+    answer = meant(sentence, world)
+    assert (answer.status, answer.commands, answer.steps) == (Status.REFUSED, (), ())
+    assert part.lower() in answer.reason.lower()
+
+
+def test_all_commands_stand_in_their_order(meant):
+    answer = meant("if there is a beer in the kitchen bring it, otherwise go to the hall")
+    assert [command.goal for command in answer.commands] == ["kitchen", "start", "hall"]
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    ["see if there is a beer in the kitchen", "first get a beer, then go to the hall, and finally come back"],
+)
+def test_plain_commands_have_no_steps(meant, sentence):
+    answer = meant(sentence)
+    assert answer.commands
+    assert answer.steps == ()
+
+
+def test_it_needs_no_punctuation_where_that_is_clear(meant):
+    with_commas = meant("If there is a beer in the kitchen, bring it, otherwise get a coke.")
+    assert meant("if there is a beer in the kitchen bring it otherwise get a coke").steps == with_commas.steps
+
+
+def test_a_door_that_could_be_several_is_asked_about(meant):
+    answer = meant("every ten minutes look whether the kitchen door is open", "shop")
+    assert answer.status is Status.QUESTION
+    assert answer.question.candidates == ("door between kitchen and back aisle", "door between kitchen and staff room")
+
+
+@pytest.mark.parametrize(
+    ("reply", "room"),
+    [("the second one", "staff room"), ("back aisle", "back aisle"), ("staff room", "staff room")],
+)
+def test_the_answer_tells_which_door(parser, worlds, reply, room):
+    answer = understand_asking(
+        "if the kitchen door is open, come back",
+        answer=lambda question: reply,
+        parser=parser,
+        knowledge=worlds["shop"],
+        require_wake=False,
+    )
+    assert written(answer.steps)[0].startswith(f'If (door "kitchen" - "{room}" open)')
+
+
+@pytest.mark.parametrize(
+    "sentence", ["look whether the door is open", "every ten minutes look whether the door is open"]
+)
+def test_a_world_without_doors_has_none_to_look_at(parser, worlds, sentence):
+    knowledge = worlds["flat"].model_copy(update={"doors": ()})
+    answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
+    assert (answer.status, answer.steps) == (Status.REFUSED, ())
+    assert "no door here" in answer.reason
+
+
+def test_there_is_no_place_that_was_not_spoken_of(meant):
+    answer = meant("if Robin is there bring him a beer")
+    assert answer.status is Status.QUESTION
+    assert "there" in answer.reason
+
+
+def test_a_time_that_could_be_two_is_noted(meant):
+    assert meant("wait until half past two").notes == ("I take 'half past two' as 14:30",)
+    assert meant("wait until 14:30").notes == ()
+
+
+def test_blocks_nest_no_deeper_than_two(meant):
+    answer = meant("twice, three times, twice, say hello")
+    assert MOST_NESTED == 2
+    assert answer.status is Status.REFUSED
+    assert "two sentences" in answer.reason
+
+
+def test_what_is_spoken_of_is_remembered(meant):
+    answer = meant("if there is a beer in the kitchen bring it to Robin")
+    assert [str(command) for command in meant("bring it to the office", memory=answer.memory).commands][-1].startswith(
+        "Take [beer]"
+    )
+
+
+def test_names_alone_keep_conditions_refused(parser):
+    answer = understand("if there is milk, bring me a glass", parser=parser, knowledge=None, require_wake=False)
+    assert answer.status is Status.REFUSED

@@ -1,0 +1,73 @@
+"""Parameters of mission files: their types, choices and names of the world."""
+
+import pytest
+
+from executive.mission.errors import InputError
+from executive.mission.file.parameters import given_values
+from executive.mission.file.resolve import load_mission, mission_from_file
+
+FILE = """name: trial
+parameters:
+  room: {type: place, default: kitchen, description: Where to go.}
+  who: {type: person, default: Robin}
+  limit: 30
+  loud: false
+  mood: {type: text, default: calm, choices: [calm, hasty]}
+steps:
+  - to: ${room}
+    timeout: ${limit}
+"""
+
+
+@pytest.fixture
+def resolved(parser, flat, tmp_path):
+    """The mission of FILE with some values given as on the command line."""
+
+    def of(*settings, text=FILE):
+        (tmp_path / "mission.yaml").write_text(text, encoding="utf-8")
+        loaded = load_mission(tmp_path / "mission.yaml", given_values(settings))
+        return mission_from_file(loaded, parser=parser, knowledge=flat)
+
+    return of
+
+
+def test_values_take_the_places_of_the_defaults(resolved):
+    step = resolved("room=office", "limit=12.5").steps[0]
+    assert (step.commands[0].goal, step.policy.timeout_s) == ("office", 12.5)
+
+
+@pytest.mark.parametrize(
+    ("setting", "line", "says"),
+    [
+        ("room=kitchn", 3, "parameter 'room': unknown place 'kitchn'; did you mean 'kitchen'?"),
+        ("who=Rbin", 4, "parameter 'who': unknown person 'Rbin'; did you mean 'Robin'?"),
+        ("limit=soon", 1, "parameter 'limit' is a number, and 'soon' is none; give it a number"),
+        ("limit=true", 1, "parameter 'limit' is a number, and 'True' is none"),
+        ("loud=1", 1, "parameter 'loud' is a truth, and '1' is none"),
+        ("mood=sad", 1, "parameter 'mood' cannot be 'sad'; it is one of calm or hasty"),
+    ],
+)
+def test_a_value_that_does_not_fit_is_refused(resolved, setting, line, says):
+    with pytest.raises(InputError) as error:
+        resolved(setting)
+    assert error.value.line == line
+    assert says in str(error.value)
+
+
+def test_a_number_may_be_given_for_a_text(resolved):
+    text = FILE.replace("choices: [calm, hasty]", "description: How.").replace(
+        "to: ${room}", 'say: "go to the kitchen"'
+    )
+    resolved("mood=5", text=text)
+
+
+def test_a_default_of_another_type_is_refused_in_its_line(resolved):
+    with pytest.raises(InputError, match="parameter 'who' is a person, and 'True' is none") as error:
+        resolved(text=FILE.replace("default: Robin", "default: true"))
+    assert error.value.line == 4
+
+
+def test_an_unknown_type_is_refused_in_its_line(resolved):
+    with pytest.raises(InputError, match="parameter 'who' has no type; its type is one of text, number") as error:
+        resolved(text=FILE.replace("type: person", "type: animal"))
+    assert error.value.line == 4

@@ -1,0 +1,195 @@
+"""Blocks of which a mission is broken off in any tick and taken up by another process: they go on where they were."""
+
+import dataclasses
+from typing import ClassVar
+
+import pytest
+
+from executive.mission.condition import ValueIs
+from executive.mission.expression import Expression, Template
+from executive.mission.file.blocks import Ask, Check, Choose, Group, Repeat, Set, Together, Try, Wait
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep, OnFailure, SkillCall, StepPolicy
+from executive.mission.request import Request
+from executive.run.control import Control
+from executive.run.outcome import Outcome
+from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.worker import LockStepWorker
+from executive.store.missions import MissionStore
+from executive.store.resuming import resumed_tree
+from executive.tree.compiler import compile_mission
+from skills.api import Cause, Failed, Running, Skill, Succeeded
+
+REQUEST = Request("blocks", seed=3, name="m", world_name="flat", robot="Alice", fingerprint="print")
+
+
+class KilledError(BaseException):
+    """The process is gone."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Nothing:
+    pass
+
+
+@pytest.fixture
+def done():
+    """What was done to the world, by name: the third step of each piece of work does it."""
+    return []
+
+
+@pytest.fixture
+def works(done):
+    """Skills a, b, c: two steps, the deed, and one more. After a restart one looks whether its deed is done."""
+
+    def work(skill_name, fails=False):
+        class Work(Skill):
+            name = skill_name
+            Inputs = Nothing
+            changes_world = True
+            checkpoint: ClassVar[dict] = {}
+
+            def begin(self, inputs):
+                self.count, self.checkpoint = 0, {"before": done.count(skill_name)}
+
+            def resume(self, inputs):
+                self.count = 3 if done.count(skill_name) > self.checkpoint.get("before", 10**9) else 0
+
+            def step(self):
+                self.count += 1
+                if fails and self.count == 3:
+                    return Failed(Cause.EXECUTION, "no")
+                if self.count == 3:
+                    done.append(skill_name)
+                return Succeeded(f"{skill_name} done") if self.count >= 4 else Running(f"{skill_name} goes on")
+
+        return Work
+
+    return {**{name: work(name) for name in "abcd"}, "fails": work("fails", fails=True)}
+
+
+def block(made, **more):
+    return MissionStep(block=made, **more)
+
+
+def do(*names):
+    return tuple(MissionStep(skill=SkillCall(name)) for name in names)
+
+
+def put(text):
+    return block(Set({"n": Expression(text)}))
+
+
+def value(text):
+    return ValueIs(Expression(text))
+
+
+WAIT = block(Wait(seconds=0.2))
+RETRIES = StepPolicy(retries=1)
+
+# Each construct, and what is done in all, whenever the process is killed.
+BLOCKS = {
+    "if": ((put("1"), block(Choose(value("n > 0"), (*do("a"), put("0"), *do("b")), do("c"))), *do("d")), "abd"),
+    "else": ((block(Choose(value("n > 0"), do("a"), do("b", "c"))), *do("d")), "bcd"),
+    "repeat": ((block(Repeat(do("a", "b"), times=3)), *do("d")), "abababd"),
+    "until": ((block(Repeat((*do("a"), put("n + 1")), until=value("n >= 3"))), *do("d")), "aaad"),
+    "while": ((block(Repeat((put("n + 1"), *do("a")), while_=value("n < 3"))), *do("d")), "aaad"),
+    "every": ((block(Repeat(do("a"), times=3, every_s=0.5)), *do("d")), "aaad"),
+    "repeat in repeat": ((block(Repeat((block(Repeat(do("a"), times=2)), *do("b")), times=2)), *do("d")), "aabaabd"),
+    "if in repeat": (
+        (block(Repeat((put("n + 1"), block(Choose(value("n == 2"), do("a"), do("b")))), times=3)), *do("d")),
+        "babd",
+    ),
+    "try": ((block(Try(do("a"), do("b"))), *do("d")), "ad"),
+    "try else": ((block(Try(do("a", "fails"), do("b", "c"))), *do("d")), "abcd"),
+    "together": ((block(Together((*do("a"), WAIT))), *do("d")), "ad"),
+    "group": ((block(Group(do("a", "b"))), *do("d")), "abd"),
+    "always": ((block(Group(do("a"), always=do("b", "c"))), *do("d")), "abcd"),
+    "always after a failure": (
+        (block(Try((block(Group(do("a", "fails"), always=do("b"))),), do("c"))), *do("d")),
+        "abcd",
+    ),
+    "always in always": ((block(Group((block(Group(do("a"), always=do("b"))),), always=do("c"))), *do("d")), "abcd"),
+    "while it holds": ((block(Group(do("a", "b"), holds=value("battery > 0.1"))), *do("d")), "abd"),
+    "set": ((put("n + 1"), *do("a"), put("n + 1"), block(Choose(value("n == 2"), do("b"))), *do("d")), "abd"),
+    "check": (
+        (block(Check(value("n == 0"), "so")), *do("a"), put("5"), block(Choose(value("so"), do("b"))), *do("d")),
+        "abd",
+    ),
+    "wait": ((*do("a"), WAIT, *do("d")), "ad"),
+    "ask": ((block(Ask(Template("q?"), {"x": do("a"), "y": do("b", "c")}, limit_s=0.2, default="y")), *do("d")), "bcd"),
+    "skipped": ((block(Group(do("a", "fails", "b")), policy=StepPolicy(on_failure=OnFailure.SKIP)), *do("d")), "ad"),
+}  # fmt: skip
+
+
+@pytest.fixture
+def live(tmp_path, clock, robot, make, works, registry, knowledge):
+    """One life of the executive: to its end, or until it is killed after some tick."""
+
+    def one_life(steps, number, kill_after=None):
+        tree = compile_mission(
+            Mission("m", DEFAULT_WORLD, "Alice", steps, variables={"n": 0, "so": False}),
+            knowledge=knowledge,
+            registry={**registry, **works},
+        )
+        with MissionStore(tmp_path / f"{number}.sqlite") as store:
+            missions = store.missions()
+            mission = missions[0] if missions else store.add(REQUEST, queued=False)
+            journal = store.journal(mission.id)
+            if missions:
+                tree, recollection = resumed_tree(tree, store.memory(mission.id))
+                journal.remembering(recollection)
+            store.begin(mission.id)
+            robot.holder = None
+            entry = RunEntry(tree, robot, make.StillLocaliser(), make.EmptyCostmap(), Killing(journal, kill_after))
+            with LockStepWorker(clock) as worker:
+                try:
+                    return run(
+                        [entry],
+                        clock=clock,
+                        worker=worker,
+                        publish=lambda topic, message: None,
+                        settings=RunSettings(seed=3, tick_period_s=0.1, time_limit_s=60.0),
+                        control=Control(pace=None),
+                    )
+                except KilledError:
+                    return None
+
+    return one_life
+
+
+class Killing:
+    """Passes notes on, and kills after some."""
+
+    def __init__(self, journal, kill_after):
+        self.journal, self.left = journal, kill_after
+
+    def note(self, note):
+        self.journal.note(note)
+        if self.left is not None:
+            self.left -= 1
+            if self.left <= 0:
+                raise KilledError
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_a_kill_in_any_tick_neither_repeats_nor_leaves_out_anything(live, done, name):
+    steps, expected = BLOCKS[name]
+    whole = live(steps, "whole")
+    assert (whole.outcome, "".join(done)) == (Outcome.SUCCESS, expected)
+    wrong = []
+    for tick in range(1, whole.ticks):
+        done.clear()
+        assert live(steps, tick, kill_after=tick) is None
+        result = live(steps, tick)
+        if (result.outcome, "".join(done)) != (Outcome.SUCCESS, expected):
+            wrong.append((tick, result.outcome.value, "".join(done), result.worst.message[:120]))
+    assert not wrong, wrong
+
+
+@pytest.mark.parametrize("name", ["if", "until", "while", "repeat in repeat", "try else", "always after a failure"])
+def test_one_kill_after_the_other_leads_to_the_end_all_the_same(live, done, name):
+    steps, expected = BLOCKS[name]
+    lives = 1
+    while live(steps, "store", kill_after=9) is None and lives < 50:
+        lives += 1
+    assert ("".join(done), 1 < lives < 50) == (expected, True)

@@ -36,7 +36,7 @@ DECIDING = {
     "retry_elsewhere": (1, None),
     "speak_while_driving": (1, "On my way to the hall."),
     "tea_or_coffee": (1, "1 tea, please."),
-    "timed_visit": (1, "It is "),
+    "timed_visit": (1, "Good morning. It is 08:30."),
     "wait_for_button": (1, "Nobody pressed the button. I am going now."),
     "watch_the_door": (1, "I looked 1 time. The bathroom door is open."),
 }
@@ -47,8 +47,9 @@ DECIDING = {
 def test_what_it_decides_is_right_and_it_says_so(name, tmp_path):
     seed, said = DECIDING[name]
     file = MISSIONS / f"{name}.yaml"
-    report = run_simulated(prepare(Request(file=file, seed=seed, out=tmp_path, record=False))).report
+    request = Request(file=file, seed=seed, out=tmp_path, record=False, time_of_day="08:29")
+    report = run_simulated(prepare(request)).report
     assert report.outcome == "success", report.message
     assert report.referee.success, report.referee.why
     assert (report.referee.collisions, report.referee.drops) == (0, 0)
-    assert (said or "") in (report.said[-1].text if said else "")
+    assert said in (None, *(each.text for each in report.said[-1:]))

@@ -237,6 +237,11 @@ def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder, policy: S
         decide, key, parts = _decided(assembler, condition, builder.at("while"))
         nodes = [decide]
     body = _row(assembler, block.steps, builder.at("round"), "round")
+    flow = assembler.flow
+    if flow.held != before.held and block.times != 1:
+        flow.names = dict(before.names)
+        flow.held, flow.opening = UNSURE, False
+        body = _row(assembler, block.steps, builder.at("round"), "round")
     if mode == "until" and condition is not None:
         decide, key, parts = _decided(assembler, condition, builder.at("until"))
         nodes = [decide]

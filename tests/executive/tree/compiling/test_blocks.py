@@ -220,6 +220,14 @@ def test_the_gripper_after_a_block_that_may_take_something_is_unsure(compiled_st
     assert (part.held.sure, part.opening) == (False, False)
 
 
+@pytest.mark.parametrize(("times", "unsure"), [(1, False), (2, True), (None, True)])
+def test_a_round_may_begin_with_what_the_one_before_has_taken(compiled_steps, times, unsure):
+    tree = compiled_steps(block(Repeat((go(TAKE),), times=times, until=None if times else HOLDING)))
+    (part,) = tree.parts
+    assert (part.held is not None and not part.held.sure) is unsure
+    assert any(node.kind == "only if holding" and "coke" in node.name for node in tree.root.walk()) is unsure
+
+
 def test_what_is_taken_before_a_block_is_held_in_its_branches(compiled_steps):
     tree = compiled_steps(go(TAKE), block(Choose(HOLDING, (go(BRING),), (to("bathroom"),))))
     assert [held(tree, n)[0] for n in (-2, -1)] == [(True, "coke")] * 2

@@ -50,6 +50,7 @@ class Session:
         self.context = context
         self._robot, self._control, self._profile = robot, control, profile
         self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal, profile),)
+        self._given_up: tuple[TreeRun, ...] = ()
         self._held = False
         self._lost_since_s: float | None = None
         self._preempting: tuple[RobotResult, ...] = ()
@@ -140,8 +141,13 @@ class Session:
         return False
 
     def tick(self, breakpoints: frozenset[str]) -> bool:
-        """Tick the mission under way once; True when a node changed its status. Its end takes up the one before."""
+        """Tick the mission under way once; True when a node changed its status. Its end takes up the one before.
+
+        What a mission that was given up always does in the end comes first.
+        """
         self._held = False
+        if self._given_up:
+            return self._tick_given_up(self._given_up[0])
         changed = self._top.tick(breakpoints)
         if self._top.finished and len(self._stack) > 1:
             self._take_up_the_one_before()
@@ -159,7 +165,7 @@ class Session:
     @property
     def ends(self) -> bool:
         """True while missions that were ended early still do what is always done in the end."""
-        return self.result is None and any(run.ends for run in self._stack)
+        return self.result is None and any(run.ends for run in (*self._given_up, *self._stack))
 
     def end_early(self) -> None:
         """Stop all missions where they are; what is always done in the end is left to `tick_end`."""
@@ -169,15 +175,22 @@ class Session:
     def tick_end(self) -> None:
         """Tick once what is always done in the end, of the latest mission first."""
         self._held = False
-        run = next((run for run in reversed(self._stack) if run.ends), None)
+        run = next((run for run in (*self._given_up, *reversed(self._stack)) if run.ends), None)
         if run is not None:
             run.tick(frozenset())
+
+    def _tick_given_up(self, run: TreeRun) -> bool:
+        changed = run.tick(frozenset())
+        if not run.ends:
+            run.halt(self._attempt)
+            self._given_up = self._given_up[1:]
+        return changed
 
     def hold(self) -> None:
         """Suspend the mission and stop the robot; done once until the next tick."""
         if not self._held:
             self._held = True
-            for run in self._stack:
+            for run in (*self._given_up, *self._stack):
                 run.suspend()
             if self._lost_since_s is None:
                 self.context.robot.stop(lease=self.context.lease)
@@ -206,10 +219,15 @@ class Session:
     def _give_up_for(self, tree: CompiledTree) -> None:
         self.hold()
         given_up = self._top
-        given_up.halt(self._attempt)
+        self._attempt("stop the tree", given_up.end_early)
+        if given_up.ends:
+            self._given_up += (given_up,)
+        else:
+            given_up.halt(self._attempt)
         self._stack = self._stack[:-1]
         self._control.mission_ended(self.name)
         journal = None if self._stack or given_up.journal is None else given_up.journal.replaced(tree)
+        given_up.journal = None
         self._begin(tree, self._start_of(given_up), journal)
         message = f"given up for '{tree.mission_name}'"
         self._note_result(given_up.judge(Ending(Outcome.CANCELLED, Cause.CANCELLED, message)))
@@ -217,7 +235,7 @@ class Session:
     def close(self, ending: Ending | None = None) -> RobotResult:
         """Stop the trees and the robot, give the lease back, log the end. Idempotent; raises nothing."""
         if self.result is None:
-            for run in reversed(self._stack):
+            for run in (*self._given_up, *reversed(self._stack)):
                 run.halt(self._attempt)
             context = self.context
             self._attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))

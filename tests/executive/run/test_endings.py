@@ -189,3 +189,21 @@ def test_where_a_command_is_cancelled_the_end_begins_at_once(go, control):
     drive = MissionStep((parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"),))
     _, begun = go(group(drive, always=[skill("relocalise")]), act=cancels(control, 2))
     assert begun == ["navigate", "relocalise"]
+
+
+def test_a_mission_that_is_given_up_for_another_does_it_before_the_other_begins(go, control, knowledge, registry):
+    other = Mission("other", DEFAULT_WORLD, "Alice", (skill("back_off"),))
+    tree = compile_mission(other, knowledge=knowledge, registry=registry)
+    acts = {3: lambda: control.replace(tree)}
+    steps = group(LONG, always=[skill("relocalise"), skill("stow")])
+    result, begun = go(steps, act=lambda now: acts.get(now, int)())
+    assert (result.outcome, begun) == (Outcome.SUCCESS, ["relocalise", "stow", "back_off"])
+
+
+def test_a_cancel_meanwhile_lets_a_mission_that_was_given_up_do_it_too(go, control, knowledge, registry, script):
+    script.steps = 5
+    other = Mission("other", DEFAULT_WORLD, "Alice", (skill("back_off"),))
+    tree = compile_mission(other, knowledge=knowledge, registry=registry)
+    acts = {3: lambda: control.replace(tree), 6: lambda: control.cancel("enough")}
+    result, begun = go(group(LONG, always=[skill("relocalise")]), act=lambda now: acts.get(now, int)())
+    assert (result.outcome, begun) == (Outcome.CANCELLED, ["relocalise"])

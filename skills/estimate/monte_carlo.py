@@ -79,6 +79,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         self._scans = self._at_rest = self._rival_updates = 0
         self._agreeing = 0 if initial is None else self._own.sure_updates
         self._mass = 0.0 if initial is None else 1.0
+        self._expected = initial is not None
 
     @property
     def particles(self) -> ParticleFilter:
@@ -106,10 +107,16 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         self._mass, self._agreeing = 1.0, self._own.sure_updates
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
-        """Where a scan fits the map, as the scan matching has it; None also where two places fit equally well."""
+        """Where a scan fits the map, as the scan matching has it; None also where two places fit equally well.
+
+        At the beginning, of places that fit equally well it is the one where the robot is expected to be.
+        """
         X_OB = Pose2D.from_transform(scan.X_OB)
-        found = self._matches(self._points(scan), compose(Pose2D.from_transform(belief.X_WO), X_OB), radius_m)
+        here = compose(Pose2D.from_transform(belief.X_WO), X_OB)
+        found = self._matches(self._points(scan), here, radius_m)
         best = max(found, key=lambda each: each.inlier_share, default=None)
+        if best is not None and self._expected and _same_place(here, best.pose):
+            found = [best]
         if best is None or best.inlier_share < self._options.found_share:
             return None
         rivals = (each for each in found if each.inlier_share > best.inlier_share - self._own.alike_share)
@@ -120,6 +127,8 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
 
     def _take_in(self, points_F: FloatArray) -> None:
         """Carry the belief on by scan matching; when it is time, weigh the particles, and see what they say."""
+        if self._localised:
+            self._expected = False
         if self._placed:
             knew = self._localised
             self._correct(points_F)
@@ -178,6 +187,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         if fits and (not self._localised or (better and doubted)):
             self._believe(found)
             self._placed, self._localised, self._rival_updates = True, False, 0
+            self._expected = False
             self._mass, self._inlier_share = mode.mass, found.inlier_share
 
     def _injected(self, points_F: FloatArray, beams: FloatArray) -> FloatArray | None:

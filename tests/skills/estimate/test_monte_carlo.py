@@ -10,6 +10,7 @@ from planar_robot import TWO_ROOMS, Bench, Box
 from skills.estimate.localiser import LocaliserOptions
 from skills.estimate.monte_carlo import MonteCarloOptions
 from skills.robot import Pose2D
+from skills.testing.blocks import grid_of
 
 START = Pose2D(1.5, 5.4, 0.0)
 EMPTY_ROOM = (
@@ -82,6 +83,17 @@ def test_in_an_empty_symmetric_room_it_does_not_claim_to_know():
     assert bench.localiser.estimate().health < 0.7
     scan = bench.robot.scan()
     assert bench.localiser.search(scan, bench.localiser.estimate(), None) is None
+
+
+def test_where_places_look_alike_a_search_at_the_beginning_finds_the_one_where_it_is_expected():
+    bench = bench_at(Pose2D(2.0, 1.5, 0.3), surveyed=EMPTY_ROOM)
+    grid = grid_of(EMPTY_ROOM, (0.7, 1.3))
+    bench.localiser = MonteCarloOptions().build(grid, Pose2D(2.05, 1.45, 0.3), surely=False)
+    tick(bench, 2)
+    found = bench.localiser.search(bench.robot.scan(), bench.localiser.estimate(), None)
+    assert found is not None
+    bench.localiser.accept(found)
+    assert bench.pose_error()[0] < 0.1
 
 
 def test_told_where_it_is_it_knows_also_in_an_empty_symmetric_room():

@@ -115,6 +115,7 @@ def queueing(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], s
     before = prepared.request
 
     def later(text: str) -> str:
+        """Queue it, and say so."""
         named, *settings = text.split()
         asked = Request(text, world=before.world or before.world_name, seed=before.seed, out=out)
         if named in shipped_missions():

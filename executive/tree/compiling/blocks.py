@@ -134,7 +134,6 @@ def framed(assembler: Assembler, body: Assembled, group: Group, builder: PlanBui
                 )
             )
         assembler.flow = after
-        after.join([after.copy(), after.copy()])
         node = builder.node("interrupts", f"{node.name}, watched", *calls, node, part="watched")
     if group.holds is not None:
         decision = instant_decision(group.holds, builder.at("while"), before.names)
@@ -199,7 +198,7 @@ def _decided(
     assembler: Assembler, condition: Condition, builder: PlanBuilder
 ) -> tuple[NodeSpec, str, tuple[StepPart, ...]]:
     """The node that decides, the key of its answer, and the checks that it makes."""
-    decided = decision_of(condition, builder, _readable(assembler))
+    decided = decision_of(condition, builder, assembler.flow.names)
     key = f"{builder.path_id}/decided"
     return decide_plan(condition, decided, builder, key), key, _checks(decided, builder)
 
@@ -209,10 +208,6 @@ def _checks(decided: Decided, builder: PlanBuilder) -> tuple[StepPart, ...]:
         StepPart(path, look.command, goal=command_goal(look.command, builder.knowledge))
         for path, look in decided.checks
     )
-
-
-def _readable(assembler: Assembler) -> Mapping[str, Named]:
-    return assembler.flow.names
 
 
 def _choose(assembler: Assembler, block: Choose, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
@@ -365,7 +360,7 @@ def _wait(assembler: Assembler, block: Wait, builder: PlanBuilder, policy: StepP
 
 def _check(assembler: Assembler, block: Check, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
     below = builder.at("check")
-    decided = decision_of(block.condition, below, _readable(assembler))
+    decided = decision_of(block.condition, below, assembler.flow.names)
     if isinstance(block.condition, Look):
         key = _give_key(assembler, block.gives, f"{decided.looks[0].path_id}/answer", bool, builder)
         return Assembled((answering(decided.looks[0], {"key": key}),), _checks(decided, builder))
@@ -392,7 +387,7 @@ def _speak(assembler: Assembler, block: Speak, builder: PlanBuilder, policy: Ste
         return Assembled((builder.skill("speak", {"text": block.text.filled({})}),))
     _check_template(block.text, builder, assembler)
     key = f"{builder.path_id}/text"
-    names = {**_readable(assembler), "": Named(key, str)}
+    names = {**assembler.flow.names, "": Named(key, str)}
     fill = set_plan(builder, {key: block.text}, names, "fill", "put the values in")
     return Assembled((builder.sequence("speak", fill, builder.skill("speak", {"text": FromBoard(key)})),))
 
@@ -408,7 +403,7 @@ def _ask(assembler: Assembler, block: Ask, builder: PlanBuilder, policy: StepPol
         f"ask: {block.text.text}",
         part="question",
         text=block.text,
-        keys=MappingProxyType(dict(keys_of(block.text, _readable(assembler)))),
+        keys=MappingProxyType(dict(keys_of(block.text, assembler.flow.names))),
         options=tuple(block.choices),
         names=MappingProxyType(names),
         gives=kind,
@@ -465,16 +460,16 @@ def _default(block: Ask, names: Mapping[str, str], builder: PlanBuilder) -> Valu
 def _set(assembler: Assembler, block: Set, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
     values: dict[str, Expression | Template] = {}
     for name, expression in block.values.items():
-        kind = kind_in(expression, builder, _readable(assembler))
+        kind = kind_in(expression, builder, assembler.flow.names)
         key = _give_key(assembler, name, "", PYTHON_TYPES[kind], builder)
         values[key] = expression
     words = ", ".join(f"{name} = {expression}" for name, expression in block.values.items())
-    return Assembled((set_plan(builder, values, _readable(assembler), "set", f"set {words}"),))
+    return Assembled((set_plan(builder, values, assembler.flow.names, "set", f"set {words}"),))
 
 
 def _check_template(text: Template, builder: PlanBuilder, assembler: Assembler) -> None:
     for expression in text.expressions:
-        kind_in(expression, builder, _readable(assembler))
+        kind_in(expression, builder, assembler.flow.names)
 
 
 def _give_key(assembler: Assembler, name: str | None, key: str, kind: type, builder: PlanBuilder) -> str:

@@ -63,6 +63,7 @@ def decision_of(condition: Condition, builder: PlanBuilder, names: Mapping[str, 
     checks: list[tuple[str, Look]] = []
 
     def made(part: Condition) -> Decision:
+        """The decision of a part; its looks are gathered on the way."""
         match part:
             case ValueIs(expression):
                 if kind_in(expression, builder, names) is not Kind.TRUTH:

@@ -147,17 +147,21 @@ class SpotRobot:
         reason = self._trajectory_refusal(trajectory)
         return self._commands.refuse(reason) if reason else self._begin(Part.ARM, trajectory, until_s, lease)
 
-    def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+    def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Spot has no head."""
+        return self._commands.refuse("point_head: the robot has no head")
+
+    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Move the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
         gripper = spot_facts()["gripper"]
-        if not (0.0 <= opening_rad <= gripper["open"] and 0.0 < force_n <= gripper["max_force"]):
+        if not (0.0 <= opening <= gripper["open"] and 0.0 < force_n <= gripper["max_force"]):
             return self._commands.refuse(
-                f"set_gripper: opening {opening_rad:.2f} rad must lie in [0, {gripper['open']}] "
+                f"set_gripper: opening {opening:.2f} rad must lie in [0, {gripper['open']}] "
                 f"and force {force_n:.0f} N in (0, {gripper['max_force']}]"
             )
-        command = self._begin(Part.GRIPPER, GripperGoal(opening_rad, force_n), until_s, lease)
+        command = self._begin(Part.GRIPPER, GripperGoal(opening, force_n), until_s, lease)
         if self._commands.status(command).state is CommandState.RUNNING:
-            self._gripper_goal_before, self._gripper_goal = self._gripper_goal, GripperGoal(opening_rad, force_n)
+            self._gripper_goal_before, self._gripper_goal = self._gripper_goal, GripperGoal(opening, force_n)
             self._gripper_still_s = 0.0
         return command
 

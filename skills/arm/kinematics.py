@@ -37,10 +37,9 @@ class ChainJoint:
 
 @dataclass(frozen=True)
 class ArmModel:
-    """Forward and inverse kinematics of the arm, and where the gripper hinges on the hand."""
+    """Forward and inverse kinematics of the arm."""
 
     joints: tuple[ChainJoint, ...]
-    gripper: ChainJoint
     stowed_rad: FloatArray
     solver: InverseKinematics | None = None
 
@@ -194,19 +193,18 @@ def _check_structure(joints: tuple[ChainJoint, ...]) -> None:
 def _read_model(
     description: str,
     names: tuple[str, ...],
-    jaw_name: str,
     stowed: tuple[float, ...],
     closed_form: bool,
 ) -> ArmModel:
     robot = ElementTree.fromstring(description.replace("drake:", "drake-"))  # the prefix is often left undeclared
     elements = {element.get("name"): element for element in robot.findall("joint")}
-    missing = [name for name in (*names, jaw_name) if name not in elements]
+    missing = [name for name in names if name not in elements]
     if missing:
         raise ValueError(f"URDF of the robot: no joint {', '.join(missing)}")
     joints = tuple(_read_joint(elements[name]) for name in names)
     if closed_form:
         _check_structure(joints)
-    return ArmModel(joints, _read_joint(elements[jaw_name]), np.array(stowed))
+    return ArmModel(joints, np.array(stowed))
 
 
 def arm_model(capabilities: Capabilities) -> ArmModel:
@@ -217,6 +215,5 @@ def arm_model(capabilities: Capabilities) -> ArmModel:
     if capabilities.arm is None or capabilities.gripper is None:
         raise ValueError("the robot has no arm with a gripper")
     names, stowed, solver = capabilities.arm.joint_names, capabilities.arm.stowed_rad, capabilities.arm.inverse
-    jaw_name = capabilities.gripper.joint_name
-    model = _read_model(capabilities.description, names, jaw_name, stowed[: len(names)], solver is None)
+    model = _read_model(capabilities.description, names, stowed[: len(names)], solver is None)
     return replace(model, solver=solver)

@@ -79,14 +79,14 @@ def pad_shapes(
 def add_joint(
     robot: ElementTree.Element, name: str, parent: str, child: str, part: Mapping[str, Any], kind: str = "revolute"
 ) -> None:
-    """A joint with a motor: `offset`, `axis`, `range`, `effort` and, where the child is turned, `rpy`."""
+    """A joint with a motor: `offset`, `axis`, `range` (but when continuous), `effort` and, of a turned child, `rpy`."""
     joint = ElementTree.SubElement(robot, "joint", name=name, type=kind)
     ElementTree.SubElement(joint, "origin", xyz=text(part["offset"]), rpy=text(part.get("rpy", (0, 0, 0))))
     ElementTree.SubElement(joint, "parent", link=parent)
     ElementTree.SubElement(joint, "child", link=child)
     ElementTree.SubElement(joint, "axis", xyz=text(part["axis"]))
-    lower, upper = part["range"]
-    ElementTree.SubElement(joint, "limit", lower=str(lower), upper=str(upper), effort=str(part["effort"]))
+    ends = {} if kind == "continuous" else dict(zip(("lower", "upper"), map(str, part["range"]), strict=True))
+    ElementTree.SubElement(joint, "limit", ends, effort=str(part["effort"]))
     transmission = ElementTree.SubElement(robot, "transmission", name=f"{name}_transmission")
     ElementTree.SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
     ElementTree.SubElement(transmission, "joint", name=name)

@@ -20,8 +20,6 @@ WHEELS = ("left_wheel", "right_wheel")
 FINGERS = ("left_finger", "right_finger")
 LIFT_JOINT = "torso_lift"
 HEAD_JOINTS = ("head_pan", "head_tilt")
-_ENDLESS_RAD = (-2.0 * math.pi, 2.0 * math.pi)
-"""The range of a joint that turns without end; planners need one."""
 
 
 @cache
@@ -48,7 +46,8 @@ def fetch_urdf(*, root: str = BASE_LINK) -> str:
         parent = BODY_LINK
         for part in chain:
             _add(robot, part["link"], part)
-            urdf.add_joint(robot, part["link"], parent, part["link"], {**part, "range": part["range"] or _ENDLESS_RAD})
+            kind = "continuous" if part["range"] is None else "revolute"
+            urdf.add_joint(robot, part["link"], parent, part["link"], part, kind)
             parent = part["link"]
     for name, side in zip(FINGERS, (1, -1), strict=True):
         _add_finger(robot, name, side, facts["finger"])
@@ -113,13 +112,13 @@ def _add_wheel(robot: ElementTree.Element, name: str, side: int, wheel: Mapping[
         "com": (0, 0, 0),
         "offset": (x, side * y, z),
         "axis": (0, 1, 0),
-        "range": (-1e6, 1e6),
     }
     link = urdf.add_link(robot, name, part)
-    urdf.add_collision(link, f"{name}_0", {"sphere": wheel["radius"], "xyz": (0, 0, 0)}, urdf.friction(wheel["friction"]))
+    ball = {"sphere": wheel["radius"], "xyz": (0, 0, 0)}
+    urdf.add_collision(link, f"{name}_0", ball, urdf.friction(wheel["friction"]))
     tyre = {"cylinder": (wheel["radius"], wheel["width"]), "xyz": (0, 0, 0), "rpy": (math.pi / 2, 0, 0)}
     urdf.add_look(link, f"{name}_look_0", tyre, "black")
-    urdf.add_joint(robot, name, BASE_LINK, name, part)
+    urdf.add_joint(robot, name, BASE_LINK, name, part, "continuous")
 
 
 def _add_lift(robot: ElementTree.Element, lift: Mapping[str, Any], root: str) -> None:

@@ -26,10 +26,10 @@ from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, ModelInst
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from plant.happenings.doors import add_panel
+from plant.kinds import BodyOptions, RobotBody, robot_kind
 from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.scene import Scene
 from plant.scenery import add_model, add_scenery
-from plant.spot.model import SpotModel
 from plant.worlds.world import DoorRule
 
 TIME_STEP_S = 0.0125
@@ -73,7 +73,7 @@ class WorldDiagram:
     diagram: Diagram
     plant: MultibodyPlant
     scene_graph: SceneGraph
-    robots: Mapping[str, SpotModel]
+    robots: Mapping[str, RobotBody]
     models: Mapping[str, ModelInstanceIndex]
     trays: Mapping[str, RigidBody]
     scenery: Mapping[GeometryId, str]
@@ -85,7 +85,7 @@ def build_diagram(
     *,
     directives: Path | None,
     models: Sequence[LooseModel],
-    robot_names: Sequence[str],
+    robots: Mapping[str, str],
     doors: Sequence[DoorRule] = (),
     visuals: bool = True,
     carried: bool = True,
@@ -98,16 +98,16 @@ def build_diagram(
 
     SAP contact at `TIME_STEP_S`; sampled outputs, which would double the cost of a step, are off, so that evaluating
     contact results solves once more. Positions of the models are defaults, the robots' are set by the caller.
-    `doors` have panels, which are models, too.
+    `robots` names the kind of each; `doors` have panels, which are models, too.
     `renderer_parameters` set light and sky; `meshcat` shows the world there.
-    `visuals` draws Spot with meshes where they are installed; `render` makes the scene for cameras. `locomotion` limits
-    what bears the robots.
+    `visuals` draws robots with meshes where they are installed; `render` makes the scene for cameras; `locomotion`
+    limits what bears the robots.
     """
     rebuild = partial(
         build_diagram,
         directives=directives,
         models=models,
-        robot_names=robot_names,
+        robots=robots,
         doors=doors,
         visuals=visuals,
         carried=carried,
@@ -125,10 +125,8 @@ def build_diagram(
     instances = {model.name: _add_model(plant, parser, model) for model in models}
     panels = {door.name: add_panel(plant, door) for door in doors}
     trays = {model.name: _add_tray(plant, parser, model) for model in models if model.receives}
-    robots = {
-        name: SpotModel(plant, name, visuals=visuals, carried=carried, limits=locomotion)
-        for name in sorted(robot_names)
-    }
+    options = BodyOptions(visuals, carried, locomotion)
+    bodies = {name: robot_kind(kind).add(plant, name, options) for name, kind in sorted(robots.items())}
     plant.Finalize()
     for model in models:
         if not (model.fixed or model.slides):
@@ -136,7 +134,7 @@ def build_diagram(
             plant.SetDefaultFloatingBaseBodyPose(plant.get_body(body), model.X_WM)
     filters = scene_graph.collision_filter_manager()
     floor = GeometrySet(_floor_geometries(plant, scene_graph))
-    for robot in robots.values():
+    for robot in bodies.values():
         robot.filter_collisions(filters, floor)
     moved = [*panels.values(), *(instances[model.name] for model in models if model.slides)]
     moved += [tray.model_instance() for tray in trays.values()]
@@ -150,7 +148,7 @@ def build_diagram(
         diagram,
         plant,
         scene_graph,
-        robots,
+        bodies,
         {**instances, **panels},
         trays,
         scenery,

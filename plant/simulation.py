@@ -18,6 +18,7 @@ from plant.carried import Carried
 from plant.diagram import TIME_STEP_S, LooseModel, WorldDiagram, build_diagram
 from plant.happenings.doors import Doors
 from plant.happenings.moves import Moves
+from plant.kinds import RobotBody, SensorOptions
 from plant.live_scene import LiveScene
 from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.people.receivers import Receivers
@@ -28,10 +29,6 @@ from plant.sleeping import Sleepers
 from plant.snapshot.file import read_snapshot
 from plant.snapshot.values import State
 from plant.snapshot.writer import SnapshotWriter, restore
-from plant.spot.capabilities import spot_capabilities
-from plant.spot.model import SpotModel
-from plant.spot.robot import SpotRobot
-from plant.spot.sensing import HAND_LINK, SpotSensors
 from plant.worlds.lights import render_parameters
 from plant.worlds.placement import Placement, Receiving, place_objects, place_people
 from plant.worlds.route import Route
@@ -56,7 +53,7 @@ class Engine:
         starts: Mapping[str, Pose2D],
         *,
         seed: int = 0,
-        dock: Pose2D | None = None,
+        docks: Mapping[str, Pose2D] = MappingProxyType({}),
         charge: float = 1.0,
         routes: Mapping[str, Route] = MappingProxyType({}),
         receiving: Mapping[str, Receiving] = MappingProxyType({}),
@@ -64,27 +61,26 @@ class Engine:
     ) -> None:
         """`starts`: where each robot stands at time 0, in the world frame; `seed` gives the sensors' noise.
 
-        Batteries begin at `charge` (0 to 1) and charge at `dock`. `routes` are those of people who walk, by the names
-        of their models; `receiving` says how those with a tray take what is held out to them; `doors` are those of the
-        Diagram. Raises WorldError: a route leads through what stands fast.
+        Batteries begin at `charge` (0 to 1), each robot's charges at its own of the `docks`. `routes` are those of
+        people who walk, by the names of their models; `receiving` says how those with a tray take what is held out to
+        them; `doors` are those of the Diagram. Raises WorldError: a route leads through what stands fast.
         """
-        self.world, self._dock, self._charge = world, dock, charge
+        self.world, self._docks, self._charge = world, docks, charge
         self._simulator = Simulator(world.diagram)
         self.root_context: Context = self._simulator.get_mutable_context()
         self.context: Context = world.plant.GetMyMutableContextFromRoot(self.root_context)
         for name, pose in starts.items():
             world.robots[name].place(self.context, pose)
         self.work: Counter[str] = Counter()
-        self._spots = {
-            name: SpotRobot(model, self._sensors(model, seed), self.context)
-            for name, model in sorted(world.robots.items())
+        self._robots = {
+            name: body.kind.drive(body, self._sensors(body, seed)) for name, body in sorted(world.robots.items())
         }
         self.walkers = Walkers(world, self.context, routes)
         self._sleepers = Sleepers(world, self.root_context)
         plant = world.plant
         loose = [plant.get_body(index) for model in world.models.values() for index in plant.GetBodyIndices(model)]
         self._carried = Carried(plant, self.context, loose)
-        self._hands = {name: plant.GetBodyByName(HAND_LINK, model.instance) for name, model in world.robots.items()}
+        self._hands = {name: robot.hand for name, robot in world.robots.items()}
         self.receivers = Receivers(world, self.context, receiving)
         self._happened: list[tuple[float, str]] = []
         self.doors = Doors(plant, self.context, doors, self._outlines_W, self.note)
@@ -95,14 +91,13 @@ class Engine:
         self._command_robots()
         self._simulator.Initialize()
 
-    def _sensors(self, model: SpotModel, seed: int) -> SpotSensors:
-        return SpotSensors(
-            model,
+    def _sensors(self, body: RobotBody, seed: int) -> SensorOptions:
+        return SensorOptions(
             self.world.scene_graph,
             self.context,
             seed=seed,
             scene=self.world.scene,
-            dock=self._dock,
+            dock=self._docks.get(body.name),
             charge=self._charge,
             work=self.work,
         )
@@ -110,7 +105,7 @@ class Engine:
     @property
     def robots(self) -> Mapping[str, Robot]:
         """The robots by name."""
-        return self._spots
+        return self._robots
 
     @property
     def happened(self) -> Sequence[tuple[float, str]]:
@@ -138,7 +133,7 @@ class Engine:
                 self._carried.limit_spin()
             if self._steps % CONTROL_STEPS == 0:
                 self._command_robots()
-            holding = [name for name, spot in self._spots.items() if spot.gripper().holding]
+            holding = [name for name, robot in self._robots.items() if robot.gripper().holding]
             self.walkers.before_step(TIME_STEP_S, standing=self.receivers.busy)
             self.receivers.before_step(self.now(), TIME_STEP_S, holding)
             self.doors.before_step(self.now(), TIME_STEP_S)
@@ -152,8 +147,8 @@ class Engine:
             for every, observer in self._observers:
                 if self._steps % every == 0:
                     observer(self.now())
-        for spot in self._spots.values():
-            spot.sense(self.now())
+        for robot in self._robots.values():
+            robot.sense(self.now())
         for listener in self._after_advance:
             listener()
 
@@ -163,7 +158,7 @@ class Engine:
 
     def state(self) -> State:
         """Time, what the robots keep, how far the people have walked, and what they are about to take."""
-        robots = {name: spot.state() for name, spot in self._spots.items()}
+        robots = {name: robot.state() for name, robot in self._robots.items()}
         people = {"walkers": self.walkers.state(), "receivers": self.receivers.state()}
         moves = None if self.moves is None else self.moves.state()
         return {"steps": self._steps, "robots": robots, **people, "doors": self.doors.state(), "moves": moves}
@@ -191,8 +186,8 @@ class Engine:
         self.doors.restore(state["doors"])
         if self.moves is not None and state["moves"] is not None:
             self.moves.restore(state["moves"])
-        for name, spot in self._spots.items():
-            spot.restore(state["robots"][name], self.now())
+        for name, robot in self._robots.items():
+            robot.restore(state["robots"][name], self.now())
         self._command_robots()
         self._simulator.Initialize()
 
@@ -206,17 +201,17 @@ class Engine:
 
     def _outlines_W(self) -> Iterator[FloatArray]:
         """The outlines (K, 2) of robots, their hands and people, from above."""
-        outline_B = np.array(spot_capabilities().footprint_m)
-        corners_B = np.column_stack([outline_B, np.zeros(len(outline_B))])
         for robot in self.world.robots.values():
+            outline_B = np.array(robot.kind.capabilities().footprint_m)
+            corners_B = np.column_stack([outline_B, np.zeros(len(outline_B))])
             X_WB = self.world.plant.EvalBodyPoseInWorld(self.context, robot.body)
             yield X_WB.multiply(corners_B.T).T[:, :2]
         yield from (p_W[:2] + HAND_OUTLINE_M for p_W in self._hands_W().values())
         yield from (np.array(place_W) + PERSON_OUTLINE_M for place_W in self.walkers.places_W())
 
     def _command_robots(self) -> None:
-        for spot in self._spots.values():
-            spot.control(self.now(), CONTROL_STEPS * TIME_STEP_S)
+        for robot in self._robots.values():
+            robot.control(self.now(), CONTROL_STEPS * TIME_STEP_S)
 
 
 class Simulation:
@@ -227,22 +222,26 @@ class Simulation:
         world: World,
         *,
         seed: int,
-        robot_names: Sequence[str] = ("Alice",),
+        robots: Mapping[str, str] = MappingProxyType({"Alice": "spot"}),
         record: bool = False,
         visuals: bool = True,
         charge: float = 1.0,
         locomotion: FloatingBaseLimits | None = None,
         extra_models: Sequence[LooseModel] = (),
-        start: Pose2D | None = None,
+        starts: Mapping[str, Pose2D] = MappingProxyType({}),
+        docks: Mapping[str, Pose2D] = MappingProxyType({}),
     ) -> None:
         """Build the plant of `world`; things and people stand where the seed puts them.
 
-        The first robot stands at `start`, by default the world's start pose, others a robot's length behind one
-        another. Batteries begin at `charge` (0 to 1). `extra_models` stand in the world though no map knows them;
-        `locomotion` limits what bears the robots. Raises WorldError when the things do not fit into the world, or
-        a person's route leads through something.
+        `robots` names the kind of each. They stand at their `starts`, one alone by default at the world's, and charge
+        at their `docks`, by default the world's. Batteries begin at `charge` (0 to 1). `extra_models` stand in the
+        world though no map knows them; `locomotion` limits what bears the robots. Raises WorldError when the things do
+        not fit into the world, or a person's route leads through something. Raises ValueError: a robot has no start.
         """
-        self.seed, self.world, self.start = seed, world, start or world.start
+        self.seed, self.world, self.starts = seed, world, {**_default_starts(world, robots), **starts}
+        if missing := robots.keys() - self.starts.keys():
+            raise ValueError(f"there is no start for {', '.join(sorted(missing))}")
+        own_docks = dict(docks) if world.dock is None else {name: docks.get(name, world.dock) for name in robots}
         things, people = place_objects(world, seed), place_people(world, seed)
         built = build_diagram(
             directives=world.directives_path,
@@ -251,7 +250,7 @@ class Simulation:
                 *(_person(each) for each in people),
                 *extra_models,
             ],
-            robot_names=robot_names,
+            robots=robots,
             doors=world.doors,
             visuals=visuals,
             locomotion=locomotion,
@@ -259,9 +258,9 @@ class Simulation:
         )
         self.engine = Engine(
             built,
-            _starts(self.start, robot_names),
+            {name: self.starts[name] for name in robots},
             seed=seed,
-            dock=world.dock,
+            docks=own_docks,
             charge=charge,
             routes={each.name: each.route for each in people if each.route is not None},
             receiving={each.name: each.receiving for each in people if each.receiving is not None},
@@ -274,7 +273,7 @@ class Simulation:
         self.referee = Referee(
             built.plant,
             [*things, *people],
-            robots=sorted(robot_names),
+            robots={name: body.kind for name, body in built.robots.items()},
             persons=[each.name for each in people],
             scenery=built.scenery,
         )
@@ -355,10 +354,10 @@ class Simulation:
 
     def hand_pose_at(self, robot_name: str, time_s: float) -> RigidTransform:
         """X_WH of a robot's hand as it was recorded at a time. Raises LookupError without a recording."""
-        plant, model = self.engine.world.plant, self.engine.world.robots[robot_name]
+        plant = self.engine.world.plant
         context = plant.CreateDefaultContext()
         plant.SetPositions(context, self._positions_at(time_s))
-        return plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(HAND_LINK, model.instance))
+        return plant.EvalBodyPoseInWorld(context, self.engine.world.robots[robot_name].hand)
 
     def _positions_at(self, time_s: float) -> FloatArray:
         if self.recorder is None:
@@ -391,9 +390,6 @@ def _person(placement: Placement) -> LooseModel:
     return replace(_loose(placement), fixed=not walks, slides=walks, receives=placement.receiving is not None)
 
 
-def _starts(start: Pose2D, robot_names: Sequence[str]) -> Mapping[str, Pose2D]:
-    """Start poses in a row, the first at `start` and each next one 1.5 m behind."""
-    behind = [start.transform() @ np.array([-1.5 * index, 0.0, 0.0]) for index in range(len(robot_names))]
-    return {
-        name: Pose2D(float(p_W[0]), float(p_W[1]), start.yaw_rad) for name, p_W in zip(robot_names, behind, strict=True)
-    }
+def _default_starts(world: World, robots: Mapping[str, str]) -> Mapping[str, Pose2D]:
+    """The world's start for a robot that is alone."""
+    return dict.fromkeys(robots, world.start) if len(robots) == 1 else {}

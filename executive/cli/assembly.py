@@ -46,7 +46,12 @@ def simulate(
     locomotion = (stack or default_stack()).locomotion
     try:
         return Simulation(
-            world, seed=seed, robot_names=(robot_name,), record=record, locomotion=locomotion, start=start
+            world,
+            seed=seed,
+            robots={robot_name: "spot"},
+            record=record,
+            locomotion=locomotion,
+            starts={} if start is None else {robot_name: start},
         )
     except WorldError as error:
         raise InputError(str(error)) from error
@@ -99,7 +104,7 @@ def run_entry(
         known = ", ".join(simulation.robots)
         raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", hint=f"known: {known}")
     scan_map, keepout_map = _grid(world.scan_map_path), _grid(world.keepout_map_path)
-    start = believed or (simulation.start if told else None)
+    start = believed or (simulation.starts[tree.robot_name] if told else None)
     try:
         localiser = stack.localiser.build(scan_map, start, surely=told and believed is None)
     except MapError as error:

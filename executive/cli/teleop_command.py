@@ -64,7 +64,7 @@ def teleop(
             refuse_blocked(opened, pose)
         simulation = simulate(opened, seed=seed, robot_name=robot, record=False, start=pose)
         driven, clock = simulation.robots[robot], simulation.clock
-        context = context_for(opened, driven, clock, simulation.start)
+        context = context_for(opened, driven, clock, simulation.starts[robot])
         stack.callback(driven.return_lease, context.lease)
         hands = Teleop(context)
         saving = _saving(hands, poses, opened.name)

@@ -14,14 +14,12 @@ from pydrake.systems.framework import Context
 from plant.diagram import WorldDiagram
 from plant.sensors.ray_shapes import ShapeKind, shape_row
 from plant.snapshot.values import State
-from plant.spot.capabilities import spot_capabilities
 from skills.robot import FloatArray
 
 LEAST_HEIGHT_M = 0.5
 STILL_M_S, MOVES_M_S = 0.03, 0.15
 BEYOND_OUTLINE_M = 0.05
 _AT_HAND_M = 0.5
-_GRIPPER_LINKS = ("arm_wr1", "arm_f1x")
 
 
 @dataclass(frozen=True)
@@ -40,14 +38,17 @@ class Offers:
         plant = world.plant
         self._plant, self._context, self._query = plant, context, plant.get_geometry_query_input_port()
         self._inspector = world.scene_graph.model_inspector()
-        self._outline_B = np.array(spot_capabilities().footprint_m)
+        self._robots = world.robots
         self._bodies = {name: robot.body for name, robot in world.robots.items()}
         self._links = {
-            name: [plant.GetBodyByName(link, robot.instance) for link in _GRIPPER_LINKS]
+            name: [plant.GetBodyByName(link, robot.instance) for link in robot.kind.gripper_links]
             for name, robot in world.robots.items()
         }
-        grip_x_m = 0.0 if (gripper := spot_capabilities().gripper) is None else gripper.grip_x_m
-        self._p_HT = np.array([grip_x_m, 0.0, 0.0])
+        grippers = {name: robot.kind.capabilities().gripper for name, robot in world.robots.items()}
+        self._p_HT = {
+            name: np.array([0.0 if gripper is None else gripper.grip_x_m, 0.0, 0.0])
+            for name, gripper in grippers.items()
+        }
         models = ((name, plant.get_body(plant.GetBodyIndices(model)[0])) for name, model in world.models.items())
         self.loose = {name: body for name, body in models if body.is_floating_base_body()}
         self._shapes = {
@@ -79,17 +80,16 @@ class Offers:
 
     def grip_W(self, robot: str) -> FloatArray:
         """Where a robot's fingers grip."""
-        return np.asarray(self._plant.EvalBodyPoseInWorld(self._context, self._links[robot][0]) @ self._p_HT)
+        return np.asarray(self._plant.EvalBodyPoseInWorld(self._context, self._links[robot][0]) @ self._p_HT[robot])
 
     def in_hand(self, offer: Offer) -> FloatArray:
         """Where an object is in the hand (3,), m."""
         X_WH = self._plant.EvalBodyPoseInWorld(self._context, self._links[offer.robot][0])
         return np.asarray(X_WH.inverse() @ self.place_W(offer))
 
-    def opening_rad(self, robot: str) -> float:
-        """How far a robot's gripper is open."""
-        joint = self._plant.GetJointByName("arm_f1x", self._links[robot][1].model_instance())
-        return -float(joint.GetOnePosition(self._context))
+    def opening(self, robot: str) -> float:
+        """How far a robot's gripper is open, in its own unit."""
+        return self._robots[robot].opening(self._context)
 
     def lowest_m(self, offer: Offer) -> float:
         """The height of the lowest point of an object and of the gripper that holds it."""
@@ -122,7 +122,8 @@ class Offers:
     def _before_outline(self, robot: str) -> bool:
         X_WB = self._plant.EvalBodyPoseInWorld(self._context, self._bodies[robot])
         p_BG = X_WB.inverse() @ self.grip_W(robot)
-        low, high = self._outline_B.min(axis=0), self._outline_B.max(axis=0)
+        outline_B = np.array(self._robots[robot].kind.capabilities().footprint_m)
+        low, high = outline_B.min(axis=0), outline_B.max(axis=0)
         return bool(np.any((p_BG[:2] < low - BEYOND_OUTLINE_M) | (p_BG[:2] > high + BEYOND_OUTLINE_M)))
 
     def _free_in(self, robot: str) -> str | None:

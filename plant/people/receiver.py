@@ -54,7 +54,7 @@ class Receiver:
         self._walks = not world.plant.IsAnchored(self._body)
         self.phase = Phase.IDLE
         self.offer: Offer | None = None
-        self._since_s, self._opening_rad = 0.0, 0.0
+        self._since_s, self._opening = 0.0, 0.0
         self._p_HO = np.zeros(3)
         self._home, self._X_WT = True, self._home_W()
 
@@ -92,11 +92,11 @@ class Receiver:
 
     def _grip(self, offer: Offer) -> None:
         """Note how the gripper has the object, against which it is seen to give way."""
-        self._opening_rad, self._p_HO = self._offers.opening_rad(offer.robot), self._offers.in_hand(offer)
+        self._opening, self._p_HO = self._offers.opening(offer.robot), self._offers.in_hand(offer)
 
     def _gives(self, offer: Offer, opens_rad: float = GIVES_RAD) -> bool:
         """Whether the gripper gives way: somebody who pulls feels it sooner."""
-        opened = self._offers.opening_rad(offer.robot) - self._opening_rad > opens_rad
+        opened = self._offers.opening(offer.robot) - self._opening > opens_rad
         return opened or float(np.linalg.norm(self._offers.in_hand(offer) - self._p_HO)) > GIVES_M
 
     def pull_W(self, now_s: float) -> FloatArray | None:
@@ -193,7 +193,7 @@ class Receiver:
             "phase": self.phase.value,
             "offer": taken,
             "since_s": self._since_s,
-            "opening_rad": self._opening_rad,
+            "opening": self._opening,
             "p_HO": self._p_HO.tolist(),
             "home": self._home,
             "X_WT": transform_state(self._X_WT),
@@ -202,7 +202,7 @@ class Receiver:
     def restore(self, state: State) -> None:
         """Go on from such a state. Raises KeyError: an object is not there."""
         self.phase, self._since_s, self._home = Phase(state["phase"]), state["since_s"], state["home"]
-        self._opening_rad, self._p_HO = state["opening_rad"], array_of(state["p_HO"])
+        self._opening, self._p_HO = state["opening"], array_of(state["p_HO"])
         self._X_WT = RigidTransform(np.array(state["X_WT"]))
         self.offer = None
         if state["offer"] is not None:

@@ -20,7 +20,6 @@ from plant.diagram import WorldDiagram
 from plant.people.paths import Ground
 from plant.people.walk import Leg, Walk
 from plant.snapshot.values import State
-from plant.spot.capabilities import spot_capabilities
 from plant.worlds.route import Route
 from plant.worlds.world import Point, WorldError
 from skills.robot import FloatArray
@@ -44,9 +43,9 @@ class Walkers:
     def __init__(self, world: WorldDiagram, context: Context, routes: Mapping[str, Route]) -> None:
         """`context` is the plant's. Raises WorldError: a waypoint is in something, or there is no way to it."""
         self._plant, self._context, self._routes = world.plant, context, dict(routes)
-        self._robots = [robot.body for robot in world.robots.values()]
-        self._outline_B = np.array(spot_capabilities().footprint_m)
-        self._reach_m = float(np.linalg.norm(self._outline_B, axis=1).max())
+        self._robots = [
+            (robot.body, np.array(robot.kind.capabilities().footprint_m)) for robot in world.robots.values()
+        ]
         self._instances = {name: world.models[name] for name in routes}
         inertia = SpatialInertia.SolidCylinderWithMass(BODY_KG, *BODY_M, np.array([0.0, 0.0, 1.0]))
         for instance in self._instances.values():
@@ -111,10 +110,11 @@ class Walkers:
 
     def _outlines_W(self, walk: Walk) -> Iterator[FloatArray]:
         """The outlines (K, 2) of the robots that somebody may be close to."""
-        for body in self._robots:
+        for body, outline_B in self._robots:
             X_WB = self._plant.EvalBodyPoseInWorld(self._context, body)
-            if math.dist(X_WB.translation()[:2], walk.place_W) < YIELD_M + self._reach_m:
-                corners_B = np.column_stack([self._outline_B, np.zeros(len(self._outline_B))])
+            reach_m = float(np.linalg.norm(outline_B, axis=1).max())
+            if math.dist(X_WB.translation()[:2], walk.place_W) < YIELD_M + reach_m:
+                corners_B = np.column_stack([outline_B, np.zeros(len(outline_B))])
                 yield X_WB.multiply(corners_B.T).T[:, :2]
 
     def _close_ahead(self, walk: Walk, outline_W: FloatArray) -> bool:

@@ -12,6 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, RigidBody
 
 if TYPE_CHECKING:
+    from plant.kinds import RobotKind
     from plant.worlds.placement import Placement
 
 
@@ -41,17 +42,16 @@ class Entity:
     label: str
 
 
-HAND_LINK, BASE_LINK = "arm_wr1", "body"
-_GRIPPER_LINKS, _TRUNK_LINKS = frozenset({"arm_wr1", "arm_f1x"}), frozenset({"body", "lidar"})
+BASE_LINK = "body"
 
 
-def _kind(link: str) -> Kind:
+def _kind(link: str, robot: RobotKind) -> Kind:
     """What a robot's link is."""
-    if link in _GRIPPER_LINKS:
+    if link in robot.gripper_links:
         return Kind.GRIPPER
-    if link.startswith("arm_"):
-        return Kind.ARM
-    return Kind.BODY if link in _TRUNK_LINKS else Kind.LEG
+    if link in robot.trunk_links:
+        return Kind.BODY
+    return Kind.LEG if link in robot.leg_links else Kind.ARM
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Entities:
     def of(
         plant: MultibodyPlant,
         placements: Iterable[Placement],
-        robots: Sequence[str],
+        robots: Mapping[str, RobotKind],
         persons: Sequence[str],
         scenery: Mapping[GeometryId, str],
     ) -> Entities:
@@ -92,9 +92,9 @@ class Entities:
                 entities[int(_first_body(plant, tray).index())] = Entity(Kind.TRAY, name, tray)
         for name in robots:
             for body in _bodies(plant, name):
-                kind = _kind(body.name())
+                kind = _kind(body.name(), robots[name])
                 entities[int(body.index())] = Entity(kind, name, f"{name}'s {kind.value} ({body.name()})")
-        bases = _links(plant, robots, BASE_LINK)
+        bases = _links(plant, dict.fromkeys(robots, BASE_LINK))
         for name in set(robots) - set(bases):
             raise ValueError(f"robot {name!r} has no link {BASE_LINK!r}")
         pieces = {name: plant.num_bodies() + number for number, name in enumerate(sorted({*scenery.values()}))}
@@ -106,7 +106,7 @@ class Entities:
             classes={placed.name: placed.class_name for placed in things},
             persons={name: _first_body(plant, name) for name in persons},
             bases=bases,
-            hands=_links(plant, robots, HAND_LINK),
+            hands=_links(plant, {name: kind.gripper_links[0] for name, kind in robots.items()}),
         )
 
 
@@ -139,6 +139,6 @@ def _first_body(plant: MultibodyPlant, instance_name: str) -> RigidBody:
     return _bodies(plant, instance_name)[0]
 
 
-def _links(plant: MultibodyPlant, robots: Iterable[str], link: str) -> dict[str, RigidBody]:
-    """A link of those robots that have it."""
-    return {name: body for name in robots for body in _bodies(plant, name) if body.name() == link}
+def _links(plant: MultibodyPlant, links: Mapping[str, str]) -> dict[str, RigidBody]:
+    """A link of each robot, of those that have it."""
+    return {name: body for name, link in links.items() for body in _bodies(plant, name) if body.name() == link}

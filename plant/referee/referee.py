@@ -23,6 +23,7 @@ from plant.snapshot.values import State, array_of
 from skills.robot import FloatArray
 
 if TYPE_CHECKING:
+    from plant.kinds import RobotKind
     from plant.worlds.placement import Placement
 
 PATH_STEP_M = 0.02
@@ -37,14 +38,14 @@ class Referee:
         plant: MultibodyPlant,
         placements: Iterable[Placement],
         *,
-        robots: Sequence[str],
+        robots: Mapping[str, RobotKind],
         persons: Sequence[str] = (),
         scenery: Mapping[GeometryId, str] = MappingProxyType({}),
     ) -> None:
         """Build for a finalized plant; `scenery` names the pieces of furniture whose shapes are the world body's.
 
-        `placements` are the loose objects; those named in `persons` are people. `robots` are the model instances of the
-        robots. Raises ValueError that names what the plant does not have.
+        `placements` are the loose objects; those named in `persons` are people. `robots` has the kind of each
+        robot by the name of its model instance. Raises ValueError that names what the plant does not have.
         """
         self._plant, self._geometry = plant, plant.get_geometry_query_input_port()
         self._entities = Entities.of(plant, placements, robots, persons, scenery)

@@ -8,9 +8,10 @@ import numpy as np
 from pydrake.geometry import CollisionFilterDeclaration, CollisionFilterManager, GeometryId, GeometrySet
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RevoluteJoint
+from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RevoluteJoint, RigidBody
 from pydrake.systems.framework import Context
 
+from plant.kinds import RobotKind
 from plant.locomotion.floating_base import FloatingBase, FloatingBaseLimits
 from plant.models.spot.description import (
     GRIPPER_JOINT,
@@ -44,13 +45,13 @@ class SpotModel:
         plant: MultibodyPlant,
         name: str,
         *,
+        kind: RobotKind,
         visuals: bool,
         carried: bool = True,
         limits: FloatingBaseLimits | None = None,
     ) -> None:
         """Add the robot to `plant` (before Finalize); a robot that is not carried keeps its free base."""
-        self.plant = plant
-        self.name = name
+        self.plant, self.name, self.kind = plant, name, kind
         parser = Parser(plant)
         parser.SetAutoRenaming(True)
         meshes = visuals_folder() if visuals else None
@@ -62,6 +63,15 @@ class SpotModel:
         self.floating_base = FloatingBase(plant, name, self.body, limits) if carried else None
         for joint, (p, d) in self._gains().items():
             plant.GetJointActuatorByName(joint, self.instance).set_controller_gains(PdControllerGains(p=p, d=d))
+
+    @property
+    def hand(self) -> RigidBody:
+        """The last link of the arm."""
+        return self.plant.GetBodyByName(self.kind.gripper_links[0], self.instance)
+
+    def opening(self, context: Context) -> float:
+        """The gripper's angle (rad), 0 closed."""
+        return -float(self._joint(GRIPPER_JOINT).get_angle(context))
 
     def _gains(self) -> Mapping[str, tuple[float, float]]:
         legs = {joint: _LEG_GAINS for leg in LEGS for joint in leg_joint_names(leg)}

@@ -8,12 +8,12 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from pydrake.geometry import FrameId, SceneGraph
+from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context
 
+from plant.kinds import SensorOptions
 from plant.models.spot.description import CAMERAS, arm_joint_names, spot_facts
-from plant.scene import RENDERER, Scene
+from plant.scene import RENDERER
 from plant.sensors.battery import BatteryModel, BatterySpec
 from plant.sensors.camera import Camera
 from plant.sensors.camera_spec import load_cameras
@@ -24,10 +24,10 @@ from plant.sensors.lidar import Lidar
 from plant.sensors.noisy import NoisySensor
 from plant.sensors.odometry import OdometryModel
 from plant.snapshot.values import State
+from plant.spot.kind import HAND_LINK
 from plant.spot.model import SpotModel
-from skills.robot import Battery, FloatArray, FrameTree, Gripper, Image, Imu, Joints, Odometry, Pose2D, Scan
+from skills.robot import Battery, FloatArray, FrameTree, Gripper, Image, Imu, Joints, Odometry, Scan
 
-HAND_LINK = "arm_wr1"
 _FRAME_OF_LINK = {"body": "body", HAND_LINK: "hand"}
 _LIDAR_PERIOD_S = 0.1
 _GRIPPER_MOVES_RAD_S = 0.05
@@ -38,43 +38,28 @@ _STILL_M_S = 0.02
 class SpotSensors:
     """All sensors of one Spot. Pictures are taken when asked for; `update` takes the readings, which are attributes."""
 
-    def __init__(
-        self,
-        model: SpotModel,
-        scene_graph: SceneGraph,
-        context: Context,
-        *,
-        seed: int,
-        scene: Scene | None = None,
-        dock: Pose2D | None = None,
-        charge: float = 1.0,
-        work: Counter[str] | None = None,
-    ) -> None:
-        """`context` is the plant's. The seed and the robot's name give the noise. Without a scene, cameras are blind.
-
-        The battery begins at `charge` (0 to 1) and charges while the body stands still at `dock`. `work` counts rays
-        cast and pictures rendered.
-        """
-        self._model, self._scene_graph, self._dock = model, scene_graph, dock
-        self._scene, self._context = scene, context
+    def __init__(self, model: SpotModel, options: SensorOptions) -> None:
+        """`options.context` is the plant's."""
+        self._model, self._scene_graph, self._dock = model, options.scene_graph, options.dock
+        self._scene, self._context = options.scene, options.context
         self._index = model.index()
         self._kinematics = model.plant.CreateDefaultContext()
-        rngs = _generators(seed, model.name)
+        rngs = _generators(options.seed, model.name)
         body = spot_facts()["capabilities"]
         self._odometry_model = OdometryModel(next(rngs))
         self._imu_model = ImuModel(next(rngs))
         self._joint_model = JointModel(next(rngs), self._index.names)
         self._gripper_model = GripperModel(next(rngs))
-        self._battery_model = BatteryModel(next(rngs), charge, BatterySpec(runtime_s=body["runtime"]))
-        self._lidar = self._make_lidar(next(rngs), work)
+        self._battery_model = BatteryModel(next(rngs), options.charge, BatterySpec(runtime_s=body["runtime"]))
+        self._lidar = self._make_lidar(next(rngs), options.work)
         self._cameras = {
-            name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER, work=work)
+            name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER, work=options.work)
             for name, spec in load_cameras(CAMERAS).items()
         }
         self.scan: Scan | None = None
         self.update(0.0)
 
-    def _make_lidar(self, rng: np.random.Generator, work: Counter[str] | None) -> Lidar:
+    def _make_lidar(self, rng: np.random.Generator, work: Counter[str]) -> Lidar:
         plant, X_BL = self._model.plant, RigidTransform(spot_facts()["lidar"]["xyz"])
         inspector = self._scene_graph.model_inspector()
         return Lidar(plant, inspector, self._model.body, X_BL, rng, unseen=self._model.instances(), work=work)

@@ -98,7 +98,7 @@ class Driver:
     def __init__(
         self, world: World, stack: RobotStack, maps: tuple[GridMap, GridMap], *, seed: int, start: Pose2D | None = None
     ) -> None:
-        self.simulation = Simulation(world, seed=seed, visuals=False, start=start, robot_names=(ROBOT,))
+        self.simulation = Simulation(world, seed=seed, visuals=False, starts={ROBOT: start}, robots={ROBOT: "spot"})
         self.planner, self.controller = Clocked(stack.planner, "problem"), Clocked(stack.controller, "build")
         options = stack.skills.get("navigate") or NavigateOptions()
         blind = replace(options, low_obstacles=WatchOptions(period_s=86_400.0))
@@ -111,7 +111,7 @@ class Driver:
             robot.take_lease("benchmark"),
             self.simulation.clock,
             LockStepWorker(self.simulation.clock),
-            stack.localiser.build(maps[0], self.simulation.start, surely=True),
+            stack.localiser.build(maps[0], self.simulation.starts[ROBOT], surely=True),
             stack.costmap.build(maps[1]),
             lambda topic, message: None,
             seed=seed,

@@ -120,7 +120,7 @@ def in_flat(seed: int, number: int) -> Iterator[Asked]:
     built = build_diagram(
         directives=world.directives_path,
         models=loose,
-        robot_names=("Alice",),
+        robots={"Alice": "spot"},
         visuals=False,
         renderer_parameters=render_parameters(),
     )

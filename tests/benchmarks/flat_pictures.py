@@ -121,7 +121,7 @@ def furnished(rng: np.random.Generator, world: World, free: GridMap, supply: Sup
     built = build_diagram(
         directives=world.directives_path,
         models=loose,
-        robot_names=(),
+        robots={},
         visuals=False,
         renderer_parameters=render_parameters(),
     )

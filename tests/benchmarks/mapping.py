@@ -51,7 +51,7 @@ class Gliding:
         self._lidar = Lidar(engine.world.plant, inspector, self._model.body, X_BL, rng, unseen=self._model.instances())
         self._odometry = OdometryModel(rng)
         self._height = spot_facts()["capabilities"]["standing_height"]
-        self.true, self._velocity, self._until_s, self.now_s = simulation.start, np.zeros(3), 0.0, 0.0
+        self.true, self._velocity, self._until_s, self.now_s = simulation.starts["Alice"], np.zeros(3), 0.0, 0.0
         self.capabilities, self.joints, self.gripper = self._robot.capabilities, self._robot.joints, self._robot.gripper
         self._sense()
 

@@ -21,7 +21,7 @@ from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from plant.diagram import LooseModel
 from plant.simulation import Simulation
-from plant.spot.sensing import HAND_LINK
+from plant.spot.kind import HAND_LINK
 from skills.faults.faulty_robot import with_faults
 
 FETCH = (
@@ -51,7 +51,7 @@ class FlatMission:
         self.tree = compile_mission(
             Mission("m", DEFAULT_WORLD, "Alice", tuple(steps)), knowledge=self.knowledge, registry=built_in_skills()
         )
-        self.simulation = Simulation(self.world, seed=seed, robot_names=("Alice",), visuals=False, **plant)
+        self.simulation = Simulation(self.world, seed=seed, robots={"Alice": "spot"}, visuals=False, **plant)
         self.entry = run_entry(self.simulation, self.world, self.tree)
         self.transitions: list[dict[str, Any]] = []
         self.seed = seed

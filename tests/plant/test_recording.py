@@ -8,7 +8,7 @@ from skills.robot import Pose2D
 
 @pytest.fixture
 def engine():
-    world = build_diagram(directives=None, models=[], robot_names=["Alice"], visuals=False, render=False)
+    world = build_diagram(directives=None, models=[], robots={"Alice": "spot"}, visuals=False, render=False)
     return Engine(world, {"Alice": Pose2D(0, 0, 0)})
 
 

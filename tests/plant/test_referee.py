@@ -14,6 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from plant.referee import GoalCondition, GoalKind, Referee, Region
 from plant.referee.entities import Kind
+from plant.spot.kind import SPOT
 
 FRICTION = CoulombFriction(0.8, 0.8)
 HALF = 0.03  # half a side of the objects, which are cubes
@@ -65,7 +66,7 @@ class Stage:
         self.root = self.diagram.CreateDefaultContext()
         self.context = self.plant.GetMyContextFromRoot(self.root)
         self.placements = [Placement("coke", "coke"), Placement("coke_2", "coke"), Placement("hammer", "hammer")]
-        self.referee = Referee(self.plant, self.placements, robots=["alice"], persons=["robin"])
+        self.referee = Referee(self.plant, self.placements, robots={"alice": SPOT}, persons=["robin"])
         self.time = 0.0
         for i, link in enumerate(self.LINKS):
             self.put(link, (-3, -3 - i, 0.6))
@@ -492,15 +493,15 @@ def test_path_is_kept():
 def test_unknown_robot_and_object_are_refused_by_name():
     stage = Stage()
     with pytest.raises(ValueError, match="'eve'"):
-        Referee(stage.plant, stage.placements, robots=["eve"])
+        Referee(stage.plant, stage.placements, robots={"eve": SPOT})
     with pytest.raises(ValueError, match="'cup'"):
-        Referee(stage.plant, [Placement("cup", "cup")], robots=["alice"])
+        Referee(stage.plant, [Placement("cup", "cup")], robots={"alice": SPOT})
 
 
 def test_judging_before_looking_is_refused():
     stage = Stage()
     with pytest.raises(ValueError, match="not observed"):
-        Referee(stage.plant, stage.placements, robots=["alice"]).judge([])
+        Referee(stage.plant, stage.placements, robots={"alice": SPOT}).judge([])
 
 
 def test_impossible_region_is_refused():

@@ -12,6 +12,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from plant.referee import GoalCondition, GoalKind, Referee, Region
+from plant.spot.kind import SPOT
 
 FRICTION = CoulombFriction(0.9, 0.9)
 TABLE = Region("the table", ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)), 0.7, 1.0)
@@ -57,7 +58,7 @@ class Press:
         self.context = plant.GetMyContextFromRoot(self.simulator.get_mutable_context())
         self.desired = plant.get_desired_state_input_port(alice)
         plant.SetPositions(self.context, alice, [0.0, 0.12])
-        self.referee = Referee(plant, [Placement("coke", "coke")], robots=["alice"])
+        self.referee = Referee(plant, [Placement("coke", "coke")], robots={"alice": SPOT})
 
     def run(self, lift_m, jaw_m, seconds):
         """Move lift and jaw towards positions; the referee looks on at 20 Hz."""

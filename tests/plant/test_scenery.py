@@ -11,6 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 from plant.diagram import build_diagram, parser_of
 from plant.referee import Referee
 from plant.simulation import Engine
+from plant.spot.kind import SPOT
 from plant.worlds.world import load_world
 from skills.robot import Pose2D
 
@@ -52,7 +53,7 @@ def shapes(plant, scene_graph):
 
 def test_every_shape_of_the_flat_stands_where_the_directives_put_it():
     world = load_world("flat")
-    built = build_diagram(directives=world.directives_path, models=[], robot_names=[], render=False)
+    built = build_diagram(directives=world.directives_path, models=[], robots={}, render=False)
     plant, scene_graph = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
     ProcessModelDirectives(LoadModelDirectives(world.directives_path), parser_of(plant))
     plant.Finalize()
@@ -62,7 +63,7 @@ def test_every_shape_of_the_flat_stands_where_the_directives_put_it():
 
 
 def test_a_model_with_a_part_that_moves_stays_a_model(directives):
-    built = build_diagram(directives=directives, models=[], robot_names=[], render=False)
+    built = build_diagram(directives=directives, models=[], robots={}, render=False)
     assert {*built.scenery.values()} == {"north_wall"}
     hinge = built.plant.GetJointByName("hinge", built.plant.GetModelInstanceByName("cupboard"))
     assert built.plant.num_positions() == hinge.num_positions() == 1
@@ -72,9 +73,9 @@ def test_a_model_with_a_part_that_moves_stays_a_model(directives):
 
 
 def test_a_bump_into_scenery_names_the_piece(directives):
-    built = build_diagram(directives=directives, models=[], robot_names=["Alice"], visuals=False, render=False)
+    built = build_diagram(directives=directives, models=[], robots={"Alice": "spot"}, visuals=False, render=False)
     engine = Engine(built, {"Alice": Pose2D(0.0, 0.0, 0.0)})
-    referee = Referee(built.plant, [], robots=["Alice"], scenery=built.scenery)
+    referee = Referee(built.plant, [], robots={"Alice": SPOT}, scenery=built.scenery)
     engine.observe(lambda now_s: referee.observe(engine.context, now_s), every=5)
     robot = engine.robots["Alice"]
     robot.drive(0.8, 0.0, 0.0, until_s=3.0, lease=robot.acquire_lease("test"))

@@ -41,7 +41,7 @@ def stage(tmp_path):
         built = build_diagram(
             directives=tmp_path / "world.dmd.yaml",
             models=models,
-            robot_names=[*(robots or {})],
+            robots=dict.fromkeys(robots or {}, "spot"),
             visuals=False,
             render=False,
         )

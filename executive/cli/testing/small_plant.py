@@ -31,7 +31,7 @@ class SmallPlant:
 def make_small_plant(folder: Path, *, seed: int = 1, can: bool = True) -> SmallPlant:
     """Write the world into `folder` and put the robot into it, at (-0.5, 0) and 1.7 m before the table."""
     world = load_world(write_small_room(folder, can=can))
-    simulation = Simulation(world, seed=seed, robot_names=(ROBOT_NAME,), visuals=False)
+    simulation = Simulation(world, seed=seed, robots={ROBOT_NAME: "spot"}, visuals=False)
     bench = SkillBench(
         simulation.robots[ROBOT_NAME],
         simulation.clock,

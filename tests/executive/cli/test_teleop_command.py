@@ -111,7 +111,7 @@ def test_the_plants_robot_is_driven_by_hand():
     world = open_world("flat")
     simulation = simulate(world, seed=1, robot_name="Alice", record=False, start=Pose2D(5.2, 4.5, math.pi))
     robot = simulation.robots["Alice"]
-    context = context_for(world, robot, simulation.clock, simulation.start)
+    context = context_for(world, robot, simulation.clock, simulation.starts["Alice"])
     hands, model = Teleop(context), arm_model(robot.capabilities())
     speeds, rates = [], []
 
@@ -153,4 +153,4 @@ def test_the_plants_robot_is_driven_by_hand():
     assert max(rates) < OPTIONS.arm.joint_rad_s * 1.25
 
     with pytest.raises(InputError, match="the lease is held by 'teleop'"):
-        context_for(world, robot, simulation.clock, simulation.start)
+        context_for(world, robot, simulation.clock, simulation.starts["Alice"])

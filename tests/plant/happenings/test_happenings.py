@@ -17,7 +17,7 @@ DOOR = DoorRule(name="door", at=AT, yaw=math.pi, width=0.9, closes=1.0, opens=5.
 
 
 def simulated(*, doors=(DOOR,), moves=(), start=None, seed=1):
-    return Simulation(FLAT.with_events(doors, moves), seed=seed, visuals=False, start=start)
+    return Simulation(FLAT.with_events(doors, moves), seed=seed, visuals=False, starts={} if start is None else {"Alice": start})
 
 
 def panel_W(simulation):
@@ -127,7 +127,7 @@ def test_doors_and_moves_go_on_after_a_restart(tmp_path):
 def test_somebody_who_stands_sets_off_from_there():
     world = FLAT.with_walks({"Robin": RouteRule(waypoints=((9.5, 3.0),), start=1.0)})
     (stands,) = place_people(FLAT, seed=1)
-    simulation = Simulation(world, seed=1, visuals=False, start=Pose2D(4.0, 4.5, 0.0))
+    simulation = Simulation(world, seed=1, visuals=False, starts={"Alice": Pose2D(4.0, 4.5, 0.0)})
     ((x, y),) = simulation.engine.walkers.places_W()
     assert (x, y) == pytest.approx(tuple(stands.X_WO.translation()[:2]))
     simulation.clock.advance(4.0)

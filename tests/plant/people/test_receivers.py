@@ -12,6 +12,7 @@ from plant.models.catalogue import load_catalogue
 from plant.people.receiver import Phase
 from plant.referee import Referee
 from plant.simulation import Engine
+from plant.spot.kind import SPOT
 from plant.worlds.placement import Placement, Receiving
 from plant.worlds.route import Route, Stop
 from skills.robot import ArmTrajectory, Pose2D
@@ -43,7 +44,7 @@ class Hall:
             LooseModel("coke", CAN.path(), RigidTransform([-2.0, 0.0, CAN.rest_height_m])),
         ]
         self.world = build_diagram(
-            directives=folder / "world.dmd.yaml", models=models, robot_names=["Alice"], visuals=False, render=False
+            directives=folder / "world.dmd.yaml", models=models, robots={"Alice": "spot"}, visuals=False, render=False
         )
         self.engine = Engine(
             self.world,
@@ -53,7 +54,7 @@ class Hall:
         )
         placed = Placement("coke", "coke", CAN, RigidTransform())
         self.referee = Referee(
-            self.world.plant, [placed], robots=["Alice"], persons=["Kim"], scenery=self.world.scenery
+            self.world.plant, [placed], robots={"Alice": SPOT}, persons=["Kim"], scenery=self.world.scenery
         )
         self.engine.observe(lambda now_s: self.referee.observe(self.engine.context, now_s), every=4)
         self.robot = self.engine.robots["Alice"]

@@ -10,6 +10,7 @@ from plant.diagram import LooseModel, build_diagram
 from plant.models.catalogue import load_catalogue
 from plant.referee import Referee
 from plant.simulation import Engine
+from plant.spot.kind import SPOT
 from plant.worlds.route import Route, Stop
 from plant.worlds.world import WorldError
 from skills.robot import Pose2D
@@ -42,10 +43,12 @@ class Hall:
         (x, y), models = route.stops[0].at_W, []
         models.append(LooseModel("Kim", PERSON, RigidTransform([x, y, 0.0]), slides=True))
         self.world = build_diagram(
-            directives=folder / "world.dmd.yaml", models=models, robot_names=["Alice"], visuals=False, render=False
+            directives=folder / "world.dmd.yaml", models=models, robots={"Alice": "spot"}, visuals=False, render=False
         )
         self.engine = Engine(self.world, {"Alice": robot}, routes={"Kim": route})
-        self.referee = Referee(self.world.plant, [], robots=["Alice"], persons=["Kim"], scenery=self.world.scenery)
+        self.referee = Referee(
+            self.world.plant, [], robots={"Alice": SPOT}, persons=["Kim"], scenery=self.world.scenery
+        )
         self.engine.observe(lambda now_s: self.referee.observe(self.engine.context, now_s), every=4)
 
     @property

@@ -11,7 +11,7 @@ from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
 
 @pytest.fixture
 def engine():
-    world = build_diagram(directives=None, models=[], robot_names=["Alice"], visuals=False, render=False)
+    world = build_diagram(directives=None, models=[], robots={"Alice": "spot"}, visuals=False, render=False)
     return Engine(world, {"Alice": Pose2D(0.5, 0.2, 0.0)})
 
 
@@ -175,7 +175,7 @@ def test_efforts_of_joints_are_those_that_the_solver_applies(monkeypatch):
             "plant.diagram.MultibodyPlantConfig",
             lambda sampled=sampled, **given: MultibodyPlantConfig(**{**given, "use_sampled_output_ports": sampled}),
         )
-        world = build_diagram(directives=None, models=[], robot_names=["Alice"], visuals=False, render=False)
+        world = build_diagram(directives=None, models=[], robots={"Alice": "spot"}, visuals=False, render=False)
         engine = Engine(world, {"Alice": Pose2D(0.0, 0.0, 0.0)})
         spot, model = engine.robots["Alice"], world.robots["Alice"]
         spot.drive(0.4, 0.0, 0.3, until_s=2.0, lease=spot.acquire_lease("test"))

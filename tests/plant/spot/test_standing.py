@@ -19,7 +19,7 @@ def free_spot(tmp_path):
     path.write_text(FLOOR)
     ground = LooseModel("ground", path, RigidTransform([0, 0, -0.1]), fixed=True)
     world = build_diagram(
-        directives=None, models=[ground], robot_names=["Alice"], carried=False, visuals=False, render=False
+        directives=None, models=[ground], robots={"Alice": "spot"}, carried=False, visuals=False, render=False
     )
     return Engine(world, {"Alice": Pose2D(0, 0, 0)})
 

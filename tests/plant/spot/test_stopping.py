@@ -12,7 +12,7 @@ STILL_S = 0.2
 
 @pytest.fixture
 def engine():
-    world = build_diagram(directives=None, models=[], robot_names=["Alice"], visuals=False, render=False)
+    world = build_diagram(directives=None, models=[], robots={"Alice": "spot"}, visuals=False, render=False)
     engine = Engine(world, {"Alice": Pose2D(0.5, 0.2, 0.0)})
     engine.advance(0.2)
     return engine

@@ -13,7 +13,7 @@ SETTLE_S = 0.05
 
 @pytest.fixture
 def engine():
-    world = build_diagram(directives=None, models=[], robot_names=["Alice"], visuals=False, render=False)
+    world = build_diagram(directives=None, models=[], robots={"Alice": "spot"}, visuals=False, render=False)
     return Engine(world, {"Alice": Pose2D(0, 0, 0)})
 
 

@@ -1,0 +1,126 @@
+"""The kinds of robots that a plant can hold, each registered as an entry point of the group `errand.robots`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Protocol
+
+from pydrake.geometry import CollisionFilterManager, GeometrySet, SceneGraph
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
+from pydrake.systems.framework import Context
+
+from plant.locomotion.floating_base import FloatingBaseLimits
+from plant.scene import Scene
+from plant.snapshot.values import State
+from skills.robot import Capabilities, Pose2D, Robot
+
+GROUP = "errand.robots"
+
+
+class RobotBody(Protocol):
+    """One robot's bodies and joints in a plant.
+
+    `body` has the protocol's body frame B, `hand` its hand frame H.
+    """
+
+    plant: MultibodyPlant
+    name: str
+    kind: RobotKind
+    instance: ModelInstanceIndex
+    body: RigidBody
+
+    @property
+    def hand(self) -> RigidBody:
+        """The body of the hand frame."""
+
+    def instances(self) -> tuple[ModelInstanceIndex, ...]:
+        """The model instances that make up this robot."""
+
+    def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
+        """Let links of this robot pass each other, and what never touches the floor pass it."""
+
+    def place(self, context: Context, pose: Pose2D) -> None:
+        """Set the robot standing at a pose (world frame) with its arm stowed."""
+
+    def opening(self, context: Context) -> float:
+        """How far the gripper is open, in the unit of `set_gripper`."""
+
+
+class PlantRobot(Robot, Protocol):
+    """A simulated robot: the protocol, and what the simulation calls in turn."""
+
+    def control(self, now_s: float, dt_s: float) -> None:
+        """Command all servos for the next dt_s of simulated time."""
+
+    def sense(self, now_s: float) -> None:
+        """Take new sensor readings."""
+
+    def state(self) -> State:
+        """What the robot itself keeps."""
+
+    def restore(self, state: State, now_s: float) -> None:
+        """Power up in such a state."""
+
+
+@dataclass(frozen=True)
+class BodyOptions:
+    """How a robot is put into a plant: with meshes where they are installed, borne by a floating base within limits."""
+
+    visuals: bool = True
+    carried: bool = True
+    locomotion: FloatingBaseLimits | None = None
+
+
+@dataclass(frozen=True)
+class SensorOptions:
+    """What the sensors of a robot need.
+
+    The seed and the robot's name give the noise; without a scene, cameras are blind.
+    The battery begins at `charge` (0 to 1) and charges while the body stands still at `dock`. `work` counts rays cast
+    and pictures rendered.
+    """
+
+    scene_graph: SceneGraph
+    context: Context
+    seed: int = 0
+    scene: Scene | None = None
+    dock: Pose2D | None = None
+    charge: float = 1.0
+    work: Counter[str] = field(default_factory=Counter)
+
+
+@dataclass(frozen=True)
+class RobotKind:
+    """A kind of robot: what it can do, how it is put into a plant (before Finalize), and what drives it there.
+
+    `gripper_links` are the hand and the fingers; `trunk_links` and `leg_links` those of the body and of legs or wheels:
+    all others are the arm's. `facts` is the file of its numbers, `stack` that of the stack that suits it
+    (None: the default stack).
+    """
+
+    name: str
+    gripper_links: tuple[str, ...]
+    trunk_links: tuple[str, ...]
+    leg_links: tuple[str, ...]
+    facts: Path
+    capabilities: Callable[[], Capabilities]
+    add: Callable[[MultibodyPlant, str, BodyOptions], RobotBody]
+    drive: Callable[[RobotBody, SensorOptions], PlantRobot]
+    stack: Path | None = None
+
+
+@cache
+def robot_kinds() -> Mapping[str, RobotKind]:
+    """The kinds that are installed, by name. The modules of each are loaded when it is first used."""
+    return {entry.name: entry.load() for entry in sorted(entry_points(group=GROUP))}
+
+
+def robot_kind(name: str) -> RobotKind:
+    """A kind by its name. Raises KeyError: it is not installed."""
+    return robot_kinds()[name]

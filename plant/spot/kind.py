@@ -1,0 +1,40 @@
+"""Spot as a kind of robot."""
+
+from __future__ import annotations
+
+from pydrake.multibody.plant import MultibodyPlant
+
+from plant.kinds import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
+from plant.models.spot.description import FACTS, LEGS
+from plant.spot.capabilities import spot_capabilities
+
+HAND_LINK, FINGER_LINK = "arm_wr1", "arm_f1x"
+
+
+def _add(plant: MultibodyPlant, name: str, options: BodyOptions) -> RobotBody:
+    from plant.spot.model import SpotModel
+
+    return SpotModel(
+        plant, name, kind=SPOT, visuals=options.visuals, carried=options.carried, limits=options.locomotion
+    )
+
+
+def _drive(body: RobotBody, options: SensorOptions) -> PlantRobot:
+    from plant.spot.model import SpotModel
+    from plant.spot.robot import SpotRobot
+    from plant.spot.sensing import SpotSensors
+
+    assert isinstance(body, SpotModel)
+    return SpotRobot(body, SpotSensors(body, options), options.context)
+
+
+SPOT = RobotKind(
+    name="spot",
+    gripper_links=(HAND_LINK, FINGER_LINK),
+    trunk_links=("body", "lidar"),
+    leg_links=tuple(f"{leg}_{part}" for leg in LEGS for part in ("hip", "uleg", "lleg")),
+    facts=FACTS,
+    capabilities=spot_capabilities,
+    add=_add,
+    drive=_drive,
+)

@@ -168,5 +168,5 @@ def _told(hands: Teleop) -> dict[str, Any]:
         "note": hands.note,
         "base": [pose.base.x_m, pose.base.y_m, pose.base.yaw_rad],
         "joints_rad": list(pose.joints_rad),
-        "opening_rad": pose.opening_rad,
+        "opening": pose.opening,
     }

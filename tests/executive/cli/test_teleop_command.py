@@ -74,7 +74,7 @@ def test_a_pose_is_never_overwritten(tmp_path):
     path = save_pose(tmp_path, "look", POSE, world="flat")
     before = path.read_text()
     with pytest.raises(InputError, match="there is a pose of this name"):
-        save_pose(tmp_path, "look", replace(POSE, opening_rad=0.0), world="flat")
+        save_pose(tmp_path, "look", replace(POSE, opening=0.0), world="flat")
     assert path.read_text() == before
 
 
@@ -146,8 +146,8 @@ def test_the_plants_robot_is_driven_by_hand():
     assert at_rest()
     turned = (before.rotation().inverse() @ hand().rotation()).matrix()
     assert np.abs(RollPitchYaw(turned).vector()).max() < 0.1
-    hold({"open": 1.0}, lambda: robot.gripper().opening_rad > 0.5)
-    hold({"open": -1.0}, lambda: robot.gripper().opening_rad < 0.05)
+    hold({"open": 1.0}, lambda: robot.gripper().opening > 0.5)
+    hold({"open": -1.0}, lambda: robot.gripper().opening < 0.05)
     most = np.max(speeds, axis=0)
     assert most[0] < OPTIONS.base.max_speed_m_s * 1.1
     assert max(rates) < OPTIONS.arm.joint_rad_s * 1.25

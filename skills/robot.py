@@ -5,8 +5,9 @@ verbs return the latest immutable stamped snapshot and never block, except `imag
 
 Frames: `odom` (O) is fixed to the floor where the robot woke up and drifts against the world (W); `body` (B) is
 x forward, y left, z up at the centre of the hips, or of a wheeled base's axle and riding on its torso; `hand` (H) is
-x along the fingers, z along their closing; `head` (on a robot with one) turns with it; `<source>_camera` (C) is z
-forward, x right, y down; `lidar` (L). `X_AB` is the pose of frame B in frame A. SI units throughout.
+the last arm link, x along the fingers, z along their closing; `head` (on a robot with one) turns with it;
+`<source>_camera` (C) is z forward, x right, y down; `lidar` (L). `X_AB` is the pose of frame B in frame A. SI units
+throughout.
 """
 
 from __future__ import annotations
@@ -68,9 +69,8 @@ InverseKinematics = Callable[["RigidTransform"], Sequence[FloatArray]]
 class ArmCapabilities:
     """The arm: joint names from the shoulder on, the furthest reach from the first joint (m), what it lifts (kg).
 
-    Joints that turn without end are `continuous` in the description. X_LH is the hand's frame in that of the last arm
-    link, the same where it is None. `inverse` solves its inverse kinematics; None for the families whose closed form
-    `skills.arm.kinematics` reads from the description.
+    Joints that turn without end are `continuous` in the description. `inverse` solves its inverse kinematics; None for
+    the families whose closed form `skills.arm.kinematics` reads from the description.
     """
 
     joint_names: tuple[str, ...]
@@ -78,7 +78,6 @@ class ArmCapabilities:
     stowed_rad: tuple[float, ...]
     max_payload_kg: float
     inverse: InverseKinematics | None = None
-    X_LH: RigidTransform | None = None
 
 
 class GripperKind(enum.Enum):

@@ -27,7 +27,7 @@ from skills.robot import Pose2D
 
 FINGER_GAIN_N_M = 2e4
 _GAINS = {
-    **dict.fromkeys(WHEELS, (60.0, 12.0)),
+    **dict.fromkeys(WHEELS, (20.0, 15.0)),
     LIFT_JOINT: (4e4, 3e3),
     **dict.fromkeys(HEAD_JOINTS, (20.0, 1.5)),
     "shoulder_pan": (900.0, 45.0),

@@ -10,6 +10,9 @@ import numpy as np
 from plant.snapshot.values import State
 from skills.robot import FloatArray, Pose2D, quantities
 
+_MEAN_AHEAD = 0.75
+"""Of the way of a control period: where the two steps of the plant in it end, in the mean."""
+
 
 @dataclass(frozen=True)
 class WheelLimits:
@@ -52,7 +55,7 @@ class WheelServos:
         """The wheels (2,) stand at `now_rad`."""
         self._axle, self._limits = axle, limits or WheelLimits()
         self._speed = self._turn_rate = 0.0
-        self.goal_rad, self.rate_rad_s = now_rad.copy(), np.zeros(2)
+        self.goal_rad, self.rate_rad_s, self._due_rad = now_rad.copy(), np.zeros(2), now_rad.copy()
 
     def follow(self, wanted: tuple[float, float], now_rad: FloatArray, dt_s: float, *, stopping: bool) -> None:
         """Set the wheels for the next dt_s: ramp to a speed (m/s) and a turn rate (rad/s), faster when stopping."""
@@ -62,17 +65,18 @@ class WheelServos:
         self._speed += _cut(_cut(wanted[0], limits.speed_m_s) - self._speed, most * dt_s)
         self._turn_rate += _cut(_cut(wanted[1], limits.turn_rate_rad_s) - self._turn_rate, turn * dt_s)
         self.rate_rad_s = self._axle.rates(self._speed, self._turn_rate)
-        ahead_rad = self.goal_rad + self.rate_rad_s * dt_s - now_rad
-        self.goal_rad = now_rad + np.clip(ahead_rad, -limits.lead_rad, limits.lead_rad)
+        self._due_rad = now_rad + np.clip(self._due_rad - now_rad, -limits.lead_rad, limits.lead_rad)
+        self.goal_rad = self._due_rad + _MEAN_AHEAD * self.rate_rad_s * dt_s
+        self._due_rad = self._due_rad + self.rate_rad_s * dt_s
 
     def state(self) -> State:
         """What is asked of the wheels."""
-        return {"speed": [self._speed, self._turn_rate], "goal": self.goal_rad.tolist()}
+        return {"speed": [self._speed, self._turn_rate], "due": self._due_rad.tolist()}
 
     def restore(self, state: State) -> None:
         """Go on from such a state."""
         self._speed, self._turn_rate = state["speed"]
-        self.goal_rad = np.array(state["goal"])
+        self._due_rad = np.array(state["due"])
 
 
 class WheelOdometer:

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from pydrake.multibody.math import SpatialVelocity
 
 from plant.diagram import LooseModel, build_diagram
 from plant.simulation import Engine
@@ -134,9 +135,7 @@ def test_the_arm_follows_a_trajectory_to_its_end(engine, fetch, lease):
     names = fetch.capabilities().arm.joint_names
     start = np.array(fetch.capabilities().arm.stowed_rad)
     goal = start + [-0.6, -0.5, 0.3, -0.3, 0.4, -0.4, 0.5]
-    command = fetch.move_arm(
-        ArmTrajectory(np.array([0.0, 2.0]), np.array([start, goal])), until_s=10.0, lease=lease
-    )
+    command = fetch.move_arm(ArmTrajectory(np.array([0.0, 2.0]), np.array([start, goal])), until_s=10.0, lease=lease)
     engine.advance(4.0)
     assert fetch.command_status(command).state is CommandState.DONE
     read = fetch.joints().position_rad
@@ -225,12 +224,13 @@ def test_the_gripper_closes_on_a_box_and_carries_it(boxed):
     (index,) = plant.GetBodyIndices(boxed.world.models["box"])
     box = plant.get_body(index)
     closed = bob.set_gripper(0.0, 40.0, until_s=boxed.now() + 5.0, lease=lease)
-    for _ in range(60):
-        X_WH = plant.EvalBodyPoseInWorld(boxed.context, hand)
-        if bob.gripper().opening > 0.055:
-            plant.SetFreeBodyPose(boxed.context, box, Pose2D(*(X_WH @ [0.1665, 0, 0])[:2], 0.0).transform((X_WH @ [0.1665, 0, 0])[2]))
+    while bob.gripper().opening > 0.052:
+        p_W = plant.EvalBodyPoseInWorld(boxed.context, hand) @ np.array([0.1665, 0.0, 0.0])
+        plant.SetFreeBodyPose(boxed.context, box, Pose2D(p_W[0], p_W[1], 0.0).transform(p_W[2]))
+        plant.SetFreeBodySpatialVelocity(context=boxed.context, body=box, V_JpJc=SpatialVelocity.Zero())
         boxed.advance(0.025)
-    boxed.advance(1.0)
+    for _ in range(10):
+        boxed.advance(0.1)
     assert bob.command_status(closed).state is CommandState.DONE
     assert bob.gripper().holding
     assert bob.gripper().opening == pytest.approx(0.05, abs=0.004)

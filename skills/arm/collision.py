@@ -91,6 +91,12 @@ class ArmScene:
         """Opening of the gripper in later checks, 0 closed."""
         self._opening = opening
 
+    def set_joints(self, joint_positions: Mapping[str, float]) -> None:
+        """Where the robot's other joints are in later checks: legs, lift, head."""
+        self._joints_rad = dict(joint_positions)
+        for built in self._built.values():
+            built.set_joints(self._joints_rad)
+
     def set_padding(self, padding_m: float) -> None:
         """Distance that the robot keeps from boxes in later checks."""
         self._padding_m = padding_m
@@ -173,16 +179,19 @@ class _BuiltScene:
         self._held: tuple[Box, ...] = ()
         self._q = np.array(plant.GetPositions(plant.CreateDefaultContext()))
         joints = {plant.get_joint(index).name(): plant.get_joint(index) for index in plant.GetJointIndices(robot)}
-        for name, joint in joints.items():
-            if joint.num_positions() == 1:
-                self._q[joint.position_start()] = joint_positions_rad.get(name, 0.0)
         self._arm = np.array([joints[name].position_start() for name in model.names])
         self.arm_velocities = np.array([joints[name].velocity_start() for name in model.names])
         self._positions = {name: joint.position_start() for name, joint in joints.items() if joint.num_positions() == 1}
+        self.set_joints(joint_positions_rad)
         self._around = around.floating_positions_start()
         self.place(RigidTransform([0.0, 0.0, _FAR_M]))
         self._allow_stowed_contacts()
         self.place(RigidTransform())
+
+    def set_joints(self, joint_positions: Mapping[str, float]) -> None:
+        """Where all joints are that are not given with each check; 0 where nothing is said."""
+        for name, start in self._positions.items():
+            self._q[start] = joint_positions.get(name, 0.0)
 
     def place(self, X_BF: RigidTransform) -> None:
         """Put the boxes' frame F there."""

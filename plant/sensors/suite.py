@@ -194,9 +194,10 @@ class SensorSuite(ABC):
     def _X_BLinks(self, joint_names: tuple[str, ...], links: tuple[str, ...]) -> list[RigidTransform]:
         """Poses of links in the body frame, with these joints where their encoders read."""
         plant, instance = self._body.plant, self._body.instance
+        positions = plant.GetPositions(self._kinematics)
         for name in joint_names:
-            joint = plant.GetJointByName(name, instance)
-            joint.SetPositions(self._kinematics, [self.joints.position_rad[name]])
+            positions[plant.GetJointByName(name, instance).position_start()] = self.joints.position_rad[name]
+        plant.SetPositions(self._kinematics, positions)
         frames = [plant.GetBodyByName(link, instance).body_frame() for link in links]
         body = self._body.body.body_frame()
         return [plant.CalcRelativeTransform(self._kinematics, body, frame) for frame in frames]

@@ -15,7 +15,7 @@ import yaml
 from plant.models import urdf
 
 FACTS = Path(__file__).with_name("fetch.yaml")
-BASE_LINK, BODY_LINK, HAND_LINK, HEAD_LINK = "base_link", "body", "wrist_roll", "head_tilt"
+BASE_LINK, BODY_LINK, CASTERS_LINK, HAND_LINK, HEAD_LINK = "base_link", "body", "casters", "wrist_roll", "head_tilt"
 WHEELS = ("left_wheel", "right_wheel")
 FINGERS = ("left_finger", "right_finger")
 LIFT_JOINT = "torso_lift"
@@ -40,6 +40,7 @@ def fetch_urdf(*, root: str = BASE_LINK) -> str:
     _add(robot, BASE_LINK, _base(facts))
     _add(robot, BODY_LINK, facts["body"])
     _add_lift(robot, facts["lift"], root)
+    _add_casters(robot, facts["casters"])
     for name, side in zip(WHEELS, (1, -1), strict=True):
         _add_wheel(robot, name, side, facts["wheel"])
     for chain in (facts["head"], facts["arm"]):
@@ -59,7 +60,7 @@ def _base(facts: Mapping[str, Any]) -> Mapping[str, Any]:
     """The base with the column on it, as one link."""
     base, column = facts["base"], facts["column"]
     offset = np.array(column["xyz"])
-    parts = [(base, np.zeros(3)), (column, offset)]
+    parts = [({**base, "mass": base["mass"] - facts["casters"]["mass"]}, np.zeros(3)), (column, offset)]
     mass = sum(part["mass"] for part, _ in parts)
     com = sum(part["mass"] * (np.array(part["com"]) + at) for part, at in parts) / mass
     moments = np.zeros(3)
@@ -73,7 +74,6 @@ def _base(facts: Mapping[str, Any]) -> Mapping[str, Any]:
         "inertia": dict(zip(("ixx", "iyy", "izz"), moments.tolist(), strict=True)),
         "shapes": [*base["shapes"], *(_moved(shape, offset) for shape in column["shapes"])],
         "looks": [*base["looks"], *(_moved(shape, offset) for shape in column["looks"])],
-        "casters": facts["casters"],
     }
 
 
@@ -88,8 +88,6 @@ def _add(robot: ElementTree.Element, name: str, part: Mapping[str, Any]) -> None
         urdf.add_collision(link, f"{name}_{index}", shape, {})
     for index, shape in enumerate(part["looks"]):
         urdf.add_look(link, f"{name}_look_{index}", shape, shape["colour"])
-    if "casters" in part:
-        _add_casters(link, part["casters"])
     if "pads" in part:
         facts = fetch_facts()
         pads = urdf.pad_shapes(part["pads"], facts["pad_friction"], facts["pad_stiffness_n_m"])
@@ -97,8 +95,11 @@ def _add(robot: ElementTree.Element, name: str, part: Mapping[str, Any]) -> None
             urdf.add_collision(link, f"{name}_pad_{index}", shape, contact)
 
 
-def _add_casters(link: ElementTree.Element, casters: Mapping[str, Any]) -> None:
+def _add_casters(robot: ElementTree.Element, casters: Mapping[str, Any]) -> None:
+    """What else stands on the floor: a link of its own, since what touches there is no collision."""
     radius = casters["radius"]
+    link = urdf.add_link(robot, CASTERS_LINK, {**casters, "com": (0, 0, radius)})
+    urdf.add_fixed(robot, CASTERS_LINK, BASE_LINK, CASTERS_LINK, (0, 0, 0))
     for index, (x, y) in enumerate(casters["places"]):
         shape = {"sphere": radius, "xyz": [x, y, radius + casters["lift"]]}
         urdf.add_collision(link, f"caster_{index}", shape, urdf.friction(0.0))

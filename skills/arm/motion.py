@@ -56,8 +56,8 @@ class RrtConnect:
     ) -> FloatArray:
         """A free path from start to goal. Raises PlanningError when an end is blocked or no path was found.
 
-        Joints that turn without end take the shorter way. A start that is in contact by what the arm's servos are off is
-        left by the least turn that frees it.
+        Joints that turn without end take the shorter way. A start that is in contact by what the arm's servos are off
+        is left by the least turn that frees it.
         """
         q_goal_rad = scene.model.turned_near(q_goal_rad, q_start_rad)
         if not scene.free(q_goal_rad):

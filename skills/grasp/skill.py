@@ -269,9 +269,8 @@ class Grasp(ArmSkill[GraspInputs]):
         if at_thing:
             yield from self._lift_again(f"lifting the {seen.thing}")
             yield from self.try_shift_hand(-self.options.pull_back_m * R_BH.matrix()[:, 0] * [1.0, 1.0, 0.0], message)
-        yield from self.move_to(
-            lambda scene, q: carry_configuration(scene, self.arm, R_BH, q), message, speed_rad_s=0.9
-        )
+        arm = self.arm
+        yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q), message, speed_rad_s=0.9)
         yield from self.pause(0.2, message)
         self._check_held(str(seen.thing), opening)
         yield from self.stand_at(self.context.robot.capabilities().standing_height_m, message)
@@ -457,9 +456,8 @@ class Grasp(ArmSkill[GraspInputs]):
         gripper = self.context.robot.gripper()
         if gripper.opening < self.gripper.like_turn(_CLOSED_RAD) or not gripper.holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the gripper closed on nothing where the {thing} was seen")
-        if opening_before_rad is not None and abs(gripper.opening - opening_before_rad) > self.gripper.like_turn(
-            self.options.slip_rad
-        ):
+        slip = self.gripper.like_turn(self.options.slip_rad)
+        if opening_before_rad is not None and abs(gripper.opening - opening_before_rad) > slip:
             raise SkillFailure(Cause.POSTCONDITION, f"the {thing} slipped in the gripper while it was lifted")
         return gripper.opening
 
@@ -473,9 +471,8 @@ class Grasp(ArmSkill[GraspInputs]):
                 break
         R_BH = self.model.X_BH(self.q_rad()).rotation()
         speed_rad_s = _GENTLY_RAD_S if gently or grasp.lever_m > _LONG_LEVER_M else _CARRY_RAD_S
-        yield from self.move_to(
-            lambda scene, q: carry_configuration(scene, self.arm, R_BH, q), message, speed_rad_s=speed_rad_s
-        )
+        arm = self.arm
+        yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q), message, speed_rad_s)
         yield from self.pause(0.2, message)
         self._check_held(thing, opening)
 

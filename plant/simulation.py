@@ -226,7 +226,7 @@ class Simulation:
         record: bool = False,
         visuals: bool = True,
         charge: float = 1.0,
-        locomotion: FloatingBaseLimits | None = None,
+        locomotion: Mapping[str, FloatingBaseLimits] = MappingProxyType({}),
         extra_models: Sequence[LooseModel] = (),
         starts: Mapping[str, Pose2D] = MappingProxyType({}),
         docks: Mapping[str, Pose2D] = MappingProxyType({}),
@@ -235,7 +235,7 @@ class Simulation:
 
         `robots` names the kind of each. They stand at their `starts`, one alone by default at the world's, and charge
         at their `docks`, by default the world's. Batteries begin at `charge` (0 to 1). `extra_models` stand in the
-        world though no map knows them; `locomotion` limits what bears the robots. Raises WorldError when the things do
+        world though no map knows them; `locomotion` limits what bears each robot. Raises WorldError when the things do
         not fit into the world, or a person's route leads through something. Raises ValueError: a robot has no start.
         """
         self.seed, self.world, self.starts = seed, world, {**_default_starts(world, robots), **starts}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,11 +11,13 @@ import typer
 from typer.core import TyperCommand
 
 if TYPE_CHECKING:
+    from executive.mission.robots import RobotSetup
     from skills.robot import Pose2D
 
 __all__ = [
     "FAULT",
     "RANDOM_FAULTS",
+    "ROBOTS",
     "SCENARIO",
     "SET",
     "START",
@@ -52,6 +54,12 @@ TIME_OF_DAY = Annotated[
 TIME_LIMIT = Annotated[
     str | None,
     typer.Option("--time-limit", metavar="TIME", help='The run ends after so long: seconds, or "2 h"; 20 min.'),
+]
+ROBOTS = Annotated[
+    str | None,
+    typer.Option(
+        "--robots", metavar="NAME=KIND,...", help="The robots and their kinds, as in alice=spot,bob=fetch@1.0,2.0,0.0."
+    ),
 ]
 SET = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value for a parameter of the mission file.")
@@ -104,6 +112,14 @@ def time_limit_s(text: str | None) -> float | None:
             f"--time-limit {str(text)[:20]}: it is no time span", hint='write seconds, or "30 min" or "2 h"'
         )
     return seconds
+
+
+def robots_of(text: str | None) -> Mapping[str, RobotSetup]:
+    """The robots of the option. Raises InputError: they are none, or of a kind that is not installed."""
+    from executive.mission.robots import parse_robots
+    from plant.kinds import robot_kinds
+
+    return {} if text is None else parse_robots(text, robot_kinds())
 
 
 def start_pose(text: str | None) -> Pose2D | None:

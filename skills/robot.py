@@ -200,6 +200,7 @@ class Capabilities:
 
     `footprint_m` is the standing outline in the body frame as (x, y) corners; `description` the robot's URDF text with
     collision shapes and a free base (link `body`); `height_range_m` that of the body origin while it walks.
+    `lidar_height_m` is that of the LiDAR over the floor, the robot standing as usual: maps of what it sees differ by it.
     """
 
     footprint_m: tuple[tuple[float, float], ...]
@@ -214,6 +215,7 @@ class Capabilities:
     description: str
     base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL
     head: HeadCapabilities | None = None
+    lidar_height_m: float | None = None
 
     @property
     def body_cameras(self) -> tuple[CameraCapabilities, ...]:

@@ -63,7 +63,8 @@ def run_entry(
     if tree.robot_name not in simulation.robots:
         known = ", ".join(simulation.robots)
         raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", hint=f"known: {known}")
-    scan_map, keepout_map = grid_at(world.scan_map_path), grid_at(world.keepout_map_path)
+    seen_from_m = simulation.robots[tree.robot_name].capabilities().lidar_height_m
+    scan_map, keepout_map = grid_at(world.scan_map_seen_from(seen_from_m)), grid_at(world.keepout_map_path)
     start = believed or (simulation.starts[tree.robot_name] if told else None)
     try:
         localiser = stack.localiser.build(scan_map, start, surely=told and believed is None)

@@ -54,6 +54,7 @@ def fetch_capabilities() -> Capabilities:
         cameras=(CameraCapabilities(HEAD_CAMERA, head_camera().X_link_camera(), Mount.HEAD),),
         description=fetch_urdf(root="body"),
         base_kind=BaseKind.DIFFERENTIAL,
+        lidar_height_m=facts["lidar"]["xyz"][2],
         head=HeadCapabilities(
             HEAD_JOINTS,
             tuple(head[0]["offset"]),

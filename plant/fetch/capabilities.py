@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from pydrake.math import RollPitchYaw, RotationMatrix
 
-from plant.models.fetch.description import FINGERS, HEAD_JOINTS, arm_joint_names, fetch_facts, fetch_urdf
+from plant.models.fetch.description import FINGERS, HEAD_JOINTS, LIFT_JOINT, arm_joint_names, fetch_facts, fetch_urdf
 from plant.sensors.camera_spec import CameraSpec
 from skills.robot import (
     ArmCapabilities,
@@ -54,6 +54,7 @@ def fetch_capabilities() -> Capabilities:
         cameras=(CameraCapabilities(HEAD_CAMERA, head_camera().X_link_camera(), Mount.HEAD),),
         description=fetch_urdf(root="body"),
         base_kind=BaseKind.DIFFERENTIAL,
+        lift_joint=LIFT_JOINT,
         lidar_height_m=facts["lidar"]["xyz"][2],
         head=HeadCapabilities(
             HEAD_JOINTS,

@@ -108,7 +108,7 @@ def carry_configuration(
             for cost in [_carry_cost(x - arm.carry_best_x_m, z, q, q_near_rad)]
         ]
         for _, q in sorted(candidates, key=lambda candidate: candidate[0]):
-            if scene.free(q):
+            if scene.free(q) and scene.free_as_usual(q):
                 return q
     raise PlanningError("no pose to carry the thing near the body is free of contact")
 

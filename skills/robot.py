@@ -201,7 +201,7 @@ class Capabilities:
     `lift_joint` is the joint of a torso that slides up from the lowest of `height_range_m` while the base stays.
     `footprint_m` is the standing outline in the body frame as (x, y) corners; `description` the robot's URDF text with
     collision shapes and a free base (link `body`); `height_range_m` that of the body origin while it walks.
-    `lidar_height_m` is that of the LiDAR over the floor, the robot standing as usual: maps of what it sees differ by it.
+    `lidar_height_m` is that of the LiDAR over the floor, the robot standing as usual: maps differ by it.
     """
 
     footprint_m: tuple[tuple[float, float], ...]

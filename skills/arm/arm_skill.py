@@ -404,9 +404,12 @@ class ArmSkill(RoutineSkill[InputsT]):
         return min(self.context.robot.gripper().opening + self.gripper.like_turn(_RELEASE_RAD), most * self.widest)
 
     def leave_object(self) -> Routine[bool]:
-        """Take fixed finger and palm off what was let go of, and draw the hand back; whether there was a way."""
+        """Take fixed finger and palm off what was let go of, and draw the hand back; whether there was a way.
+
+        Fingers that both open are off it already.
+        """
         fingers, _, closing = self.model.X_BH(self.q_rad()).rotation().matrix().T
-        if abs(closing[2]) < _LEVEL:
+        if abs(closing[2]) < _LEVEL and self.gripper.kind is GripperKind.HINGED:
             aside = -_ASIDE_M * (closing * [1.0, 1.0, 0.0] + fingers)
             yield from self.try_shift_hand(aside, "letting go")
         up_B = np.array([0.0, 0.0, 1.0])

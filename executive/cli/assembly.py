@@ -19,6 +19,7 @@ from executive.tree.compiler import CompiledTree
 from plant.referee import Verdict
 from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
+from plant.variation import AS_IT_IS, Variation
 from plant.worlds.placement import place_people
 from plant.worlds.world import World, WorldError
 from skills.detection import Detector
@@ -40,6 +41,7 @@ def simulate(
     record: bool,
     stack: RobotStack | None = None,
     start: Pose2D | None = None,
+    variation: Variation = AS_IT_IS,
 ) -> Simulation:
     """The plant of a world, things set by the seed. Raises InputError when they do not fit into it."""
     logging.getLogger("drake").setLevel(logging.WARNING)  # Drake sets its own level when it is imported
@@ -52,6 +54,7 @@ def simulate(
             record=record,
             locomotion=locomotion,
             starts={} if start is None else {robot_name: start},
+            variation=variation,
         )
     except WorldError as error:
         raise InputError(str(error)) from error

@@ -177,5 +177,5 @@ def _report(
         real_time_factor=round(result.sim_time_s / max(result.wall_time_s, 1e-6), 2),
         ticks=result.ticks,
         log=log,
-        scenario=prepared.request.scenario.lines(),
+        scenario=(*prepared.request.scenario.lines(), *prepared.request.variation.lines()),
     )

@@ -14,6 +14,7 @@ from executive.cli.mission_run import Finished, run_request
 from executive.cli.page_view import PageView
 from executive.cli.report import RefereeReport
 from executive.cli.requests import Prepared
+from executive.cli.variations import plant_variation
 from executive.mission.request import Start
 from executive.mission.stack_file import load_stack
 from executive.record.event_log import Listener
@@ -22,6 +23,7 @@ from executive.run.control import Control
 from executive.run.outcome import RobotResult
 from executive.run.runner import Observer, RunEntry
 from executive.tree.compiler import CompiledTree
+from plant.variation import AS_IT_IS, Variation
 from plant.worlds.world import World
 from skills.robot import Clock
 from skills.stack import RobotStack
@@ -41,12 +43,15 @@ class SimulatedBackend:
         robot_name: str,
         record: bool,
         start: Start | None = None,
+        variation: Variation = AS_IT_IS,
     ) -> None:
         """Build the plant, things set by the seed. Raises InputError when they do not fit into the world."""
         self._world, self._stack, self._robot_name, self._record = world, stack, robot_name, record
         self._told = start is None or start.pose is not None
         pose = None if start is None else stand_at(world, start, seed)
-        self._simulation = simulate(world, seed=seed, robot_name=robot_name, record=record, stack=stack, start=pose)
+        self._simulation = simulate(
+            world, seed=seed, robot_name=robot_name, record=record, stack=stack, start=pose, variation=variation
+        )
 
     @property
     def clock(self) -> Clock:
@@ -120,6 +125,7 @@ def run_simulated(
         robot_name=prepared.mission.robot_name,
         record=request.record,
         start=request.start,
+        variation=plant_variation(prepared),
     )
     return run_request(
         prepared,

@@ -108,6 +108,7 @@ class ResultsFile:
         if not about:
             with self._writing() as connection:
                 facts = {"scenario": str(evaluation.file), "digest": evaluation.digest, "code": code}
+                facts["runs"] = str(len(evaluation.runs))
                 connection.executemany("INSERT INTO about VALUES (?, ?)", facts.items())
                 files = {path: text for run in evaluation.runs for path, text in run.files.items()}
                 connection.executemany("INSERT INTO file VALUES (?, ?)", files.items())

@@ -5,8 +5,7 @@ from __future__ import annotations
 import shlex
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,49 +17,20 @@ from executive.cli.feasibility import refuse_impossible
 from executive.cli.missions_command import mission_file
 from executive.cli.output import NOT_ACHIEVED, print_json, show_table
 from executive.cli.stack_command import stack_file
-from executive.evaluation.cluster import local_cluster, scheduler_at
+from executive.cli.worker_pool import Pool
 from executive.evaluation.installed import installed_code
 from executive.evaluation.outcome import RunOutcome
 from executive.evaluation.results import ResultsFile
 from executive.evaluation.runs import Evaluation, RunSpec
 from executive.evaluation.scenario import load_evaluation
 from executive.evaluation.summary import Case, group_rows, groups_of, totals_of
-from executive.evaluation.workers import LocalWorkers, Workers
-from executive.mission.errors import InputError, Problems
+from executive.evaluation.workers import Workers
+from executive.mission.errors import Problems
 
-__all__ = ["Pool", "command_of", "evaluate_scenario", "give_out_runs"]
+__all__ = ["command_of", "evaluate_scenario", "give_out_runs"]
 
 RESULTS: Final = "results.sqlite"
 _CANCELLED: Final = "cancelled"
-
-
-@dataclass(frozen=True)
-class Pool:
-    """Who does the work: so many local processes (`jobs`), a local cluster of `workers`, or those of a `scheduler`.
-
-    Raises:
-        InputError: both of a cluster and a scheduler are given.
-    """
-
-    jobs: int = 2
-    workers: int | None = None
-    scheduler: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.workers is not None and self.scheduler is not None:
-            hint = "a scheduler has the workers that were started for it"
-            raise InputError("--workers and --scheduler do not go together", hint=hint)
-
-    def opened(self) -> AbstractContextManager[Workers]:
-        """The workers, for as long as the context is open. Raises InputError: they cannot be had."""
-        if self.scheduler is not None:
-            return scheduler_at(self.scheduler)
-        return _local(self.jobs) if self.workers is None else local_cluster(self.workers)
-
-
-@contextmanager
-def _local(count: int) -> Iterator[Workers]:
-    yield LocalWorkers(count)
 
 
 def evaluate_scenario(

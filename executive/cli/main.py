@@ -205,7 +205,8 @@ def evaluate(
             if any(each is not None for each in own) or random_faults or each_fault:
                 what = "a scenario file says itself what is run"
                 raise InputError(what, hint="write missions, worlds, seeds, faults and stacks into it", file=file)
-            from executive.cli.evaluate_scenario import Pool, evaluate_scenario
+            from executive.cli.evaluate_scenario import evaluate_scenario
+            from executive.cli.worker_pool import Pool
 
             pool, told = Pool(jobs, workers, scheduler), console_for(as_json)
             raise typer.Exit(

@@ -153,7 +153,7 @@ def scheduler_at(address: str) -> Iterator[ClusterWorkers]:
     """
     distributed = _distributed()
     try:
-        client = distributed.Client(address, timeout=ANSWER_S, set_as_default=False)
+        client = distributed.Client(address, timeout=ANSWER_S)
     except (OSError, TimeoutError, ValueError, TypeError) as error:
         hint = "start one with `dask scheduler`, and give the address that it prints, like tcp://HOST:8786"
         raise InputError(f"no scheduler answers at {address}", hint=hint) from error

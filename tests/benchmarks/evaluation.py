@@ -107,9 +107,7 @@ def cluster(count: int) -> None:
             digests[number] = {outcome.run_id: outcome.digest for outcome in outcomes}
             spent = sum(outcome.spent_s for outcome in outcomes)
             overhead = number * walls[number] / spent - 1.0
-            print(
-                f"{number} workers: {walls[number]:.1f} s for {len(outcomes)} runs, dispatch {overhead:.2%} of a mission"
-            )
+            print(f"{number} workers: {walls[number]:.1f} s for {len(outcomes)} runs, dispatch {overhead:.2%}")
     print(f"2 against 1: {walls[1] / walls[2]:.2f} x; equal results: {digests[1] == digests[2]}")
 
 

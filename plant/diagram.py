@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from pydrake.geometry import (
@@ -90,7 +91,7 @@ def build_diagram(
     doors: Sequence[DoorRule] = (),
     visuals: bool = True,
     carried: bool = True,
-    locomotion: FloatingBaseLimits | None = None,
+    locomotion: Mapping[str, FloatingBaseLimits] = MappingProxyType({}),
     render: bool = True,
     renderer_parameters: RenderEngineVtkParams | None = None,
     meshcat: Meshcat | None = None,
@@ -103,7 +104,7 @@ def build_diagram(
     `robots` names the kind of each; `doors` have panels, which are models, too.
     `renderer_parameters` set light and sky; `meshcat` shows the world there.
     `visuals` draws robots with meshes where they are installed; `render` makes the scene for cameras; `locomotion`
-    limits what bears the robots. `friction` multiplies the coefficients of all that moves.
+    limits what bears each robot. `friction` multiplies the coefficients of all that moves.
     """
     rebuild = partial(
         build_diagram,
@@ -127,8 +128,10 @@ def build_diagram(
     instances = {model.name: _add_model(plant, parser, model) for model in models}
     panels = {door.name: add_panel(plant, door) for door in doors}
     trays = {model.name: _add_tray(plant, parser, model) for model in models if model.receives}
-    options = BodyOptions(visuals, carried, locomotion)
-    bodies = {name: robot_kind(kind).add(plant, name, options) for name, kind in sorted(robots.items())}
+    bodies = {
+        name: robot_kind(kind).add(plant, name, BodyOptions(visuals, carried, locomotion.get(name)))
+        for name, kind in sorted(robots.items())
+    }
     plant.Finalize()
     if friction != 1.0:
         multiply_friction(plant, scene_graph, friction)

@@ -228,7 +228,7 @@ class Simulation:
         record: bool = False,
         visuals: bool = True,
         charge: float = 1.0,
-        locomotion: FloatingBaseLimits | None = None,
+        locomotion: Mapping[str, FloatingBaseLimits] = MappingProxyType({}),
         extra_models: Sequence[LooseModel] = (),
         starts: Mapping[str, Pose2D] = MappingProxyType({}),
         docks: Mapping[str, Pose2D] = MappingProxyType({}),
@@ -238,7 +238,7 @@ class Simulation:
 
         `robots` names the kind of each. They stand at their `starts`, one alone by default at the world's, and charge
         at their `docks`, by default the world's. Batteries begin at `charge` (0 to 1). `extra_models` stand in the
-        world though no map knows them; `locomotion` limits what bears the robots; `variation` says how it differs.
+        world though no map knows them; `locomotion` limits what bears each robot; `variation` says how it differs.
         Raises WorldError when the things do not fit into the world, or a person's route leads through something.
         Raises ValueError: a robot has no start.
         """

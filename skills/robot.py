@@ -4,8 +4,10 @@ Every motion command carries an expiry time on the robot's clock: a robot that h
 verbs return the latest immutable stamped snapshot and never block, except `image` (ask for it through the `Worker`).
 
 Frames: `odom` (O) is fixed to the floor where the robot woke up and drifts against the world (W); `body` (B) is
-x forward, y left, z up at the centre of the hips; `hand` (H) is the last arm link; `<source>_camera` (C) is
-z forward, x right, y down; `lidar` (L). `X_AB` is the pose of frame B in frame A. SI units throughout.
+x forward, y left, z up at the centre of the hips, or of a wheeled base's axle and riding on its torso; `hand` (H) is
+the last arm link, x along the fingers, z along their closing; `head` (on a robot with one) turns with it;
+`<source>_camera` (C) is z forward, x right, y down; `lidar` (L). `X_AB` is the pose of frame B in frame A. SI units
+throughout.
 """
 
 from __future__ import annotations
@@ -67,8 +69,8 @@ InverseKinematics = Callable[["RigidTransform"], Sequence[FloatArray]]
 class ArmCapabilities:
     """The arm: joint names from the shoulder on, the furthest reach from the first joint (m), what it lifts (kg).
 
-    `inverse` solves its inverse kinematics; None for shoulder yaw, two pitch joints and a spherical wrist, whose closed
-    form `skills.arm.kinematics` reads from the robot's description.
+    Joints that turn without end are `continuous` in the description. `inverse` solves its inverse kinematics; None for
+    the families whose closed form `skills.arm.kinematics` reads from the description.
     """
 
     joint_names: tuple[str, ...]
@@ -78,18 +80,26 @@ class ArmCapabilities:
     inverse: InverseKinematics | None = None
 
 
+class GripperKind(enum.Enum):
+    """How a gripper closes, and what its opening counts."""
+
+    HINGED = "hinged"  # one finger turns against a fixed one; the opening is its angle, rad
+    PARALLEL = "parallel"  # two fingers slide to the middle together; the opening is their distance, m
+
+
 @dataclass(frozen=True)
 class GripperCapabilities:
-    """The gripper: 0 is closed, `open_rad` is fully open (a positive finger angle).
+    """The gripper. Its opening is 0 closed and `widest` fully open, in the unit of its kind.
 
-    Geometry in the hand frame H (x along the fingers, z along the closing, m): the palm at `palm_x_m`, the tip of the
-    moving finger at `tip_x_m` and of the fixed one at `fixed_tip_x_m`, whose inner face is at `fixed_z_m`; tips are
-    2 `half_breadth_m` wide and `tip_thickness_m` thick. What it grips has its middle about `grip_x_m` ahead of H, is up
-    to `max_grasp_m` wide and ends by `length_m`.
+    `finger_joints` are the joints of its fingers and how far each goes for an opening of one. Geometry in the hand
+    frame H (x along the fingers, z along the closing, m): the palm at `palm_x_m`, the tip of a moving finger at
+    `tip_x_m` and of the fixed one at `fixed_tip_x_m`, whose inner face is at `fixed_z_m` (where both move: when
+    closed); tips are 2 `half_breadth_m` wide and `tip_thickness_m` thick. What it grips has its middle about `grip_x_m`
+    ahead of H, is up to `max_grasp_m` wide and ends by `length_m`.
     """
 
-    joint_name: str
-    open_rad: float
+    finger_joints: tuple[tuple[str, float], ...]
+    widest: float
     max_opening_m: float
     max_force_n: float
     depth_m: float
@@ -102,15 +112,37 @@ class GripperCapabilities:
     grip_x_m: float
     max_grasp_m: float
     length_m: float
+    kind: GripperKind = GripperKind.HINGED
+
+    def finger_positions(self, opening: float) -> dict[str, float]:
+        """Where each finger joint is at an opening, by name."""
+        return {name: share * opening for name, share in self.finger_joints}
+
+    def opening_for(self, gap_m: float) -> float:
+        """The opening at which the tips are about so far apart."""
+        return self.widest * gap_m / self.max_opening_m
+
+
+class Mount(enum.Enum):
+    """The frame that a camera is fixed to."""
+
+    BODY = "body"
+    HAND = "hand"
+    HEAD = "head"
 
 
 @dataclass(frozen=True)
 class CameraCapabilities:
-    """One camera: its source for `image`, its frame F (body or hand), and its pose X_FC in it."""
+    """One camera: its source for `image`, the frame F that it is mounted on, and its pose X_FC in it."""
 
     source: str
     X_FC: RigidTransform
-    on_hand: bool = False
+    mount: Mount = Mount.BODY
+
+    @property
+    def on_hand(self) -> bool:
+        """Whether the arm moves it."""
+        return self.mount is Mount.HAND
 
     @property
     def heading_rad(self) -> float:
@@ -119,13 +151,35 @@ class CameraCapabilities:
         return math.atan2(axis[1], axis[0])
 
     def looks_towards(self, heading_rad: float, within_rad: float = math.pi / 4) -> bool:
-        """Whether the optical axis is within an angle of a direction in the body frame."""
+        """Whether the optical axis is within an angle of a direction in the body frame, a head looking ahead."""
         return abs(math.remainder(self.heading_rad - heading_rad, math.tau)) < within_rad
 
 
 @dataclass(frozen=True)
+class HeadCapabilities:
+    """A head that pans (z up, positive to the left) and then tilts (y, positive looks down), rad.
+
+    p_BP_m is where the pan axis is in the body frame, p_PT_m where the tilt axis is in the panned frame; the frame
+    `head` lies on the tilt axis and turns with it. `joint_names` are pan and tilt in the description.
+    """
+
+    joint_names: tuple[str, str]
+    p_BP_m: tuple[float, float, float]
+    p_PT_m: tuple[float, float, float]
+    pan_range_rad: tuple[float, float]
+    tilt_range_rad: tuple[float, float]
+
+    def X_BF(self, pan_rad: float, tilt_rad: float) -> RigidTransform:
+        """Pose of the frame `head` in the body frame at such angles."""
+        from pydrake.math import RigidTransform, RotationMatrix
+
+        X_BP = RigidTransform(RotationMatrix.MakeZRotation(pan_rad), np.array(self.p_BP_m))
+        return X_BP @ RigidTransform(RotationMatrix.MakeYRotation(tilt_rad), np.array(self.p_PT_m))
+
+
+@dataclass(frozen=True)
 class Capabilities:
-    """What a robot is and can do; `arm` or `gripper` is None on a robot without one.
+    """What a robot is and can do; `arm`, `gripper` or `head` is None on a robot without one.
 
     `footprint_m` is the standing outline in the body frame as (x, y) corners; `description` the robot's URDF text with
     collision shapes and a free base (link `body`); `height_range_m` that of the body origin while it walks.
@@ -142,16 +196,23 @@ class Capabilities:
     cameras: tuple[CameraCapabilities, ...]
     description: str
     base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL
+    head: HeadCapabilities | None = None
 
     @property
     def body_cameras(self) -> tuple[CameraCapabilities, ...]:
-        """The cameras on the body. They look for people and obstacles."""
+        """The cameras on body and head. They look for people and obstacles."""
         return tuple(camera for camera in self.cameras if not camera.on_hand)
 
     @property
     def hand_camera(self) -> CameraCapabilities | None:
         """The camera on the hand, None when there is none."""
         return next((camera for camera in self.cameras if camera.on_hand), None)
+
+    @property
+    def object_camera(self) -> CameraCapabilities | None:
+        """The camera that looks for objects: the one on the hand, else the one on the head; None without either."""
+        on_head = (camera for camera in self.cameras if camera.mount is Mount.HEAD)
+        return self.hand_camera or next(on_head, None)
 
 
 @dataclass(frozen=True)
@@ -255,7 +316,7 @@ class Image:
 
 @dataclass(frozen=True)
 class Joints:
-    """Joint state by name: position (rad), velocity (rad/s), effort (N m)."""
+    """Joint state by name: position (rad), velocity (rad/s), effort (N m); of joints that slide in m, m/s and N."""
 
     stamp_s: float
     position_rad: Mapping[str, float]
@@ -265,10 +326,10 @@ class Joints:
 
 @dataclass(frozen=True)
 class Gripper:
-    """Finger angle (0 closed), clamp force at the fingertip (N), whether the robot believes that it holds something."""
+    """Opening (0 closed; see `GripperKind`), clamp force at the tips (N), whether it believes to hold something."""
 
     stamp_s: float
-    opening_rad: float
+    opening: float
     force_n: float
     holding: bool
 
@@ -380,7 +441,10 @@ class Robot(Protocol):
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follow a joint trajectory; done when its end is reached and the arm is still."""
 
-    def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+    def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Turn the head, if there is one, to angles of `HeadCapabilities`; done when it is there and still."""
+
+    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Move the gripper to an opening with at most force_n at its tip, which stays; done when there or blocked."""
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:

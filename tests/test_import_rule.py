@@ -12,8 +12,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 OURS = ("executive", "skills", "plant")
 WORDS = (
-    *("command", "condition", "errors", "expression", "file.blocks", "file.model", "geometry", "knowledge", "written"),
-    "yaml_source",
+    *("command", "condition", "errors", "expression", "file.blocks", "file.model", "geometry", "knowledge", "robots"),
+    *("written", "yaml_source"),
 )
 HOMES = (
     (*(f"executive.mission.{name}" for name in WORDS), "executive.record.profile", "executive.record.work"),

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import logging
-import math
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Final
-
-import numpy as np
 
 from executive.cli.goal_conditions import verdict_of
+from executive.cli.grids import grid_at
+from executive.cli.starts import PlacedRobot
 from executive.mission.errors import InputError
-from executive.mission.request import Start
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
 from executive.tree.compiler import CompiledTree
@@ -20,68 +18,36 @@ from plant.referee import Verdict
 from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
 from plant.variation import AS_IT_IS, Variation
-from plant.worlds.placement import place_people
 from plant.worlds.world import World, WorldError
 from skills.detection import Detector
-from skills.estimate.grid_map import GridMap, MapError, load_grid_map
+from skills.estimate.grid_map import MapError
 from skills.perception.detector.network_file import ModelFileError
 from skills.robot import Pose2D
 from skills.stack import DetectorComponent, RobotStack, default_stack
 
-TURNING_M: Final = 0.7
-FROM_PEOPLE_M: Final = 1.2
-_START_STREAM: Final = 7
-
 
 def simulate(
     world: World,
+    robots: Mapping[str, PlacedRobot],
     *,
     seed: int,
-    robot_name: str,
     record: bool,
-    stack: RobotStack | None = None,
-    start: Pose2D | None = None,
     variation: Variation = AS_IT_IS,
 ) -> Simulation:
     """The plant of a world, things set by the seed. Raises InputError when they do not fit into it."""
     logging.getLogger("drake").setLevel(logging.WARNING)  # Drake sets its own level when it is imported
-    locomotion = (stack or default_stack()).locomotion
     try:
         return Simulation(
             world,
             seed=seed,
-            robots={robot_name: "spot"},
+            robots={name: robot.kind for name, robot in robots.items()},
             record=record,
-            locomotion=locomotion,
-            starts={} if start is None else {robot_name: start},
+            locomotion={name: robot.stack.locomotion for name, robot in robots.items()},
+            starts={name: robot.start for name, robot in robots.items()},
+            docks={name: robot.dock for name, robot in robots.items() if robot.dock is not None},
             variation=variation,
         )
     except WorldError as error:
-        raise InputError(str(error)) from error
-
-
-def stand_at(world: World, start: Start, seed: int) -> Pose2D:
-    """The pose of a start: its own, or a free one with room to turn, away from people, that the seed chooses.
-
-    Raises InputError: there is nowhere.
-    """
-    if start.pose is not None:
-        return start.pose
-    keepout = _grid(world.surveyed.keepout_map_path).with_unknown_blocked()
-    places = keepout.centres(np.argwhere(keepout.distance > TURNING_M))
-    for person in place_people(world, seed):
-        places = places[np.hypot(*(places - person.X_WO.translation()[:2]).T) > FROM_PEOPLE_M]
-    if not len(places):
-        raise InputError(f"there is nowhere in {world.name} where the robot can turn", hint="give --start X Y YAW")
-    rng = np.random.default_rng([seed, _START_STREAM])
-    x, y = places[rng.integers(len(places))]
-    return Pose2D(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
-
-
-def _grid(path: Path) -> GridMap:
-    try:
-        return load_grid_map(path)
-    except (MapError, OSError) as error:
         raise InputError(str(error)) from error
 
 
@@ -106,7 +72,7 @@ def run_entry(
     if tree.robot_name not in simulation.robots:
         known = ", ".join(simulation.robots)
         raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", hint=f"known: {known}")
-    scan_map, keepout_map = _grid(world.scan_map_path), _grid(world.keepout_map_path)
+    scan_map, keepout_map = grid_at(world.scan_map_path), grid_at(world.keepout_map_path)
     start = believed or (simulation.starts[tree.robot_name] if told else None)
     try:
         localiser = stack.localiser.build(scan_map, start, surely=told and believed is None)

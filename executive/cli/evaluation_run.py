@@ -16,6 +16,7 @@ from typing import Final
 
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Prepared, prepare
+from executive.cli.run_options import robots_of
 from executive.cli.simulated import run_simulated
 from executive.evaluation.evidence import evidence_of, steps_of
 from executive.evaluation.outcome import RunOutcome
@@ -66,7 +67,7 @@ def prepared_run(spec: RunSpec, out: Path) -> Prepared:
 
 def request_of(spec: RunSpec, out: Path) -> Request:
     """What `errand run` is asked for."""
-    request = Request(
+    return Request(
         sentence=spec.sentence,
         file=None if spec.file is None else Path(spec.file),
         world=spec.world,
@@ -80,8 +81,8 @@ def request_of(spec: RunSpec, out: Path) -> Request:
         scenario_files=() if spec.scenario is None else (Path(spec.scenario),),
         time_limit_s=spec.time_limit_s,
         variation=spec.variation,
+        robots=robots_of(spec.robot_words or None),
     )
-    return request
 
 
 @contextmanager

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from executive.cli.requests import Prepared
 from executive.cli.route_cache import RouteCache, route_cache_of
+from executive.cli.starts import DEFAULT_KIND
 from executive.mission.errors import InputError, Problems
 from executive.mission.stack_file import load_stack
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
 from executive.tree.estimate import Route, RoutePlanner, load_estimates
+from plant.kinds import robot_kind
 from plant.models.catalogue import load_catalogue
-from plant.models.spot.description import FACTS
-from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World
 from skills.perception.attributes import known_attributes
 from skills.perception.class_forms import class_forms
@@ -28,8 +28,8 @@ class _RoutesOnMap(RoutePlanner):
     A stack plans them with its costmap and planner; None stands for the default one, of which only these are loaded.
     """
 
-    def __init__(self, world: World, stack: RobotStack | None) -> None:
-        self._world, self._stack = world, stack
+    def __init__(self, world: World, stack: RobotStack | None, kind: str) -> None:
+        self._world, self._stack, self._kind = world, stack, kind
 
     @cached_property
     def _routes(self) -> PlannedRoutes:
@@ -44,24 +44,26 @@ class _RoutesOnMap(RoutePlanner):
             default_component(slot) if self._stack is None else getattr(self._stack, slot)
             for slot in ("costmap", "planner")
         )
-        return PlannedRoutes(costmap.build(keepout_map), Footprint.of(spot_capabilities()), planner)
+        return PlannedRoutes(costmap.build(keepout_map), Footprint.of(robot_kind(self._kind).capabilities()), planner)
 
     def route(self, start: Pose2D, goal: Pose2D) -> Route:
         """The route from start to goal. Raises ValueError with one sentence when there is none, InputError."""
         return self._routes.route(start, goal)
 
 
-def route_planner_of(world: World, stack_file: Path | None = None) -> RouteCache:
-    """Routes on the robot's map of a world, as a stack file has them planned (None: the default stack).
+def route_planner_of(world: World, stack_file: Path | None = None, kind: str = DEFAULT_KIND) -> RouteCache:
+    """Routes of a kind of robot on its map of a world, as a stack file has them planned (None: the kind's own stack).
 
     When there is no such map, the first route raises InputError.
 
     Raises:
         InputError: with file and line where the stack file cannot be used.
     """
+    stack_file = stack_file or robot_kind(kind).stack
     stack = None if stack_file is None else load_stack(stack_file)
-    files = (FACTS,) if stack_file is None else (FACTS, stack_file)
-    return route_cache_of(world, _RoutesOnMap(world, stack), *files)
+    facts = robot_kind(kind).facts
+    files = (facts,) if stack_file is None else (facts, stack_file)
+    return route_cache_of(world, _RoutesOnMap(world, stack, kind), *files)
 
 
 def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> Checked:
@@ -75,8 +77,8 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
         prepared.tree,
         knowledge=prepared.knowledge,
         start=world.start,
-        abilities=abilities_in(world),
-        planner=planner or route_planner_of(world, prepared.request.stack),
+        abilities=abilities_in(world, prepared.kind),
+        planner=planner or route_planner_of(world, prepared.request.stack, prepared.kind),
         estimates=load_estimates(),
     )
 
@@ -84,14 +86,14 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
 def refuse_impossible(prepared: Prepared) -> None:
     """Raise InputError for all that `errand check` finds, before anything moves."""
     problems = Problems()
-    for error in check_prepared(prepared).errors:
+    for error in (error for each in prepared.all for error in check_prepared(each).errors):
         problems.add(error)
     problems.raise_any()
 
 
-def abilities_in(world: World) -> Abilities:
-    """What the robot can lift, and what the lightest object of each class weighs in a world with imports."""
-    abilities = abilities_of()
+def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
+    """What a kind of robot can lift, and what the lightest object of each class weighs in a world with imports."""
+    abilities = abilities_of(kind)
     masses, others = dict(abilities.masses_kg), {rule.model for rule in world.seed_rules.objects}
     for name in sorted(others & set(world.imports)):
         own = world.imports[name].object
@@ -102,10 +104,10 @@ def abilities_in(world: World) -> Abilities:
 
 
 @cache
-def abilities_of() -> Abilities:
-    """What the robot can lift, and what the lightest of each class weighs as far as is known of it, else 0.0."""
+def abilities_of(kind: str) -> Abilities:
+    """What a kind of robot can lift, and what the lightest of each class weighs as far as is known of it, else 0.0."""
     known = {name: form.mass_kg for name, form in class_forms().items() if name in load_catalogue()}
     masses = {name: 0.0 if mass_kg is None else mass_kg[0] for name, mass_kg in known.items()}
-    arm = spot_capabilities().arm
+    arm = robot_kind(kind).capabilities().arm
     lift_kg = 0.0 if arm is None else arm.max_payload_kg
     return Abilities(masses, lift_kg, frozenset(class_forms()), known_attributes())

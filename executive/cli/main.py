@@ -26,11 +26,13 @@ from executive.cli.run_options import (
     LIGHT,
     PEOPLE,
     RANDOM_FAULTS,
+    ROBOTS,
     SCENARIO,
     SET,
     START_OR_UNKNOWN,
     TIME_LIMIT,
     TIME_OF_DAY,
+    robots_of,
     time_limit_s,
     time_of_day,
 )
@@ -108,6 +110,7 @@ def run(
     stack: STACK = None,
     own_map: OwnMap = None,
     start: START_OR_UNKNOWN = None,
+    robots: ROBOTS = None,
     fault: FAULT = None,
     random_faults: RANDOM_FAULTS = 0,
     scenario: SCENARIO = None,
@@ -140,6 +143,7 @@ def run(
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
         asked = replace(asked, given=given_values(given or ()), start=at, map=own_map)
         asked = replace(asked, time_of_day=time_of_day(day_time), time_limit_s=time_limit_s(time_limit))
+        asked = replace(asked, robots=robots_of(robots))
         asked = _disturbed(asked, fault, random_faults, scenario)
         asked = replace(asked, variation=Variation(light, clutter, people, friction))
         finished, page = _run_kept(
@@ -287,7 +291,7 @@ def _run_kept(
             )
         with kept(missions, mission) as ended:
             control = control_for(console, quiet=quiet) if shown is None else shown.control
-            durable = new_run(missions, mission)
+            durable = None if prepared.robots else new_run(missions, mission)
             start = partial(run_simulated, prepared, page=shown, durable=durable, profile=profile)
             talk = None if shown is None else shown.conversation
             finished = show_run(

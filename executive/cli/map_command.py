@@ -94,6 +94,7 @@ class _Building:
         console: Console,
     ) -> None:
         from executive.cli.assembly import simulate
+        from executive.cli.starts import alone
         from skills.geometry import compose
         from skills.mapping.survey import Survey
         from skills.robot import Pose2D
@@ -101,7 +102,7 @@ class _Building:
         self._mapper, self._out, self._console = mapper, out, console
         self._seed, self._world = seed, world
         self._name = "Alice"
-        self._simulation: Simulation = simulate(world, seed=seed, robot_name=self._name, record=False)
+        self._simulation: Simulation = simulate(world, {self._name: alone(world)}, seed=seed, record=False)
         self._robot = self._simulation.robots[self._name]
         route = None
         if points is not None:

@@ -12,7 +12,7 @@ from executive.cli.found_out import with_found_out
 from executive.cli.happening_log import HappeningLog
 from executive.cli.page_view import PageView, log_map
 from executive.cli.profiling import profiled
-from executive.cli.report import RefereeReport, RunReport
+from executive.cli.report import RobotReport, RunReport
 from executive.cli.report_file import TREE_FILE, write_report
 from executive.cli.requests import Prepared
 from executive.cli.signals import HUNG_UP, cancelled_by_signals
@@ -24,8 +24,8 @@ from executive.record.profile import Profile
 from executive.record.schemas import WORK
 from executive.record.work import CountedDetector, Work
 from executive.run.control import Control
-from executive.run.outcome import RunResult
-from executive.run.runner import Observer, Progress, RunSettings, run
+from executive.run.outcome import RobotResult, RunResult
+from executive.run.runner import Observer, Progress, RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
@@ -67,12 +67,9 @@ def run_request(
     up another's; `profile` times the subsystems.
     Raises InputError when the world cannot be used.
     """
-    tree, out, clock, work = prepared.tree, prepared.request.out, backend.clock, Work()
+    out, clock, work = prepared.request.out, backend.clock, Work()
     scenario = prepared.request.scenario
-    entry = backend.entry(tree, durable)
-    warm_up(entry)
-    robot = with_faults(entry.robot, clock, _to_come(scenario.faults, clock.now()), since_s=0.0)
-    entry = replace(entry, robot=robot, detector=CountedDetector(entry.detector, work))
+    entries = [_entry(each, backend, durable, work) for each in prepared.all]
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
     if listener is not None:
         log.listen(listener)
@@ -82,12 +79,13 @@ def run_request(
             page.begin(log, backend.show_live())
         log_map(log, prepared)
         world, seed = prepared.world.name, prepared.request.seed
-        announce(log, clock, tree, prepared.knowledge, world=world, seed=seed, scenario=scenario.lines())
-        watched = HappeningLog(log, robot, backend.happened) if scenario else None
+        for each in prepared.all:
+            announce(log, clock, each.tree, each.knowledge, world=world, seed=seed, scenario=scenario.lines())
+        watched = HappeningLog(log, entries[0].robot, backend.happened) if scenario else None
         with cancelled_by_signals(control or Control(pace=None)) as controlled, LockStepWorker(clock) as worker:
-            begin = run if profile is None else profiled(profile, run, backend, entry, worker)
+            begin = run if profile is None else profiled(profile, run, backend, entries, worker)
             result = begin(
-                [entry],
+                entries,
                 clock=clock,
                 worker=worker,
                 publish=artifacts if profile is None else profile.timed("log", artifacts),
@@ -98,22 +96,35 @@ def run_request(
                 profile=profile,
             )
         if durable is not None:
-            _keep(durable, log, tree.robot_name)
+            _keep(durable, log, prepared.tree.robot_name)
         counts = work.totals({**backend.work(), "bytes_logged": log.bytes})
         log(WORK, counts)
     finally:
         log.close()
     events = mission_events(log.path)
     artifacts.recall(events)
-    finished = _judged(prepared, backend, result, log)
+    finished, tree = _judged(prepared, backend, result, log)
     report = with_found_out(replace(finished.report, work=counts), prepared.knowledge, result, artifacts, events)
     draw_answer(artifacts, out)
     recording = backend.leave(artifacts, out)
-    tree = result.trees.get(prepared.tree.robot_name, prepared.tree)
     write_report(prepared, report, tree, finished.tree, artifacts, events)
     if page is not None:
         page.end(recording)
     return replace(finished, report=report)
+
+
+def _entry(prepared: Prepared, backend: Backend, durable: Durable | None, work: Work) -> RunEntry:
+    """The robot of a mission with its faults, its pictures counted, and its numeric code warm."""
+    entry, clock = backend.entry(prepared.tree, durable), backend.clock
+    warm_up(entry)
+    faults = _to_come(prepared.request.scenario.faults, clock.now())
+    return replace(
+        entry,
+        robot=with_faults(entry.robot, clock, faults, since_s=0.0),
+        detector=CountedDetector(entry.detector, work),
+        after=prepared.after,
+        speaker_W=prepared.speaker_W,
+    )
 
 
 def _settings(request: Request) -> RunSettings:
@@ -137,14 +148,29 @@ def _keep(durable: Durable, log: EventLog, robot_name: str) -> None:
         log(ERROR_TOPIC, {"node": robot_name, "what": "keep the mission's state", "traceback": trouble})
 
 
-def _judged(prepared: Prepared, backend: Backend, result: RunResult, log: EventLog) -> Finished:
-    """The report of a run with what the referee saw; the tree as it ended is drawn."""
-    tree = result.trees.get(prepared.tree.robot_name, prepared.tree)
-    view = node_view(tree.root, result.worst.states)
-    picture = to_svg(folded_to(what_ran(view), DRAWN_NODES), title=prepared.mission.name)
+def _judged(prepared: Prepared, backend: Backend, result: RunResult, log: EventLog) -> tuple[Finished, CompiledTree]:
+    """The report of a run with what the referee saw, and the tree of the robot that ended worst, drawn as it ended."""
+    trees = {each.tree.robot_name: result.trees.get(each.tree.robot_name, each.tree) for each in prepared.all}
+    robots = {each.robot_name: _robot_report(each, trees[each.robot_name], backend, prepared) for each in result.robots}
+    worst = min(robots, key=lambda name: (robots[name].achieved, name != result.worst.robot_name))
+    ended = next(each for each in result.robots if each.robot_name == worst)
+    view = node_view(trees[worst].root, ended.states)
+    picture = to_svg(folded_to(what_ran(view), DRAWN_NODES), title=trees[worst].mission_name)
     (prepared.request.out / TREE_FILE).write_text(picture, encoding="utf-8")
-    referee = backend.judge(tree, result.worst)
-    return Finished(_report(prepared, tree, result, referee, log=str(log.path)), view)
+    report = _report(prepared, robots[worst], result, log=str(log.path))
+    return Finished(replace(report, robots=robots) if prepared.robots else report, view), trees[worst]
+
+
+def _robot_report(ended: RobotResult, tree: CompiledTree, backend: Backend, prepared: Prepared) -> RobotReport:
+    robot = prepared.robots.get(ended.robot_name)
+    return RobotReport(
+        kind=prepared.kind if robot is None else robot.kind,
+        outcome=ended.outcome.value,
+        cause=None if ended.cause is None else ended.cause.value,
+        message=ended.message,
+        referee=backend.judge(tree, ended),
+        commands=tuple(map(str, tree.commands)),
+    )
 
 
 def both(*observers: Observer | None) -> Observer | None:
@@ -160,16 +186,13 @@ def both(*observers: Observer | None) -> Observer | None:
     return tell
 
 
-def _report(
-    prepared: Prepared, tree: CompiledTree, result: RunResult, referee: RefereeReport | None, *, log: str
-) -> RunReport:
-    worst = result.worst
+def _report(prepared: Prepared, worst: RobotReport, result: RunResult, *, log: str) -> RunReport:
     return RunReport(
-        outcome=worst.outcome.value,
-        cause=None if worst.cause is None else worst.cause.value,
+        outcome=worst.outcome,
+        cause=worst.cause,
         message=worst.message,
-        referee=referee,
-        commands=tuple(map(str, tree.commands)),
+        referee=worst.referee,
+        commands=worst.commands,
         world=prepared.world.name,
         seed=prepared.request.seed,
         sim_time_s=round(result.sim_time_s, 3),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from executive.cli.backend import Backend
@@ -18,22 +18,28 @@ def profiled(
     profile: Profile,
     run: Callable[..., Any],
     backend: Backend,
-    entry: RunEntry,
+    entries: Sequence[RunEntry],
     worker: LockStepWorker,
 ) -> Callable[..., Any]:
     """The run with its parts timed; what none of them takes is the executive's own."""
     backend.attach(profile)
-    profile.attach("localiser", entry.localiser, "update")
-    profile.attach("costmap", entry.costmap, "update", "add_points", "clearance_m")
-    if isinstance(entry.detector, CountedDetector):
-        profile.attach("detector", entry.detector, *entry.detector.methods)
+    for entry in entries:
+        _attach(profile, entry)
     submit = worker.submit
 
     def submit_timed(work: Callable[[], Any], *, latency_s: float, name: str) -> Any:
         return submit(profile.timed("planning", work), latency_s=latency_s, name=name)
 
     vars(worker)["submit"] = submit_timed
-    if entry.journal is not None:
-        profile.attach("journal", entry.journal, "note")
     profile.begin()
     return profile.timed("executive", run)
+
+
+def _attach(profile: Profile, entry: RunEntry) -> None:
+    """Time what one robot's estimators, detector and journal do."""
+    profile.attach("localiser", entry.localiser, "update")
+    profile.attach("costmap", entry.costmap, "update", "add_points", "clearance_m")
+    if isinstance(entry.detector, CountedDetector):
+        profile.attach("detector", entry.detector, *entry.detector.methods)
+    if entry.journal is not None:
+        profile.attach("journal", entry.journal, "note")

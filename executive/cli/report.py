@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Final
 
@@ -54,6 +54,36 @@ class ReportedObject:
     t_s: float
 
 
+@dataclass(frozen=True)
+class RobotReport:
+    """How the mission of one robot ended, what the referee saw of it, and what it was to do."""
+
+    kind: str
+    outcome: str
+    cause: str | None
+    message: str
+    referee: RefereeReport | None
+    commands: tuple[str, ...]
+
+    @property
+    def achieved(self) -> bool:
+        """The tree says that the mission is achieved, and no referee denies it."""
+        return self.outcome == "success" and (self.referee is None or self.referee.success is not False)
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as JSON values; the referee's events are for people only."""
+        values = {**asdict(self), "commands": list(self.commands)}
+        if self.referee is not None:
+            del values["referee"]["events"]
+        return values
+
+    @staticmethod
+    def from_json(values: Mapping[str, Any]) -> RobotReport:
+        """A report that another process has printed."""
+        referee = None if values["referee"] is None else RefereeReport(**values["referee"])
+        return RobotReport(**{**values, "referee": referee, "commands": tuple(values["commands"])})
+
+
 NOT_JUDGED: Final = RefereeReport(None, "there is no referee", 0, 0)
 VERDICTS: Final[Mapping[bool | None, str]] = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
 
@@ -84,6 +114,7 @@ class RunReport:
     said: tuple[Said, ...] = ()
     seen_objects: tuple[ReportedObject, ...] = ()
     scenario: tuple[str, ...] = ()
+    robots: Mapping[str, RobotReport] = field(default_factory=dict)
 
     @property
     def claimed(self) -> bool:
@@ -107,11 +138,13 @@ class RunReport:
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values; the referee's events are for people only."""
-        values = {**asdict(replace(self, work={})), "work": dict(self.work)}
+        robots = {name: robot.to_json() for name, robot in self.robots.items()}
+        values = {**asdict(replace(self, work={}, robots={})), "work": dict(self.work), "robots": robots}
         lists = {name: list(values[name]) for name in ("commands", "answers", "said", "seen_objects", "scenario")}
         values = {**values, **lists}
-        if not self.scenario:
-            del values["scenario"]
+        for name in ("scenario", "robots"):
+            if not values[name]:
+                del values[name]
         if self.referee is not None:
             del values["referee"]["events"]
         return values
@@ -119,7 +152,7 @@ class RunReport:
     @staticmethod
     def from_json(values: Mapping[str, Any]) -> RunReport:
         """A report that another process has printed."""
-        values = {"scenario": (), **values}
+        values = {"scenario": (), "robots": {}, **values}
         own = {each.name: values[each.name] for each in fields(RunReport)}
         referee = None if values["referee"] is None else RefereeReport(**values["referee"])
         lists = {
@@ -128,6 +161,7 @@ class RunReport:
             "said": tuple(Said(**each) for each in values["said"]),
             "seen_objects": tuple(_reported_object(each) for each in values["seen_objects"]),
             "scenario": tuple(values["scenario"]),
+            "robots": {name: RobotReport.from_json(each) for name, each in values["robots"].items()},
         }
         return RunReport(**{**own, "referee": referee, **lists})
 
@@ -138,6 +172,8 @@ class RunReport:
             f"{self.sim_time_s:.1f} s simulated in {self.wall_time_s:.1f} s ({self.real_time_factor:.1f} x real time), "
             f"{self.ticks} ticks"
         )
+        if self.robots:
+            return (*(line for name, robot in self.robots.items() for line in _robot_lines(name, robot)), figures)
         claims = f"[bold]The tree claims:[/bold] {_mark(self.claimed)} {self.outcome}{cause}: {escape(self.message)}"
         if self.referee is None:
             return claims, figures
@@ -148,6 +184,16 @@ class RunReport:
             f"{counts_text(self.referee)}; {figures}",
             *(escape(f"  {event}") for event in self.referee.events),
         )
+
+
+def _robot_lines(name: str, robot: RobotReport) -> Iterator[str]:
+    """The two verdicts on one robot of several, with rich markup."""
+    cause = f" ({robot.cause})" if robot.cause else ""
+    claimed = robot.outcome == "success"
+    yield f"[bold]{escape(name)}'s tree claims:[/bold] {_mark(claimed)} {robot.outcome}{cause}: {escape(robot.message)}"
+    if robot.referee is not None:
+        verdict = f"{_mark(robot.referee.success)} {VERDICTS[robot.referee.success]}"
+        yield f"[bold]The referee saw:[/bold] {verdict}: {escape(robot.referee.why)} ({counts_text(robot.referee)})"
 
 
 def _reported_object(values: Mapping[str, Any]) -> ReportedObject:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from executive.cli.answers import answerer, ask_at_terminal
 from executive.cli.missions_command import mission_file
 from executive.cli.plugins import usable_skills
+from executive.cli.starts import DEFAULT_KIND, PlacedRobot
 from executive.cli.worlds import knowledge_of, open_world, refuse_blocked, with_map
 from executive.language import Understanding, load_parser
 from executive.language.questions import Answerer
@@ -24,15 +26,20 @@ from executive.mission.mission import lines_of, mission_from_lines, mission_from
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
 from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
+from skills.robot import Pose2D
 
-__all__ = ["Prepared", "fingerprint", "prepare", "replacing"]
+__all__ = ["Prepared", "fingerprint", "prepare", "prepared_for", "replacing"]
 
 
 @dataclass(frozen=True)
 class Prepared:
     """A request that was understood: its mission, compiled, the world that it runs in, and what is known of that.
 
-    `meant` is what its sentence means, where it has one.
+    `meant` is what its sentence means, where it has one. `kind` is that of its robot.
+
+    In a run with several robots, `robots` has all of them, `others` what the rest of them do meanwhile; this mission
+    begins when those of the robots `after` are done, and whoever asked for it stands at `speaker_W` (None: by this
+    robot).
     """
 
     request: Request
@@ -41,6 +48,16 @@ class Prepared:
     knowledge: Knowledge
     tree: CompiledTree
     meant: Understanding | None = None
+    kind: str = DEFAULT_KIND
+    robots: Mapping[str, PlacedRobot] = field(default_factory=dict)
+    others: tuple[Prepared, ...] = ()
+    after: tuple[str, ...] = ()
+    speaker_W: Pose2D | None = None
+
+    @property
+    def all(self) -> tuple[Prepared, ...]:
+        """This, and what the other robots do."""
+        return (replace(self, others=()), *self.others)
 
 
 def prepare(
@@ -62,12 +79,16 @@ def prepare(
         raise InputError("a mission file or --say is needed, and not both", hint='try: --say "Hey Alice, ..."')
     if request.given and request.file is None:
         raise InputError("--set gives values to a mission file, and there is none", hint="name the file as well")
+    if request.robots:
+        from executive.cli.several import prepare_several
+
+        return prepare_several(request, ask=ask)
     if request.file is not None:
         file = mission_file(request.file)
         return _filed(replace(request, file=file), file, ask)
     world, knowledge = _standing(request, open_world(request.world or request.world_name or DEFAULT_WORLD))
     if request.sentence is None:
-        return _prepared(request, _commanded(request, world), world, knowledge)
+        return prepared_for(request, _commanded(request, world), world, knowledge)
     robot = knowledge.robot
     wake = robot.require_wake if request.require_wake is None else request.require_wake
     meant = understood(
@@ -78,7 +99,7 @@ def prepare(
         answer=answerer(request.answers, request.questions, ask),
     )
     mission = mission_from_meaning(meant, world=world.name, robot_name=robot.name)
-    return _prepared(replace(request, sentence=meant.text, require_wake=wake), mission, world, knowledge, meant)
+    return prepared_for(replace(request, sentence=meant.text, require_wake=wake), mission, world, knowledge, meant)
 
 
 def _filed(request: Request, file: Path, ask: Answerer | None) -> Prepared:
@@ -91,7 +112,7 @@ def _filed(request: Request, file: Path, ask: Answerer | None) -> Prepared:
     mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
     world = _with_people(loaded, _with_objects(loaded, world, knowledge), knowledge)
     text = file.read_text(encoding="utf-8")
-    return _prepared(replace(request, text=text), mission, world, knowledge)
+    return prepared_for(replace(request, text=text), mission, world, knowledge)
 
 
 def _with_people(loaded: MissionFile, world: World, knowledge: Knowledge) -> World:
@@ -151,9 +172,10 @@ def _commanded(request: Request, world: World) -> Mission:
     return replace(mission, name=request.name)
 
 
-def _prepared(
+def prepared_for(
     request: Request, mission: Mission, world: World, knowledge: Knowledge, meant: Understanding | None = None
 ) -> Prepared:
+    """The request with its mission compiled for a world. Raises InputError: it cannot be."""
     if request.scenario or request.scenario_files:
         from executive.cli.scenarios import with_happenings, with_scenario
 

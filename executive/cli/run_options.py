@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperCommand
 
 if TYPE_CHECKING:
+    from executive.mission.robots import RobotSetup
     from skills.robot import Pose2D
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "LIGHT",
     "PEOPLE",
     "RANDOM_FAULTS",
+    "ROBOTS",
     "SCENARIO",
     "SET",
     "START",
@@ -63,6 +65,12 @@ LIGHT = Annotated[
 CLUTTER = Annotated[int, typer.Option(min=0, help="So many more objects lie about, by the seed.")]
 PEOPLE = Annotated[int, typer.Option(min=0, help="So many more people walk about, by the seed.")]
 FRICTION = Annotated[float, typer.Option(help="A factor on the friction of loose objects and robots.")]
+ROBOTS = Annotated[
+    str | None,
+    typer.Option(
+        "--robots", metavar="NAME=KIND,...", help="The robots and their kinds, as in alice=spot,bob=fetch@1.0,2.0,0.0."
+    ),
+]
 SET = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value for a parameter of the mission file.")
 ]
@@ -114,6 +122,14 @@ def time_limit_s(text: str | None) -> float | None:
             f"--time-limit {str(text)[:20]}: it is no time span", hint='write seconds, or "30 min" or "2 h"'
         )
     return seconds
+
+
+def robots_of(text: str | None) -> Mapping[str, RobotSetup]:
+    """The robots of the option. Raises InputError: they are none, or of a kind that is not installed."""
+    from executive.mission.robots import parse_robots
+    from plant.kinds import robot_kinds
+
+    return {} if text is None else parse_robots(text, robot_kinds())
 
 
 def start_pose(text: str | None) -> Pose2D | None:

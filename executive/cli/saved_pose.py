@@ -19,7 +19,7 @@ def pose_text(name: str, pose: SavedPose, *, world: str) -> str:
     base = {"x": pose.base.x_m, "y": pose.base.y_m, "yaw": pose.base.yaw_rad}
     steps: list[dict[str, object]] = [{"skill": "navigate", "with": {key: round(v, 3) for key, v in base.items()}}]
     if pose.joints_rad:
-        joints = {"joints": [round(angle, 4) for angle in pose.joints_rad], "opening": round(pose.opening_rad, 3)}
+        joints = {"joints": [round(angle, 4) for angle in pose.joints_rad], "opening": round(pose.opening, 3)}
         steps.append({"skill": "pose_arm", "with": joints})
     file = {"name": name.replace("_", " "), "world": world, "steps": steps}
     return str(yaml.safe_dump(file, sort_keys=False, default_flow_style=None, width=120))

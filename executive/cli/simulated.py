@@ -7,16 +7,16 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from executive.cli.artifacts import Artifacts, draw_artifacts
-from executive.cli.assembly import judge, run_entry, simulate, stand_at, take_up_plant
+from executive.cli.assembly import judge, run_entry, simulate, take_up_plant
 from executive.cli.backend import Scene
 from executive.cli.durable import Durable
 from executive.cli.mission_run import Finished, run_request
 from executive.cli.page_view import PageView
 from executive.cli.report import RefereeReport
 from executive.cli.requests import Prepared
+from executive.cli.starts import PlacedRobot, alone
 from executive.cli.variations import plant_variation
-from executive.mission.request import Start
-from executive.mission.stack_file import load_stack
+from executive.mission.errors import InputError
 from executive.record.event_log import Listener
 from executive.record.profile import Profile
 from executive.run.control import Control
@@ -26,32 +26,25 @@ from executive.tree.compiler import CompiledTree
 from plant.variation import AS_IT_IS, Variation
 from plant.worlds.world import World
 from skills.robot import Clock
-from skills.stack import RobotStack
 
 __all__ = ["SimulatedBackend", "run_simulated"]
 
 
 class SimulatedBackend:
-    """One robot in the plant of a world (`executive.cli.backend.Backend`)."""
+    """Robots in the plant of a world (`executive.cli.backend.Backend`)."""
 
     def __init__(
         self,
         world: World,
-        stack: RobotStack,
+        robots: Mapping[str, PlacedRobot],
         *,
         seed: int,
-        robot_name: str,
         record: bool,
-        start: Start | None = None,
         variation: Variation = AS_IT_IS,
     ) -> None:
         """Build the plant, things set by the seed. Raises InputError when they do not fit into the world."""
-        self._world, self._stack, self._robot_name, self._record = world, stack, robot_name, record
-        self._told = start is None or start.pose is not None
-        pose = None if start is None else stand_at(world, start, seed)
-        self._simulation = simulate(
-            world, seed=seed, robot_name=robot_name, record=record, stack=stack, start=pose, variation=variation
-        )
+        self._world, self._robots, self._record = world, robots, record
+        self._simulation = simulate(world, robots, seed=seed, record=record, variation=variation)
 
     @property
     def clock(self) -> Clock:
@@ -60,10 +53,14 @@ class SimulatedBackend:
 
     def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
         """The robot with its estimators; the plant's state is taken up and kept where `durable` says so."""
+        robot = self._robots.get(tree.robot_name)
+        if robot is None:
+            hint = f"known: {', '.join(self._robots)}"
+            raise InputError(f"there is no robot '{tree.robot_name}' in {self._world.name}", hint=hint)
         if durable is None:
-            return run_entry(self._simulation, self._world, tree, self._stack, told=self._told)
-        told, believed = self._told and not durable.take_up, durable.pose
-        entry = run_entry(self._simulation, self._world, tree, self._stack, believed=believed, told=told)
+            return run_entry(self._simulation, self._world, tree, robot.stack, told=robot.told)
+        told, believed = robot.told and not durable.take_up, durable.pose
+        entry = run_entry(self._simulation, self._world, tree, robot.stack, believed=believed, told=told)
         if durable.take_up:
             take_up_plant(self._simulation, durable.plant, label=durable.take_up_label)
         durable.journal.keep_world = self._simulation.keep_in(durable.plant, label=durable.label)
@@ -102,7 +99,7 @@ class SimulatedBackend:
         if not self._record:
             return None
         self._simulation.save_recording(out / "recording.html")
-        draw_artifacts(artifacts, self._simulation, self._robot_name, out)
+        draw_artifacts(artifacts, self._simulation, min(self._robots), out)
         return out / "recording.html"
 
 
@@ -120,11 +117,9 @@ def run_simulated(
     request = prepared.request
     backend = SimulatedBackend(
         prepared.world,
-        load_stack(request.stack),
+        robots_of(prepared),
         seed=request.seed,
-        robot_name=prepared.mission.robot_name,
         record=request.record,
-        start=request.start,
         variation=plant_variation(prepared),
     )
     return run_request(
@@ -137,3 +132,11 @@ def run_simulated(
         profile=profile,
         listener=listener,
     )
+
+
+def robots_of(prepared: Prepared) -> Mapping[str, PlacedRobot]:
+    """The robots of a request: those that it names, or the one that its mission is for. Raises InputError."""
+    if prepared.robots:
+        return prepared.robots
+    request, name = prepared.request, prepared.mission.robot_name
+    return {name: alone(prepared.world, seed=request.seed, stack=request.stack, start=request.start)}

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from executive.cli.assembly import simulate, stand_at
+from executive.cli.assembly import simulate
 from executive.cli.backend import Scene
 from executive.cli.keys import keys_pressed
 from executive.cli.output import console_for, refusals
@@ -20,6 +20,7 @@ from executive.cli.page_view import scene_actions
 from executive.cli.replay_command import served
 from executive.cli.run_options import START
 from executive.cli.saved_pose import save_pose
+from executive.cli.starts import alone
 from executive.cli.worlds import open_world, refuse_blocked
 from executive.mission.errors import InputError
 from executive.mission.request import Start
@@ -59,12 +60,12 @@ def teleop(
         if not _NAME.fullmatch(robot):
             raise InputError(f"'{robot[:60]}' is no name for a robot", hint="use letters and digits, as in Alice")
         opened = open_world(world)
-        pose = None if start is None else stand_at(opened, Start.of(start), seed)
-        if pose is not None:
-            refuse_blocked(opened, pose)
-        simulation = simulate(opened, seed=seed, robot_name=robot, record=False, start=pose)
+        placed = alone(opened, seed=seed, start=None if start is None else Start.of(start))
+        if start is not None:
+            refuse_blocked(opened, placed.start)
+        simulation = simulate(opened, {robot: placed}, seed=seed, record=False)
         driven, clock = simulation.robots[robot], simulation.clock
-        context = context_for(opened, driven, clock, simulation.starts[robot])
+        context = context_for(opened, driven, clock, placed.start)
         stack.callback(driven.return_lease, context.lease)
         hands = Teleop(context)
         saving = _saving(hands, poses, opened.name)
@@ -168,5 +169,5 @@ def _told(hands: Teleop) -> dict[str, Any]:
         "note": hands.note,
         "base": [pose.base.x_m, pose.base.y_m, pose.base.yaw_rad],
         "joints_rad": list(pose.joints_rad),
-        "opening_rad": pose.opening_rad,
+        "opening": pose.opening,
     }

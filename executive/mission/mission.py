@@ -20,6 +20,7 @@ __all__ = [
     "mission_from_lines",
     "mission_from_meaning",
     "mission_from_steps",
+    "steps_of",
     "understood",
 ]
 
@@ -48,8 +49,12 @@ def understood(
 
 def mission_from_meaning(meant: Understanding, *, world: str, robot_name: str) -> Mission:
     """The mission of a sentence that was understood."""
-    steps = meant.steps or (MissionStep(meant.commands),)
-    return replace(mission_from_steps(steps, world=world, robot_name=robot_name), notes=meant.notes)
+    return replace(mission_from_steps(steps_of(meant), world=world, robot_name=robot_name), notes=meant.notes)
+
+
+def steps_of(meant: Understanding) -> tuple[MissionStep, ...]:
+    """The steps of a sentence that was understood."""
+    return meant.steps or (MissionStep(meant.commands),)
 
 
 def mission_from_commands(commands: Sequence[Command], *, world: str, robot_name: str) -> Mission:

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from executive.language.questions import QuestionPolicy
 from executive.mission.errors import InputError
+from executive.mission.robots import RobotSetup
 from executive.mission.scenario import NO_SCENARIO, Scenario
 from executive.mission.variation import NO_VARIATION, Variation
 from skills.robot import Pose2D
@@ -57,9 +58,11 @@ class Request:
     folder of the map that it has in place of the world's own. `scenario` is what goes wrong and happens meanwhile, and
     `scenario_files` hold more of it; `variation` is how the world differs from what its files say.
 
+    `robots` are those of a run with several, or with one of another kind or start than the world's, by their names.
+
     The run begins at `time_of_day` ("14:30"; None: what it is) and is ended after `time_limit_s` (None: as usual).
 
-    What stands below `time_limit_s` is filled once it is understood. Then another process can take it up: a sentence
+    What stands below `robots` is filled once it is understood. Then another process can take it up: a sentence
     has the answers in their places, `text` is that of the file, and `scenario` holds all that its files say and the
     seed draws.
     """
@@ -82,6 +85,7 @@ class Request:
     given: Mapping[str, Any] = field(default_factory=dict)
     time_of_day: str | None = None
     time_limit_s: float | None = None
+    robots: Mapping[str, RobotSetup] = field(default_factory=dict)
     name: str = ""
     world_name: str = ""
     robot: str = ""

@@ -29,7 +29,7 @@ from executive.tree.compiling.builder import slug
 from executive.tree.snapshot import Snapshot
 from skills.api import Cause, Costmap, Detector, Localiser, Publish, Worker
 from skills.detection import NO_DETECTOR
-from skills.robot import Clock, LeaseError, Robot
+from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 
 HOLDER = "errand"
@@ -37,7 +37,11 @@ HOLDER = "errand"
 
 @dataclass(frozen=True)
 class RunEntry:
-    """One robot with its tree, estimators, detector, stack, and the journal of its mission."""
+    """One robot with its tree, estimators, detector, stack, and the journal of its mission.
+
+    The mission begins when the robots `after` have done theirs, and cannot when one of them fails; whoever asked for it
+    stands at `speaker_W` (world frame; None: where the robot begins).
+    """
 
     tree: CompiledTree
     robot: Robot
@@ -46,6 +50,8 @@ class RunEntry:
     journal: Journal | None = None
     detector: Detector = NO_DETECTOR
     stack: RobotStack = field(default_factory=default_stack)
+    after: tuple[str, ...] = ()
+    speaker_W: Pose2D | None = None
 
 
 @dataclass(frozen=True)
@@ -108,12 +114,14 @@ def run(
     what changed. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree is not
     ticked, and that time counts against no limit. In every case all trees and robots are stopped and all leases
     returned before this returns. Without control, equal seeds give equal logs. `work` counts what is computed,
-    `profile` times the skills. Raises ValueError: no entries, two robots of one name, or a breakpoint at a node that
-    there is not. Raises OSError, when all is stopped: the disk is full.
+    `profile` times the skills. Raises ValueError: no entries, two robots of one name, one that waits for a robot that
+    is not there, or a breakpoint at a node that there is not. Raises OSError, when all is stopped: the disk is full.
     """
     names = [entry.robot.name for entry in entries]
     if not entries or len(set(names)) != len(names):
         raise ValueError(f"a run needs robots of different names, not {names}")
+    if strangers := {name for entry in entries for name in entry.after} - set(names):
+        raise ValueError(f"there is no robot {', '.join(sorted(strangers))} to wait for")
     control = control or Control(pace=None)
     control.begin({entry.tree.robot_name: entry.tree for entry in entries})
     made = _Run(clock, worker, publish, settings, control)
@@ -148,6 +156,7 @@ class _Run:
         self.profile: Profile | None = None
         self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
+        self._after: dict[str, tuple[str, ...]] = {}
         self._ticks = 0
         self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
         self._begun_s, self._begun_wall_s = clock.now(), time.perf_counter()
@@ -166,6 +175,7 @@ class _Run:
         try:
             for entry in sorted(entries, key=lambda entry: entry.robot.name):
                 self._sessions.append(self._open(entry))
+                self._after[entry.robot.name] = entry.after
             while not all(session.finished for session in self._sessions):
                 self._cycle()
         except (Exception, VerbHung, KeyboardInterrupt) as stop:
@@ -232,7 +242,9 @@ class _Run:
             stack=entry.stack,
         )
         try:
-            return Session(entry.tree, context, robot, self._control, entry.journal, self.profile)
+            return Session(
+                entry.tree, context, robot, self._control, entry.journal, self.profile, speaker_W=entry.speaker_W
+            )
         except BaseException:
             robot.give_lease_back()
             raise
@@ -245,13 +257,27 @@ class _Run:
         self._clock.advance(self._settings.tick_period_s)
         for session in live:
             session.sense()
-        self._tick([session for session in live if session.may_move() and requests.hold is None], requests.breakpoints)
+        turn = [session for session in live if self._is_its_turn(session)]
+        self._tick([session for session in turn if session.may_move() and requests.hold is None], requests.breakpoints)
         for session in live:
             if session.finished:
                 session.close()
         if self.observer is not None:
             self.observer(self._progress())
         self._keep_pace(begun_wall_s)
+
+    def _is_its_turn(self, session: Session) -> bool:
+        """Whether the robots that a mission waits for are done; it ends when one of them has failed."""
+        results = {each.name: each.result for each in self._sessions}
+        for name in self._after[session.name]:
+            result = results[name]
+            if result is None:
+                return False
+            if result.outcome is not Outcome.SUCCESS:
+                message = f"{name}, whose part comes first, did not do it: {result.message}"
+                session.close(Ending(Outcome.FAILURE, Cause.PRECONDITION, message))
+                return False
+        return True
 
     def _poll(self, live: Sequence[Session]) -> ControlRequests:
         """Do what is asked for before time passes. Raises _CancelledError or _TimeOverError."""

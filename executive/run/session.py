@@ -46,7 +46,12 @@ class Session:
         control: Control,
         journal: Journal | None = None,
         profile: Profile | None = None,
+        *,
+        speaker_W: Pose2D | None = None,
     ) -> None:
+        """`speaker_W` is where whoever asked for it stands; None: where the robot begins."""
+        if speaker_W is not None:
+            context.board.put(start_key(tree.robot_name, tree.mission_name), speaker_W)
         self.context = context
         self._robot, self._control, self._profile = robot, control, profile
         self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal, profile),)

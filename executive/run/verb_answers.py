@@ -123,7 +123,7 @@ _CHECKS: Final[Mapping[str, Check]] = {
     "gripper": _reading(Gripper),
     "battery": _reading(Battery, _battery),
     "faults": _of(tuple, _faults),
-    **dict.fromkeys(("drive", "stand", "sit", "move_arm", "set_gripper", "stop"), _COMMAND),
+    **dict.fromkeys(("drive", "stand", "sit", "move_arm", "point_head", "set_gripper", "stop"), _COMMAND),
     "command_status": _of(CommandStatus, _status),
     "lease_holder": _or_none(_LEASE),
     "acquire_lease": _LEASE,

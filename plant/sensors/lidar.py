@@ -24,7 +24,8 @@ from skills.robot import Scan
 class LidarSpec:
     """Beams and noise. The defaults are those of a Velodyne VLP-16 at 20 revolutions a second.
 
-    Elevations run evenly over +- `half_fov_rad`; `dropout` is the share of returns lost at random.
+    Elevations run evenly over +- `half_fov_rad`; `dropout` is the share of returns lost at random. A LiDAR that does
+    not see all around has `columns` about straight ahead.
     """
 
     rings: int = 16
@@ -34,6 +35,7 @@ class LidarSpec:
     max_range_m: float = 100.0
     sigma_m: float = 0.03
     dropout: float = 0.003
+    columns: int | None = None
 
     def elevations_rad(self) -> NDArray[np.float64]:
         """Ring elevations (rings,), lowest first."""
@@ -43,6 +45,13 @@ class LidarSpec:
         """Column azimuths over one turn from -pi on, counter-clockwise from the lidar's x."""
         columns = round(2.0 * np.pi / self.azimuth_step_rad)
         return -np.pi + np.arange(columns, dtype=np.float64) * (2.0 * np.pi / columns)
+
+    def seen(self) -> slice:
+        """Which of the columns it sees."""
+        turn = round(2.0 * np.pi / self.azimuth_step_rad)
+        columns = turn if self.columns is None else self.columns
+        first = (turn - columns + 1) // 2
+        return slice(first, first + columns)
 
 
 class Lidar(NoisySensor):
@@ -70,23 +79,29 @@ class Lidar(NoisySensor):
         self.spec = spec or LidarSpec()
         self._plant, self._body, self._X_BL = plant, body, X_BL
         self._scene = RayScene(plant, inspector, (body.model_instance(),) if unseen is None else unseen)
-        self._elevations, self._azimuths = self.spec.elevations_rad(), self.spec.azimuths_rad()
+        self._elevations, self._turn = self.spec.elevations_rad(), self.spec.azimuths_rad()
+        self._azimuths = self._turn[self.spec.seen()]
 
-    def scan(self, plant_context: Context, stamp_s: float, X_OB: RigidTransform) -> Scan:
-        """One revolution at the context's state. `X_OB` is the odometry at the same instant."""
+    def scan(
+        self, plant_context: Context, stamp_s: float, X_OB: RigidTransform, X_BL: RigidTransform | None = None
+    ) -> Scan:
+        """One revolution at the context's state. `X_OB` is the odometry at the same instant.
+
+        `X_BL` is where the robot takes the lidar to be in its body frame, by default its pose on the body it is on.
+        """
         X_WL = self._plant.EvalBodyPoseInWorld(plant_context, self._body) @ self._X_BL
         return Scan(
             stamp_s=stamp_s,
             ranges_m=self._measured(self.true_ranges(plant_context, X_WL)),
             elevations_rad=self._elevations,
             azimuths_rad=self._azimuths,
-            X_BL=self._X_BL,
+            X_BL=self._X_BL if X_BL is None else X_BL,
             X_OB=X_OB,
         )
 
     def true_ranges(self, plant_context: Context, X_WL: RigidTransform) -> NDArray[np.float32]:
         """Ranges (rings, azimuths) without noise from a pose, `NO_RETURN_M` where nothing is hit."""
-        self._work["lidar_rays"] += len(self._elevations) * len(self._azimuths)
+        self._work["lidar_rays"] += len(self._elevations) * len(self._turn)
         shapes = self._scene.world_shapes(plant_context)
         ranges = cast_rays(
             shapes.kinds,
@@ -96,9 +111,9 @@ class Lidar(NoisySensor):
             np.ascontiguousarray(X_WL.rotation().matrix()),
             np.ascontiguousarray(X_WL.translation()),
             self._elevations,
-            self._azimuths,
+            self._turn,
         )
-        return np.ascontiguousarray(ranges.T, dtype=np.float32)
+        return np.ascontiguousarray(ranges.T[:, self.spec.seen()], dtype=np.float32)
 
     def _measured(self, ranges_m: NDArray[np.float32]) -> NDArray[np.float32]:
         """Ranges with noise; NaN where lost or out of range."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from plant.models.spot.description import CAMERAS, GRIPPER_JOINT, LEGS, spot_facts, spot_urdf
 from plant.sensors.camera_spec import load_cameras
-from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, FloatArray, GripperCapabilities
+from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, FloatArray, GripperCapabilities, Mount
 
 
 def nominal_footholds() -> FloatArray:
@@ -41,8 +41,8 @@ def spot_capabilities() -> Capabilities:
             body["max_payload"],
         ),
         gripper=GripperCapabilities(
-            joint_name=GRIPPER_JOINT,
-            open_rad=gripper["open"],
+            finger_joints=((GRIPPER_JOINT, -1.0),),
+            widest=gripper["open"],
             max_opening_m=gripper["max_opening"],
             max_force_n=gripper["max_force"],
             depth_m=gripper["depth"],
@@ -55,4 +55,8 @@ def spot_capabilities() -> Capabilities:
 
 def _cameras() -> tuple[CameraCapabilities, ...]:
     cameras = load_cameras(CAMERAS).items()
-    return tuple(CameraCapabilities(name, spec.X_link_camera(), spec.link != "body") for name, spec in cameras)
+    return tuple(CameraCapabilities(name, spec.X_link_camera(), _mount(spec.link)) for name, spec in cameras)
+
+
+def _mount(link: str) -> Mount:
+    return Mount.BODY if link == "body" else Mount.HAND

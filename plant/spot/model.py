@@ -11,6 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RevoluteJoint, RigidBody
 from pydrake.systems.framework import Context
 
+from plant.control.joints import ActuatedJoints
 from plant.kinds import RobotKind
 from plant.locomotion.floating_base import FloatingBase, FloatingBaseLimits
 from plant.models.spot.description import (
@@ -23,7 +24,7 @@ from plant.models.spot.description import (
     spot_urdf,
 )
 from plant.models.spot.visuals import visuals_folder
-from skills.robot import FloatArray, Pose2D
+from skills.robot import Pose2D
 
 _LEG_GAINS = (600.0, 12.0)
 _ARM_GAINS = {
@@ -121,36 +122,13 @@ class SpotModel:
         return joint
 
 
-class JointIndex:
-    """Index arrays of a Spot's joints: into the plant's positions and velocities, in the order of its actuators.
-
-    `arm`, `gripper` and `legs` stand for positions in the desired state of the actuators, `arm_rates` and `leg_rates`
-    for velocities there.
-    """
+class JointIndex(ActuatedJoints):
+    """Spot's joints: the numbers of arm, gripper and legs (4, 3), and where their velocities stand when desired."""
 
     def __init__(self, plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
-        actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices(instance)]
-        joints = [actuator.joint() for actuator in actuators]
-        self.names = tuple(joint.name() for joint in joints)
-        self.positions = np.array([joint.position_start() for joint in joints])
-        self.velocities = np.array([joint.velocity_start() for joint in joints])
-        self.efforts = np.array([actuator.effort_limit() for actuator in actuators])
-        self.lower = np.array([joint.position_lower_limits()[0] for joint in joints])
-        self.upper = np.array([joint.position_upper_limits()[0] for joint in joints])
-        gains = [actuator.get_controller_gains() for actuator in actuators]
-        self._stiffness = np.array([each.p for each in gains])
-        self._damping = np.array([each.d for each in gains])
-        self.arm = np.array([self.names.index(name) for name in arm_joint_names()])
+        super().__init__(plant, instance)
+        self.arm = self.numbers(arm_joint_names())
         self.gripper = self.names.index(GRIPPER_JOINT)
-        self.legs = np.array([[self.names.index(joint) for joint in leg_joint_names(leg)] for leg in LEGS])
-        self.arm_rates, self.leg_rates = len(joints) + self.arm, len(joints) + self.legs
+        self.legs = np.array([self.numbers(leg_joint_names(leg)) for leg in LEGS])
+        self.arm_rates, self.leg_rates = self.rates_of(self.arm), self.rates_of(self.legs)
         self.gripper_gain = _ARM_GAINS[GRIPPER_JOINT][0]
-
-    def efforts_of(
-        self, desired: FloatArray, feed_forward: FloatArray, positions: FloatArray, rates: FloatArray
-    ) -> FloatArray:
-        """Efforts of the actuators in a state, for a desired state and feed-forward efforts."""
-        goals, goal_rates = np.split(desired, 2)
-        wanted = self._stiffness * (goals - positions) + self._damping * (goal_rates - rates) + feed_forward
-        efforts: FloatArray = np.clip(wanted, -self.efforts, self.efforts)
-        return efforts

@@ -1,9 +1,8 @@
-"""Set points of Spot's joint servos: arm along a trajectory, gripper with limited force, legs under the body."""
+"""Set points of the servos of Spot's legs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,35 +10,9 @@ from plant.locomotion.leg_kinematics import LegKinematics, UnreachableFootError
 from plant.models.spot.description import LEGS
 from plant.snapshot.values import State, array_of
 from plant.spot.model import JointIndex
-from skills.robot import ArmTrajectory, FloatArray
+from skills.robot import FloatArray
 
 _MAX_LEG_RATE_RAD_S = 20.0
-
-
-@dataclass(frozen=True)
-class GripperGoal:
-    """Gripper angle to reach (0 closed, positive open) with at most `force_n` at the tip."""
-
-    opening_rad: float
-    force_n: float
-
-
-def arm_set_point(trajectory: ArmTrajectory, elapsed_s: float) -> tuple[FloatArray, FloatArray]:
-    """Positions and velocities (6,), (6,) of a trajectory at a time since its start; at rest beyond its ends."""
-    times, positions = trajectory.times_s, trajectory.positions_rad
-    if len(times) == 1 or elapsed_s >= times[-1]:
-        return positions[-1].copy(), np.zeros(positions.shape[1])
-    if elapsed_s <= times[0]:
-        return positions[0].copy(), np.zeros(positions.shape[1])
-    k = int(np.searchsorted(times, elapsed_s, side="right")) - 1
-    rate = (positions[k + 1] - positions[k]) / (times[k + 1] - times[k])
-    return positions[k] + rate * (elapsed_s - times[k]), rate
-
-
-def gripper_set_point(goal: GripperGoal, gripper_rad: float, gain_nm_rad: float, tip_radius_m: float) -> float:
-    """Gripper joint position (rad, negative open) that makes the servo push with no more than the goal's force."""
-    lead = goal.force_n * tip_radius_m / gain_nm_rad
-    return min(max(-goal.opening_rad, gripper_rad - lead), gripper_rad + lead)
 
 
 class LegServos:

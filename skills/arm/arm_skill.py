@@ -181,14 +181,14 @@ class ArmSkill(RoutineSkill[InputsT]):
         robot, model, held = self.context.robot, self.model, self.held
         boxes = [*self.boxes, *self.seen_boxes()] if boxes is None else boxes
         capabilities, joints = robot.capabilities(), robot.joints()
-        work, opening_rad = self.context.work, max(0.0, robot.gripper().opening_rad)
+        work, opening = self.context.work, max(0.0, robot.gripper().opening)
 
         def prepared() -> ArmScene:
             self._scene = scene = self._scene or ArmScene(capabilities, model, joints.position_rad, work=work)
             scene.set_boxes(boxes)
             scene.hold(held)
             scene.set_padding(0.01)
-            scene.set_opening(opening_rad)
+            scene.set_opening(opening)
             return scene
 
         return prepared
@@ -242,16 +242,16 @@ class ArmSkill(RoutineSkill[InputsT]):
         return (yield from attempt())
 
     def move_to(
-        self, goal: Goal, message: str, speed_rad_s: float | None = None, opening_rad: float | None = None
+        self, goal: Goal, message: str, speed_rad_s: float | None = None, opening: float | None = None
     ) -> Routine[FloatArray]:
         """Plan to the configuration that `goal(scene, q_now)` gives, and go there; gives that configuration.
 
-        The gripper comes to `opening_rad` on the way, as long as its wider opening is free of contact there; what it
+        The gripper comes to `opening` on the way, as long as its wider opening is free of contact there; what it
         cannot do on the way it does before when it closes, afterwards when it opens.
         """
 
-        scene_now, start, now_rad = self.scene_now(), self.q_rad(), self.context.robot.gripper().opening_rad
-        turn = None if opening_rad is None else GripperTurn(now_rad, opening_rad)
+        scene_now, start, now_rad = self.scene_now(), self.q_rad(), self.context.robot.gripper().opening
+        turn = None if opening is None else GripperTurn(now_rad, opening)
 
         def plan() -> tuple[ArmTrajectory, FloatArray, float | None]:
             scene, planner = scene_now(), self.context.stack.arm_planner
@@ -359,9 +359,9 @@ class ArmSkill(RoutineSkill[InputsT]):
         return camera
 
     @property
-    def open_rad(self) -> float:
+    def widest(self) -> float:
         """How far the gripper opens."""
-        return self.gripper.open_rad
+        return self.gripper.widest
 
     @property
     def p_HT(self) -> FloatArray:
@@ -370,7 +370,7 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def release_rad(self) -> float:
         """How far the gripper opens to let go of what it holds."""
-        return min(self.context.robot.gripper().opening_rad + _RELEASE_RAD, 0.75 * self.open_rad)
+        return min(self.context.robot.gripper().opening + _RELEASE_RAD, 0.75 * self.widest)
 
     def leave_object(self) -> Routine[bool]:
         """Take fixed finger and palm off what was let go of, and draw the hand back; whether there was a way."""
@@ -387,16 +387,16 @@ class ArmSkill(RoutineSkill[InputsT]):
     def look_from(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[None]:
         """Go where `goal` says to take a picture; an empty gripper, which else stands before the camera, opens."""
         gripper = self.context.robot.gripper()
-        opens = not gripper.holding and gripper.opening_rad < 0.9 * self.open_rad
-        yield from self.move_to(goal, message, speed_rad_s, opening_rad=0.98 * self.open_rad if opens else None)
+        opens = not gripper.holding and gripper.opening < 0.9 * self.widest
+        yield from self.move_to(goal, message, speed_rad_s, opening=0.98 * self.widest if opens else None)
 
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
         """Close the gripper and fold the arm onto the body; nothing is done where it lies there already."""
         stowed = self.model.stowed_rad
         gripper = self.context.robot.gripper()
-        closing_rad = 0.0 if not gripper.holding and gripper.opening_rad > 0.05 else None
+        closing_rad = 0.0 if not gripper.holding and gripper.opening > 0.05 else None
         if np.max(np.abs(self.q_rad() - stowed)) > 0.05:
-            yield from self.move_to(lambda scene, q: stowed, message, opening_rad=closing_rad)
+            yield from self.move_to(lambda scene, q: stowed, message, opening=closing_rad)
         elif closing_rad is not None:
             yield from self.move_gripper(closing_rad, GRIPPER_FORCE_N, message)
 

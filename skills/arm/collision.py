@@ -58,7 +58,8 @@ class ArmScene:
         self.model, self._work = model, work
         self._description = _without_visuals(capabilities.description)
         self._joints_rad = dict(joint_positions_rad)
-        self._padding_m, self._opening_rad = padding_m, 0.0
+        self._padding_m, self._opening = padding_m, 0.0
+        self._gripper = capabilities.gripper
         self._held: tuple[Box, ...] = ()
         self._built: dict[bytes, _BuiltScene] = {}
         self._now = self._with(())
@@ -72,23 +73,23 @@ class ArmScene:
         self._now.place(RigidTransform() if X_BF is None else X_BF)
 
     @contextmanager
-    def with_only(self, boxes: Sequence[Box], opening_rad: float) -> Iterator[None]:
+    def with_only(self, boxes: Sequence[Box], opening: float) -> Iterator[None]:
         """For a while other boxes (frame B) stand around, and the gripper is open so far."""
-        before, opening_before_rad = self._now, self._opening_rad
+        before, opening_before_rad = self._now, self._opening
         self.set_boxes(boxes)
-        self._opening_rad = opening_rad
+        self._opening = opening
         try:
             yield
         finally:
-            self._now, self._opening_rad = before, opening_before_rad
+            self._now, self._opening = before, opening_before_rad
 
     def hold(self, boxes: Sequence[Box]) -> None:
         """Replace the boxes fixed to the hand (frame H), for a thing held."""
         self._held = tuple(boxes)
 
-    def set_opening(self, opening_rad: float) -> None:
-        """Angle of the gripper in later checks, 0 closed."""
-        self._opening_rad = opening_rad
+    def set_opening(self, opening: float) -> None:
+        """Opening of the gripper in later checks, 0 closed."""
+        self._opening = opening
 
     def set_padding(self, padding_m: float) -> None:
         """Distance that the robot keeps from boxes in later checks."""
@@ -134,7 +135,8 @@ class ArmScene:
         return _contacts(self._checker, self._full(q_rad))
 
     def _full(self, q_rad: FloatArray) -> FloatArray:
-        return self._now.positions(q_rad, self._opening_rad)
+        fingers = {} if self._gripper is None else self._gripper.finger_positions(self._opening)
+        return self._now.positions(q_rad, fingers)
 
 
 class _BuiltScene:
@@ -176,7 +178,7 @@ class _BuiltScene:
                 self._q[joint.position_start()] = joint_positions_rad.get(name, 0.0)
         self._arm = np.array([joints[name].position_start() for name in model.names])
         self.arm_velocities = np.array([joints[name].velocity_start() for name in model.names])
-        self._gripper = joints[model.gripper.name].position_start()
+        self._positions = {name: joint.position_start() for name, joint in joints.items() if joint.num_positions() == 1}
         self._around = around.floating_positions_start()
         self.place(RigidTransform([0.0, 0.0, _FAR_M]))
         self._allow_stowed_contacts()
@@ -187,11 +189,12 @@ class _BuiltScene:
         quaternion = X_BF.rotation().ToQuaternion().wxyz()
         self._q[self._around : self._around + 7] = [*quaternion, *X_BF.translation()]
 
-    def positions(self, q_rad: FloatArray, opening_rad: float) -> FloatArray:
-        """All positions of the model with the arm at q_rad (J,)."""
+    def positions(self, q_rad: FloatArray, fingers: Mapping[str, float]) -> FloatArray:
+        """All positions of the model with the arm at q_rad (J,) and the gripper's joints there, by name."""
         q = self._q.copy()
         q[self._arm] = q_rad
-        q[self._gripper] = -opening_rad
+        for name, position in fingers.items():
+            q[self._positions[name]] = position
         return q
 
     def checker(self, padding_m: float, held: tuple[Box, ...]) -> SceneGraphCollisionChecker:
@@ -212,7 +215,7 @@ class _BuiltScene:
 
     def _allow_stowed_contacts(self) -> None:
         """Links that touch when the arm is stowed may touch: resting there is what stowing means."""
-        for a, b in _contacts(self._checker, self.positions(self._model.stowed_rad, 0.0)):
+        for a, b in _contacts(self._checker, self.positions(self._model.stowed_rad, {})):
             plant = self._checker.plant()
             self._checker.SetCollisionFilteredBetween(plant.GetBodyByName(a), plant.GetBodyByName(b), True)
 

@@ -43,7 +43,7 @@ class HoldWatch:
     settle_s: float = 0.5
     released_rad: float = 0.08
     force_n: float = field(default=0.0, init=False)
-    _opening_rad: float | None = field(default=None, init=False)
+    _opening: float | None = field(default=None, init=False)
     _empty_since_s: float | None = field(default=None, init=False)
     _weak_since_s: float | None = field(default=None, init=False)
     _gripped_again_s: float | None = field(default=None, init=False)
@@ -52,11 +52,11 @@ class HoldWatch:
 
     def judge(self, reading: Gripper, now_s: float) -> Grip:
         """What the newest reading means at a time on the robot's clock (s); `force_n` is the force when it held."""
-        if self._opening_rad is None:
+        if self._opening is None:
             if not reading.holding:
                 return Grip.EMPTY
-            self._opening_rad, self.force_n = reading.opening_rad, reading.force_n
-        self._released = self._released or reading.opening_rad > self._opening_rad + self.released_rad
+            self._opening, self.force_n = reading.opening, reading.force_n
+        self._released = self._released or reading.opening > self._opening + self.released_rad
         if self._released:
             return Grip.RELEASED
         if not reading.holding:
@@ -67,8 +67,8 @@ class HoldWatch:
     def _missed(self, reading: Gripper, now_s: float) -> Grip:
         """A reading of a gripper that feels nothing; fingers that stay apart may still have something between them."""
         self._empty_since_s = now_s if self._empty_since_s is None else self._empty_since_s
-        assert self._opening_rad is not None
-        apart = reading.opening_rad > self._opening_rad - self.slip_rad
+        assert self._opening is not None
+        apart = reading.opening > self._opening - self.slip_rad
         if apart and self._gripped_again_s is not None and now_s < self._gripped_again_s + self.regrip_s:
             return Grip.HELD
         return Grip.LOST if now_s - self._empty_since_s >= self.patience_s - _TOLERANCE_S else Grip.HELD
@@ -78,12 +78,12 @@ class HoldWatch:
         if self._settling and self._gripped_again_s is not None:
             if now_s < self._gripped_again_s + self.settle_s:
                 return Grip.HELD
-            self._settling, self._opening_rad, self.force_n = False, reading.opening_rad, reading.force_n
-        assert self._opening_rad is not None
-        closes = reading.opening_rad <= self._opening_rad - self.slip_rad
+            self._settling, self._opening, self.force_n = False, reading.opening, reading.force_n
+        assert self._opening is not None
+        closes = reading.opening <= self._opening - self.slip_rad
         if self._gripped_again_s is not None:
             return Grip.SLIPS_ON if closes else Grip.HELD
-        opens = reading.opening_rad > self._opening_rad + 0.5 * self.released_rad
+        opens = reading.opening > self._opening + 0.5 * self.released_rad
         weak = reading.force_n < self.slip_force * self.force_n and not opens
         self._weak_since_s = (now_s if self._weak_since_s is None else self._weak_since_s) if weak else None
         weakened = self._weak_since_s is not None and now_s - self._weak_since_s >= self.slip_s - _TOLERANCE_S

@@ -203,20 +203,20 @@ class RoutineSkill(Skill[InputsT]):
                 return stopped_s is not None
             trajectory = rest_of(trajectory, stopped_s - begun_s, self._stance_now().arm_rad)
 
-    def move_gripper(self, opening_rad: float, force_n: float, message: str) -> Routine[None]:
+    def move_gripper(self, opening: float, force_n: float, message: str) -> Routine[None]:
         """Move the gripper with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
         stopped_s: float | None = 0.0
         while stopped_s is not None:
-            command = self.gripper_command(opening_rad, force_n)
+            command = self.gripper_command(opening, force_n)
             stopped_s = yield from self.finish(self.issue(command), message, "the gripper")
 
-    def gripper_command(self, opening_rad: float, force_n: float) -> CommandId:
+    def gripper_command(self, opening: float, force_n: float) -> CommandId:
         """Give the gripper its command, and do not wait for it."""
         context = self.context
-        if opening_rad > context.robot.gripper().opening_rad:
+        if opening > context.robot.gripper().opening:
             context.payload.corners_H = context.payload.R_BH = None
         until_s = context.clock.now() + GRIPPER_EXPIRY_S
-        return context.robot.set_gripper(opening_rad, force_n, until_s=until_s, lease=context.lease)
+        return context.robot.set_gripper(opening, force_n, until_s=until_s, lease=context.lease)
 
     def stand_at(self, height_m: float, message: str) -> Routine[None]:
         """Bring the body to a height, level; nothing is done where it is there already."""

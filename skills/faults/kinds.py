@@ -20,16 +20,17 @@ THIEF: Final = "the tablet"
 
 VERBS: Final = (
     "capabilities", "odometry", "imu", "scan", "image", "joints", "gripper", "battery", "faults",
-    "drive", "stand", "sit", "move_arm", "set_gripper", "stop", "command_status",
+    "drive", "stand", "sit", "move_arm", "point_head", "set_gripper", "stop", "command_status",
     "acquire_lease", "take_lease", "return_lease", "lease_holder",
 )  # fmt: skip
 SENSE_VERBS: Final = ("odometry", "imu", "scan", "image", "joints", "gripper", "battery")
-MOTION_VERBS: Final = ("drive", "stand", "sit", "move_arm", "set_gripper")
+MOTION_VERBS: Final = ("drive", "stand", "sit", "move_arm", "point_head", "set_gripper")
 
 _OTHER_WORDS: Final[Mapping[str, str]] = {
     "camera": "image",
     "lidar": "scan",
     "arm": "move_arm",
+    "head": "point_head",
     "base": "drive",
     "body": "stand",
 }
@@ -270,8 +271,8 @@ def _loses(_: re.Match[str]) -> Effect:
             memory["until_s"] = reading.stamp_s + _WEAK_S
             call.robot.set_gripper(0.0, _WEAK_N, until_s=memory["until_s"], lease=lease)
         if call.verb == "set_gripper" and reading.stamp_s < memory.get("until_s", 0.0):
-            opening_rad, _, until_s, owned = call.arguments
-            return call.robot.set_gripper(opening_rad, _WEAK_N, until_s=until_s, lease=owned)
+            opening, _, until_s, owned = call.arguments
+            return call.robot.set_gripper(opening, _WEAK_N, until_s=until_s, lease=owned)
         return call.proceed()
 
     return Effect(frozenset(("gripper", "set_gripper")), act, once=True)

@@ -65,7 +65,7 @@ class ReachCheck:
     X_WB: RigidTransform
     seen: ObjectObservation
     candidates_of: CandidatesOf
-    open_rad: float
+    widest: float
     beside: Sequence[Box] = ()
 
     def best(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> Reached | None:
@@ -113,7 +113,7 @@ class ReachCheck:
             spaces = [((*self.boxes, *self.beside), _NARROW, 0.0), *spaces]
         for boxes, opening, extra in spaces:
             self.scene.set_boxes(boxes, X_WB.inverse() @ self.X_WB)
-            self.scene.set_opening(opening * self.open_rad)
+            self.scene.set_opening(opening * self.widest)
             best = next((each for each in reached if _postures(self.scene, each, _up_B(X_WB))), None)
             if best is not None:
                 return best, best.cost - least + extra
@@ -233,10 +233,10 @@ def reach_check(
     candidates = partial(skill.context.stack.grasp_planner.candidates, p_BS=skill.model.p_BS, gripper=skill.gripper)
     cells = skill.context.solid.cells
     beside = [_less(box) for box in boxes_of(cells, X_WB, partial(_beside, seen))]
-    scene_now, open_rad = skill.scene_now(boxes), skill.open_rad
+    scene_now, widest = skill.scene_now(boxes), skill.widest
 
     def check() -> ReachCheck:
         """The check, with a collision scene of its own boxes."""
-        return ReachCheck(scene_now(), boxes, X_WB, seen, candidates, open_rad, beside)
+        return ReachCheck(scene_now(), boxes, X_WB, seen, candidates, widest, beside)
 
     return check

@@ -318,7 +318,7 @@ class Grasp(ArmSkill[GraspInputs]):
             return look_configuration(scene, X_HC, viewpoints, p_BT, q)
 
         X_BC = self.model.X_BH(self.q_rad()) @ X_HC
-        open_wide = self.context.robot.gripper().opening_rad > WIDE * self.open_rad
+        open_wide = self.context.robot.gripper().opening > WIDE * self.widest
         if aside_rad != 0.0 or not (open_wide and sees_closely(X_BC, p_BT)):
             yield from self.look_from(goal, message)
         image = yield from self.picture(message)
@@ -347,23 +347,23 @@ class Grasp(ArmSkill[GraspInputs]):
 
         around = Surroundings((*view.boxes, *seen), view.target_box, up_B, view.others, thing, reach_m)
 
-        def planned(scene: ArmScene, opening_rad: float, space: Surroundings) -> tuple[GraspPlan, float]:
+        def planned(scene: ArmScene, opening: float, space: Surroundings) -> tuple[GraspPlan, float]:
             """A plan for a gripper that is open so far, and that opening."""
-            scene.set_opening(opening_rad)
-            return stack.grasp_planner.plan(scene, q, candidates, space, stack.arm_planner, self._rng), opening_rad
+            scene.set_opening(opening)
+            return stack.grasp_planner.plan(scene, q, candidates, space, stack.arm_planner, self._rng), opening
 
         def plan() -> tuple[GraspPlan, float]:
             """A plan for the first opening for which there is one."""
             scene, (*first_rad, last_rad) = scene_now(), openings_rad
-            for opening_rad in first_rad:
+            for opening in first_rad:
                 with suppress(PlanningError):  # why there is none is not asked: another opening is left
-                    return planned(scene, opening_rad, replace(around, others=()))
+                    return planned(scene, opening, replace(around, others=()))
             return planned(scene, last_rad, around)
 
-        found, opening_rad = yield from self.compute(
+        found, opening = yield from self.compute(
             plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}"
         )
-        yield from self.move_gripper(opening_rad, GRIPPER_FORCE_N, "opening the gripper")
+        yield from self.move_gripper(opening, GRIPPER_FORCE_N, "opening the gripper")
         return found
 
     def _openings_rad(self, candidates: Sequence[GraspCandidate]) -> tuple[float, ...]:
@@ -372,8 +372,8 @@ class Grasp(ArmSkill[GraspInputs]):
         The opening is about proportional to the finger's angle.
         """
         gap_m = min(each.width_m for each in candidates) + _GAP_BESIDE_M
-        wide_rad = WIDE * self.open_rad
-        narrow_rad = self.open_rad * gap_m / self.gripper.max_opening_m
+        wide_rad = WIDE * self.widest
+        narrow_rad = self.widest * gap_m / self.gripper.max_opening_m
         return (wide_rad, narrow_rad) if narrow_rad < wide_rad - _LESS_OPEN_RAD else (wide_rad,)
 
     def _take(self, view: CloseView, plan: GraspPlan, seen: ObjectObservation) -> Routine[None]:
@@ -454,11 +454,11 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _check_held(self, thing: str, opening_before_rad: float | None) -> float:
         gripper = self.context.robot.gripper()
-        if gripper.opening_rad < _CLOSED_RAD or not gripper.holding:
+        if gripper.opening < _CLOSED_RAD or not gripper.holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the gripper closed on nothing where the {thing} was seen")
-        if opening_before_rad is not None and abs(gripper.opening_rad - opening_before_rad) > self.options.slip_rad:
+        if opening_before_rad is not None and abs(gripper.opening - opening_before_rad) > self.options.slip_rad:
             raise SkillFailure(Cause.POSTCONDITION, f"the {thing} slipped in the gripper while it was lifted")
-        return gripper.opening_rad
+        return gripper.opening
 
     def _carry(self, grasp: GraspCandidate, thing: str, gently: bool) -> Routine[None]:
         """Draw back from the surface, hold the object near the body, and check once more."""
@@ -492,7 +492,7 @@ class Grasp(ArmSkill[GraspInputs]):
                 continue
 
     def _open(self) -> Routine[None]:
-        yield from self.move_gripper(WIDE * self.open_rad, GRIPPER_FORCE_N, "opening the gripper after the failure")
+        yield from self.move_gripper(WIDE * self.widest, GRIPPER_FORCE_N, "opening the gripper after the failure")
 
     def _draw_back(self) -> Routine[None]:
         """Out of the object's reach, since the closing gripper must not catch it."""

@@ -432,7 +432,7 @@ class Release:
     """How the hand lets go: what stands beside, as boxes (B), and how far the gripper is open then (rad)."""
 
     beside: Sequence[Box]
-    opening_rad: float
+    opening: float
 
 
 def above_goal(
@@ -468,7 +468,7 @@ def _can_put_down(scene: ArmScene, q_rad: FloatArray, planner: ArmPlanner, relea
     back = lowered @ RigidTransform([-_LEAST_BACK_M, 0.0, 0.0])
     try:
         down = planner.line(scene.model, q_rad, lowered)
-        with scene.with_only(release.beside, release.opening_rad):
+        with scene.with_only(release.beside, release.opening):
             planner.line(scene.model, down[-1], back, scene)
     except PlanningError:
         return False

@@ -21,7 +21,7 @@ class PoseArmInputs:
     """Joint angles from the shoulder on; the opening (0 closed): None, or something held, leaves it as it is."""
 
     joints_rad: tuple[Angle, ...]
-    opening_rad: Turn | None = None
+    opening: Turn | None = None
 
 
 class PoseArm(ArmSkill[PoseArmInputs]):
@@ -46,10 +46,10 @@ class PoseArm(ArmSkill[PoseArmInputs]):
             raise SkillFailure(Cause.PRECONDITION, text)
         if not self.model.within_limits(goal, -1e-3):
             raise SkillFailure(Cause.PRECONDITION, "the pose is beyond the limits of the arm's joints")
-        opens = inputs.opening_rad is not None and not self.context.robot.gripper().holding
+        opens = inputs.opening is not None and not self.context.robot.gripper().holding
         if np.max(np.abs(self.q_rad() - goal)) > _THERE_RAD:
             yield from self.move_to(lambda scene, q: goal, "moving the arm to the pose")
-        if opens and inputs.opening_rad is not None:
-            opening_rad = min(inputs.opening_rad, self.open_rad)
-            yield from self.move_gripper(opening_rad, GRIPPER_FORCE_N, "moving the gripper")
+        if opens and inputs.opening is not None:
+            opening = min(inputs.opening, self.widest)
+            yield from self.move_gripper(opening, GRIPPER_FORCE_N, "moving the gripper")
         return Succeeded("the arm is in the pose")

@@ -52,7 +52,7 @@ class SavedPose:
 
     base: Pose2D
     joints_rad: tuple[float, ...]
-    opening_rad: float
+    opening: float
 
 
 class Teleop:
@@ -67,7 +67,7 @@ class Teleop:
         self._hand = None if self._model is None else HandControl(self._model, self._options.arm)
         self._scene: ArmScene | None = None
         self._asked: tuple[Mapping[str, float], float] = ({}, -math.inf)
-        self._opening_rad: float | None = None
+        self._opening: float | None = None
         self._opening_sign = 0.0
         self._posture = (capabilities.standing_height_m, 0.0)
         self._commands: list[CommandId] = []
@@ -80,7 +80,7 @@ class Teleop:
     def pose(self) -> SavedPose:
         """Where the robot is now, to be saved."""
         return SavedPose(
-            self._context.pose(), tuple(self._q_rad().tolist()), max(0.0, self._context.robot.gripper().opening_rad)
+            self._context.pose(), tuple(self._q_rad().tolist()), max(0.0, self._context.robot.gripper().opening)
         )
 
     def tick(self) -> None:
@@ -136,7 +136,7 @@ class Teleop:
         robot = self._context.robot
         if self._scene is None:
             self._scene = ArmScene(robot.capabilities(), self._model, robot.joints().position_rad)
-        self._scene.set_opening(max(0.0, robot.gripper().opening_rad))
+        self._scene.set_opening(max(0.0, robot.gripper().opening))
         trajectory = self._hand.next({a: v for a, v in asked.items() if a in _ARM}, now_s, self._q_rad(), self._scene)
         self.note = self._hand.note or self.note
         if trajectory is not None:
@@ -146,16 +146,16 @@ class Teleop:
     def _move_gripper(self, asked: Mapping[str, float], until_s: float) -> None:
         sign, gripper = asked.get(GRIPPER, 0.0), self._context.robot.capabilities().gripper
         if gripper is None or not sign:
-            self._opening_rad, self._opening_sign = None, 0.0
+            self._opening, self._opening_sign = None, 0.0
             return
-        if self._opening_rad is None or sign * self._opening_sign < 0.0:
-            self._opening_rad = self._context.robot.gripper().opening_rad
+        if self._opening is None or sign * self._opening_sign < 0.0:
+            self._opening = self._context.robot.gripper().opening
         self._opening_sign = sign
         step = sign * self._options.gripper_rad_s * self._options.period_s
-        self._opening_rad = min(gripper.open_rad, max(0.0, self._opening_rad + step))
+        self._opening = min(gripper.widest, max(0.0, self._opening + step))
         force_n = min(self._options.gripper_n, gripper.max_force_n)
         lease = self._context.lease
-        self._commands.append(self._context.robot.set_gripper(self._opening_rad, force_n, until_s=until_s, lease=lease))
+        self._commands.append(self._context.robot.set_gripper(self._opening, force_n, until_s=until_s, lease=lease))
 
     def _stand(self, asked: Mapping[str, float], until_s: float) -> None:
         rates = (self._options.height_m_s, self._options.tilt_rad_s)

@@ -107,8 +107,9 @@ class ScriptedRobot:
         self.odometry_scale, self.yaw_drift_rad_per_m = 1.0, 0.0
         self.height_m, self.pitch_rad = capabilities.standing_height_m, 0.0
         self.q_rad = self._first_angles(start)
-        self.opening_rad = (start.in_gripper_rad or 0.3) if start.holding else 0.0
-        self.in_gripper_rad = self.opening_rad if start.holding else start.in_gripper_rad
+        self.head_rad = (0.0, 0.0)
+        self.opening = (start.in_gripper_rad or 0.3) if start.holding else 0.0
+        self.in_gripper_rad = self.opening if start.holding else start.in_gripper_rad
         self.clamp_force_n = 20.0 if start.holding else 0.0
         self.held: Block | None = can_at(0.0, 0.0, 0.0) if start.holding else None
         self._hangs_down_m = 0.057  # of what is held, below the fingers' middle
@@ -143,7 +144,7 @@ class ScriptedRobot:
     def holding(self) -> bool:
         """Whether the gripper is closed about something."""
         met_rad = self.in_gripper_rad
-        return met_rad is not None and self.clamp_force_n > 0.0 and self.opening_rad <= met_rad + 0.02
+        return met_rad is not None and self.clamp_force_n > 0.0 and self.opening <= met_rad + 0.02
 
     def capabilities(self) -> Capabilities:
         """What the robot is and can do."""
@@ -176,10 +177,12 @@ class ScriptedRobot:
         if camera is None:
             raise ValueError(f"{self._name} has no camera '{source}'; it has {', '.join(cameras)}")
         mount = mount_of(camera)
-        X_BF = self.arm.X_BH(self.q_rad) if mount.frame == "hand" else RigidTransform()
         edges = {"body": ("odom", self._X_OB())}
         if self._capabilities.arm is not None:
             edges["hand"] = ("body", self.arm.X_BH(self.q_rad))
+        if self._capabilities.head is not None:
+            edges["head"] = ("body", self._capabilities.head.X_BF(*self.head_rad))
+        X_BF = FrameTree(edges).pose(mount.frame, "body")
         stamp_s = self._clock.now()
         return picture(self.blocks, self._X_WB() @ X_BF, mount, FrameTree(edges), source, stamp_s, self._rng)
 
@@ -188,7 +191,9 @@ class ScriptedRobot:
         self.calls.append("joints")
         names = () if self._capabilities.arm is None else self._capabilities.arm.joint_names
         position = dict(zip(names, self.q_rad.tolist(), strict=True))
-        still = dict.fromkeys(names, 0.0)
+        if self._capabilities.head is not None:
+            position |= dict(zip(self._capabilities.head.joint_names, self.head_rad, strict=True))
+        still = dict.fromkeys(position, 0.0)
         joints = Joints(self._clock.now(), position, still, still)
         is_pulled = self._pulled_at_s is not None and joints.stamp_s >= self._pulled_at_s
         return pulled(joints, self._capabilities) if is_pulled else joints
@@ -196,7 +201,7 @@ class ScriptedRobot:
     def gripper(self) -> Gripper:
         """Latest gripper state."""
         self.calls.append("gripper")
-        return Gripper(self._clock.now(), self.opening_rad, self.clamp_force_n if self.holding else 0.0, self.holding)
+        return Gripper(self._clock.now(), self.opening, self.clamp_force_n if self.holding else 0.0, self.holding)
 
     def battery(self) -> Battery:
         """Latest battery state."""
@@ -240,10 +245,20 @@ class ScriptedRobot:
         near = off <= _TRAJECTORY_START_RAD + _ARM_RAD_S * float(trajectory.times_s[0])
         return "" if near else "the trajectory does not begin where the arm is"
 
-    def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+    def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Turn the head; it is there at once."""
+        head = self._capabilities.head
+        fault = "there is no head" if head is None else ""
+        if head is not None:
+            ways = (pan_rad, head.pan_range_rad), (tilt_rad, head.tilt_range_rad)
+            within = all(low <= angle <= high for angle, (low, high) in ways)
+            fault = "" if within else f"the head cannot turn to pan {pan_rad:.2f}, tilt {tilt_rad:.2f} rad"
+        return self._begin("point_head", (pan_rad, tilt_rad), until_s, lease, fault)
+
+    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Move the gripper; it stops where something lies between its fingers."""
         fault = "" if self._capabilities.gripper is not None else "there is no gripper"
-        return self._begin("set_gripper", (opening_rad, force_n), until_s, lease, fault)
+        return self._begin("set_gripper", (opening, force_n), until_s, lease, fault)
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stop all motion, or only the given command; the gripper keeps its force."""
@@ -284,7 +299,7 @@ class ScriptedRobot:
 
     @property
     def moving_parts(self) -> tuple[str, ...]:
-        """What truly moves now: "drive", "stand", "move_arm", "set_gripper"."""
+        """What truly moves now: "drive", "stand", "move_arm", "point_head", "set_gripper"."""
         driving = ("drive",) if float(np.max(np.abs(self.velocity))) > 0.01 else ()
         return (*driving, *(part for part in self._commands.moving_parts if part != "drive"))
 
@@ -312,6 +327,7 @@ class ScriptedRobot:
         self._move_base(dt_s)
         self._move_body(dt_s)
         self._move_arm()
+        self._move_head()
         self._move_gripper(dt_s)
         used = -dt_s / _CHARGING_S if self.docked else dt_s / _BATTERY_RUNTIME_S
         self.charge = min(1.0, max(0.0, self.charge - used))
@@ -355,24 +371,30 @@ class ScriptedRobot:
         if t >= times[-1]:
             self._commands.finish("move_arm", CommandState.DONE)
 
+    def _move_head(self) -> None:
+        active = self._commands.active("point_head")
+        if active is not None:
+            self.head_rad = active.goal
+            self._commands.finish("point_head", CommandState.DONE)
+
     def _move_gripper(self, dt_s: float) -> None:
         active = self._commands.active("set_gripper")
         if active is None:
             return
-        opening_rad, self.clamp_force_n = active.goal
-        if opening_rad < self.opening_rad and self.in_gripper_rad is None and self.clamp_force_n >= _LEAST_CLAMP_N:
+        opening, self.clamp_force_n = active.goal
+        if opening < self.opening and self.in_gripper_rad is None and self.clamp_force_n >= _LEAST_CLAMP_N:
             self._feel()
         if self.held is not None and self.clamp_force_n < _LEAST_CLAMP_N:
             self._let_go(self.held)
-        if self.held is not None and self.in_gripper_rad is not None and opening_rad > self.in_gripper_rad + 0.02:
+        if self.held is not None and self.in_gripper_rad is not None and opening > self.in_gripper_rad + 0.02:
             self._let_go(self.held)
-        before, least = self.opening_rad, self.in_gripper_rad
+        before, least = self.opening, self.in_gripper_rad
         most = _GRIPPER_RAD_S * dt_s
-        self.opening_rad += max(-most, min(most, opening_rad - self.opening_rad))
-        met = least is not None and before >= least > self.opening_rad
+        self.opening += max(-most, min(most, opening - self.opening))
+        met = least is not None and before >= least > self.opening
         if met and least is not None:
-            self.opening_rad = least
-        if met or abs(self.opening_rad - opening_rad) < 1e-6:
+            self.opening = least
+        if met or abs(self.opening - opening) < 1e-6:
             self._commands.finish("set_gripper", CommandState.DONE)
 
     def _between_fingers_W(self) -> FloatArray:
@@ -388,7 +410,7 @@ class ScriptedRobot:
         if taken is None or gripper is None:
             return
         width_m = min(taken.x1 - taken.x0, taken.y1 - taken.y0)
-        self.in_gripper_rad = gripper.open_rad * min(1.0, width_m / gripper.max_opening_m)
+        self.in_gripper_rad = gripper.widest * min(1.0, width_m / gripper.max_opening_m)
         self.held, self._hangs_down_m = taken, float(place_W[2]) - taken.z0
         self.blocks.remove(taken)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.robot import CameraCapabilities, FloatArray, FrameTree, Image, Intrinsics, Scan, unit_rays
+from skills.robot import CameraCapabilities, FloatArray, FrameTree, Image, Intrinsics, Mount, Scan, unit_rays
 from skills.testing.blocks import Block, block_array, cast_rays, colours_of
 
 X_BL = RigidTransform(np.array([-0.2, 0.0, 0.4]))
@@ -22,7 +22,7 @@ _DOWN_30 = RotationMatrix(RollPitchYaw(0.0, math.radians(30.0), 0.0)) @ _AHEAD
 
 @dataclass(frozen=True)
 class CameraMount:
-    """A camera on a frame of the robot ("body" or "hand"): X_FC, lens, how far depth reaches (m)."""
+    """A camera on a frame of the robot ("body", "hand" or "head"): X_FC, lens, how far depth reaches (m)."""
 
     frame: str
     X_FC: RigidTransform
@@ -39,9 +39,8 @@ FRONT_CAMERAS = tuple(CameraCapabilities(name, _AT_FRONT) for name in ("frontlef
 
 def mount_of(camera: CameraCapabilities) -> CameraMount:
     """Where a robot's camera sits, with a lens of this module's."""
-    return (
-        CameraMount("hand", camera.X_FC, _HAND_LENS) if camera.on_hand else CameraMount("body", camera.X_FC, _BODY_LENS)
-    )
+    lens = _BODY_LENS if camera.mount is Mount.BODY else _HAND_LENS
+    return CameraMount(camera.mount.value, camera.X_FC, lens)
 
 
 def sweep(

@@ -23,6 +23,7 @@ import numpy as np
 import shapely
 
 from executive.cli.assembly import simulate
+from executive.cli.starts import alone
 from executive.run.outcome import Outcome
 from plant.simulation import Simulation
 from plant.worlds.world import World, load_world
@@ -101,7 +102,7 @@ def attempt(chosen: tuple[str, int]) -> dict[str, Any]:
     """Take an object of a class, carry it there and back and there again; what the plant's truth says of it."""
     class_name, seed = chosen
     world = flat_with(class_name)
-    simulation = simulate(world, seed=seed, robot_name=ROBOT, record=False)
+    simulation = simulate(world, {ROBOT: alone(world)}, seed=seed, record=False)
     way, near = Way(simulation), PLACES[class_name]
     simulation.engine.observe(way)
     legs = (FAR[near], near, FAR[near])

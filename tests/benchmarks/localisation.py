@@ -28,6 +28,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from executive.cli.mission_run import run_request
 from executive.cli.requests import prepare
 from executive.cli.simulated import SimulatedBackend
+from executive.cli.starts import alone
 from executive.mission.request import Request
 from plant.sensors.lidar import Lidar
 from plant.sensors.odometry import OdometryModel
@@ -39,7 +40,7 @@ from skills.estimate.monte_carlo import MonteCarloLocaliser, MonteCarloOptions
 from skills.estimate.particle_filter import FilterOptions, ParticleFilter
 from skills.geometry import compose, relative
 from skills.robot import Odometry, Pose2D, Scan
-from skills.stack import components, default_stack
+from skills.stack import components
 
 SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
 RIGHT_M, RIGHT_RAD, RIGHT_S, MOST_M = 0.10, math.radians(3.0), 2.0, 15.0
@@ -87,7 +88,7 @@ def record(path: Path, seed: int, say: str) -> None:
     path.with_suffix("").mkdir(parents=True, exist_ok=True)
     prepared = prepare(request, ask=None)
     name = prepared.mission.robot_name
-    backend = SimulatedBackend(prepared.world, default_stack(), seed=seed, robot_name=name, record=False)
+    backend = SimulatedBackend(prepared.world, {name: alone(prepared.world)}, seed=seed, record=False)
     simulation: Simulation = backend._simulation
     engine, robot = simulation.engine, simulation.robots[name]
     body = engine.world.robots[name].body

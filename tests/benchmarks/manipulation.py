@@ -40,6 +40,7 @@ from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 
 from executive.cli.assembly import run_entry, simulate
+from executive.cli.starts import alone
 from executive.cli.worlds import knowledge_of
 from executive.cli.worst_sheet import Shown, contact_sheet
 from executive.mission.command import parse_command
@@ -240,7 +241,7 @@ def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
     """Take, hold, put down; what the plant's truth says of it, and how it ended where it failed, if pictured."""
     with tempfile.TemporaryDirectory() as folder:
         world = room(Path(folder), trial.class_name, others_of(trial), trial.surface, trial.seed, trial.model)
-        simulation = simulate(world, seed=trial.seed, robot_name=ROBOT, record=False)
+        simulation = simulate(world, {ROBOT: alone(world)}, seed=trial.seed, record=False)
         watch, before = Watch(simulation), poses(simulation)
         simulation.engine.observe(watch)
         texts = (

@@ -26,8 +26,8 @@ import numpy as np
 from executive.cli.mission_run import run_request
 from executive.cli.requests import prepare
 from executive.cli.simulated import SimulatedBackend
+from executive.cli.starts import alone
 from executive.mission.request import Request
-from executive.mission.stack_file import load_stack
 from plant.worlds.builder.maps import FREE, OCCUPIED, Grid
 from plant.worlds.builder.own import world_from_grid
 from plant.worlds.world import RouteRule
@@ -145,7 +145,10 @@ def run_case(folder: Path, drawn: Case) -> Outcome:
         route = RouteRule(waypoints=(drawn.from_W, drawn.to_W), speed=drawn.speed_m_s, start=86400.0, yields=False)
         world = world.with_routes({drawn.what: route})
     backend = SimulatedBackend(
-        world, load_stack(stack), seed=drawn.number, robot_name=prepared.mission.robot_name, record=False
+        world,
+        {prepared.mission.robot_name: alone(world, seed=drawn.number, stack=stack)},
+        seed=drawn.number,
+        record=False,
     )
     trigger = None
     if drawn.what != NOBODY:

@@ -25,7 +25,7 @@ from executive.mission.knowledge import load_knowledge
 from executive.mission.written import parse_written, written
 from plant.worlds.world import load_world
 
-__all__ = ["TABLES", "Score", "measured"]
+__all__ = ["TABLES", "Score", "as_lines", "in_full", "measured", "steps_of"]
 
 TABLES: Final = tuple(Path(__file__).with_name(f"structured_sentences{name}.yaml") for name in ("", "_later", "_last"))
 _SHORT: Final = re.compile(r"\b(fetch|carry|put|take|give|go|find|charge)\(([^()]*)\)")
@@ -79,28 +79,28 @@ def _answers(table: Path) -> Iterator[tuple[str, list[str] | str, Understanding]
 def _right(expected: list[str] | str, answer: Understanding) -> bool:
     if isinstance(expected, str):
         return answer.status is not Status.OK
-    return answer.status is Status.OK and _lines(_steps(answer)) == _lines(parse_written(map(_long, expected)))
+    return answer.status is Status.OK and as_lines(steps_of(answer)) == as_lines(parse_written(map(in_full, expected)))
 
 
 def _wrongly_accepted(expected: list[str] | str, answer: Understanding) -> bool:
     return answer.status is Status.OK and not _right(expected, answer)
 
 
-def _steps(answer: Understanding) -> Sequence[MissionStep]:
+def steps_of(answer: Understanding) -> Sequence[MissionStep]:
     return answer.steps or (MissionStep(answer.commands),)
 
 
-def _lines(steps: Sequence[MissionStep]) -> str:
+def as_lines(steps: Sequence[MissionStep]) -> str:
     """The written form, with every command a step of its own."""
     return re.sub(r"\]\s*then Take", "]; Take", "; ".join(written(steps)))
 
 
-def _long(text: str) -> str:
+def in_full(text: str) -> str:
     return _SHORT.sub(lambda match: _FORMS[match[1]].format(*re.split(r", ", match[2])), text)
 
 
 def _line(text: str, answer: Understanding) -> str:
-    found = "; ".join(written(_steps(answer))) if answer.status is Status.OK else answer.reason
+    found = "; ".join(written(steps_of(answer))) if answer.status is Status.OK else answer.reason
     return f"{text}\n      {found}"
 
 

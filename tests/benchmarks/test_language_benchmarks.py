@@ -15,7 +15,7 @@ from executive.mission.mission import mission_from_meaning, understood
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from plant.worlds.world import load_world
-from tests.benchmarks.structured_sentences import TABLES, measured
+from tests.benchmarks import robots_sentences, structured_sentences
 
 SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
 FAMILIES = Path(__file__).parents[1] / "executive" / "language" / "sentences"
@@ -83,8 +83,15 @@ def test_odd_input_takes_no_longer_than_a_second(parser, sentence):
     assert seconds_for(sentence, parser) < ODD_S
 
 
-@pytest.mark.parametrize("table", TABLES, ids=lambda table: table.stem)
+@pytest.mark.parametrize("table", structured_sentences.TABLES, ids=lambda table: table.stem)
 def test_structured_sentences_are_right_or_refused(table):
-    score = measured(table)
+    score = structured_sentences.measured(table)
+    assert score.wrongly_accepted == ()
+    assert score.right / score.sentences >= LEAST_RIGHT
+
+
+@pytest.mark.parametrize("table", robots_sentences.TABLES, ids=lambda table: table.stem)
+def test_sentences_for_several_robots_are_right_or_refused(table):
+    score = robots_sentences.measured(table)
     assert score.wrongly_accepted == ()
     assert score.right / score.sentences >= LEAST_RIGHT

@@ -66,7 +66,7 @@ class ScriptedRobot:
         self.name = name
         self.clock = clock
         self.holding = False
-        self.opening_rad, self.empty_rad = 0.3, 0.0
+        self.opening, self.empty_rad = 0.3, 0.0
         self.clamps_n: list[float] = []
         self.driving = False
         self.charge = 0.9
@@ -88,8 +88,8 @@ class ScriptedRobot:
         return Odometry(self.clock.now(), self.standing.transform(), (0.0, 0.0, 0.0))
 
     def gripper(self) -> Gripper:
-        opening_rad = self.opening_rad if self.holding else self.empty_rad
-        return Gripper(self.clock.now(), opening_rad, 10.0 * self.holding, self.holding)
+        opening = self.opening if self.holding else self.empty_rad
+        return Gripper(self.clock.now(), opening, 10.0 * self.holding, self.holding)
 
     def let_go(self) -> None:
         """Open the gripper, as a skill that puts something down does."""
@@ -98,7 +98,7 @@ class ScriptedRobot:
     def capabilities(self) -> Capabilities:
         return BASE_ONLY
 
-    def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         self.clamps_n.append(force_n)
         return self._called("set_gripper")
 

@@ -114,11 +114,11 @@ class WeakGripper:
     def __getattr__(self, name):
         return getattr(self._robot, name)
 
-    def set_gripper(self, opening_rad, force_n, *, until_s, lease):
-        if opening_rad == 0.0 and force_n > 30.0 and self._left > 0:
+    def set_gripper(self, opening, force_n, *, until_s, lease):
+        if opening == 0.0 and force_n > 30.0 and self._left > 0:
             self._left -= 1
             force_n = self._force_n
-        return self._robot.set_gripper(opening_rad, force_n, until_s=until_s, lease=lease)
+        return self._robot.set_gripper(opening, force_n, until_s=until_s, lease=lease)
 
 
 def test_a_thing_that_slips_is_taken_again():

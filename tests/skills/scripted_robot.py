@@ -45,7 +45,7 @@ class ScriptedRobot:
     now_s: float = 0.0
     height_m: float = 0.52
     q: Any = field(default_factory=lambda: MODEL.stowed_rad.copy())
-    opening_rad: float = 0.0
+    opening: float = 0.0
     holding: bool = False
     gripper_stops_rad: float = 0.0
     scan_now: Any = None
@@ -74,7 +74,7 @@ class ScriptedRobot:
         return Joints(self.now_s, dict(zip(MODEL.names, self.q.tolist(), strict=True)), {}, {})
 
     def gripper(self):
-        return Gripper(self.now_s, self.opening_rad, 0.0, self.holding)
+        return Gripper(self.now_s, self.opening, 0.0, self.holding)
 
     def scan(self):
         return self.scan_now
@@ -103,13 +103,16 @@ class ScriptedRobot:
             self.q = trajectory.positions_rad[-1].copy()
         return self._note(answer)
 
+    def point_head(self, pan_rad, tilt_rad, *, until_s, lease):
+        return self._note(CommandStatus(CommandState.REFUSED, "no head"))
+
     def stand(self, height_m, pitch_rad, *, until_s, lease):
         self.height_m = height_m
         return self._note(CommandStatus(CommandState.RUNNING))
 
-    def set_gripper(self, opening_rad, force_n, *, until_s, lease):
-        self.opening_rad = max(opening_rad, self.gripper_stops_rad)
-        self.holding = self.opening_rad > opening_rad
+    def set_gripper(self, opening, force_n, *, until_s, lease):
+        self.opening = max(opening, self.gripper_stops_rad)
+        self.holding = self.opening > opening
         return self._note(CommandStatus(CommandState.RUNNING))
 
     def stop(self, *, lease, only=None):

@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, GripperCapabilities
+from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, GripperCapabilities, Mount
 
 BODY = ((0.42, 0.24), (-0.42, 0.24), (-0.42, -0.24), (0.42, -0.24))
 HEIGHT_M = 0.45
@@ -49,8 +49,8 @@ TOY = Capabilities(
     pitch_range_rad=(0.0, 0.0),
     arm=ArmCapabilities(tuple(part[0] for part in _CHAIN[:-1]), 0.95, STOWED_RAD, max_payload_kg=1.0),
     gripper=GripperCapabilities(
-        joint_name="claw",
-        open_rad=1.2,
+        finger_joints=(("claw", -1.0),),
+        widest=1.2,
         max_opening_m=0.14,
         max_force_n=90.0,
         depth_m=0.08,
@@ -65,7 +65,7 @@ TOY = Capabilities(
         length_m=0.30,
     ),
     cameras=(
-        CameraCapabilities("wrist_eye", RigidTransform(_AHEAD, np.array([0.12, 0.0, 0.05])), on_hand=True),
+        CameraCapabilities("wrist_eye", RigidTransform(_AHEAD, np.array([0.12, 0.0, 0.05])), mount=Mount.HAND),
         CameraCapabilities("bow", RigidTransform(_DOWN, [0.4, 0.0, 0.1])),
         CameraCapabilities("stern", RigidTransform(RotationMatrix.MakeZRotation(np.pi) @ _AHEAD, [-0.4, 0.0, 0.1])),
     ),

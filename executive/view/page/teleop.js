@@ -48,7 +48,7 @@
       if (!told) return;
       this.keys = new Set(Object.keys(keys || {}));
       const [x, y, yaw] = told.base, joints = told.joints_rad.map((angle) => angle.toFixed(2)).join(" ");
-      byId("teleop-told").textContent = told.note || `x ${x.toFixed(2)} y ${y.toFixed(2)} yaw ${yaw.toFixed(2)} · arm ${joints} · gripper ${told.opening_rad.toFixed(2)}`;
+      byId("teleop-told").textContent = told.note || `x ${x.toFixed(2)} y ${y.toFixed(2)} yaw ${yaw.toFixed(2)} · arm ${joints} · gripper ${told.opening.toFixed(2)}`;
       byId("teleop-told").classList.toggle("bad", Boolean(told.note));
     }
 

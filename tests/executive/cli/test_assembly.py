@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from tiny_detector import CLASSES, model_bytes, write_model
 
-from executive.cli.assembly import TURNING_M, shared_detector, stand_at
+from executive.cli.assembly import shared_detector
+from executive.cli.starts import TURNING_M, stand_at
 from executive.cli.worlds import refuse_blocked
 from executive.mission.errors import InputError
 from executive.mission.request import Start

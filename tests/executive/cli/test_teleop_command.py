@@ -11,10 +11,12 @@ from typer.testing import CliRunner
 from executive.cli.assembly import simulate
 from executive.cli.entry import app
 from executive.cli.saved_pose import save_pose
+from executive.cli.starts import alone
 from executive.cli.teleop_command import TerminalKeys, context_for, page_actions, period
 from executive.cli.worlds import open_world
 from executive.mission.errors import InputError
 from executive.mission.file.resolve import load_mission
+from executive.mission.request import Start
 from executive.view.actions import RefusedError
 from skills.arm.kinematics import arm_model
 from skills.robot import Pose2D
@@ -74,7 +76,7 @@ def test_a_pose_is_never_overwritten(tmp_path):
     path = save_pose(tmp_path, "look", POSE, world="flat")
     before = path.read_text()
     with pytest.raises(InputError, match="there is a pose of this name"):
-        save_pose(tmp_path, "look", replace(POSE, opening_rad=0.0), world="flat")
+        save_pose(tmp_path, "look", replace(POSE, opening=0.0), world="flat")
     assert path.read_text() == before
 
 
@@ -109,7 +111,7 @@ def test_bad_arguments_are_one_clear_line(arguments, said):
 def test_the_plants_robot_is_driven_by_hand():
     """Half a metre ahead, the hand 10 cm up, the gripper closed; at rest half a second after the keys end."""
     world = open_world("flat")
-    simulation = simulate(world, seed=1, robot_name="Alice", record=False, start=Pose2D(5.2, 4.5, math.pi))
+    simulation = simulate(world, {"Alice": alone(world, start=Start(Pose2D(5.2, 4.5, math.pi)))}, seed=1, record=False)
     robot = simulation.robots["Alice"]
     context = context_for(world, robot, simulation.clock, simulation.starts["Alice"])
     hands, model = Teleop(context), arm_model(robot.capabilities())
@@ -146,8 +148,8 @@ def test_the_plants_robot_is_driven_by_hand():
     assert at_rest()
     turned = (before.rotation().inverse() @ hand().rotation()).matrix()
     assert np.abs(RollPitchYaw(turned).vector()).max() < 0.1
-    hold({"open": 1.0}, lambda: robot.gripper().opening_rad > 0.5)
-    hold({"open": -1.0}, lambda: robot.gripper().opening_rad < 0.05)
+    hold({"open": 1.0}, lambda: robot.gripper().opening > 0.5)
+    hold({"open": -1.0}, lambda: robot.gripper().opening < 0.05)
     most = np.max(speeds, axis=0)
     assert most[0] < OPTIONS.base.max_speed_m_s * 1.1
     assert max(rates) < OPTIONS.arm.joint_rad_s * 1.25

@@ -111,7 +111,7 @@ def not_finite(call):
         "odometry": {"velocity": (np.nan, 0.0, 0.0)},
         "imu": {"angular_velocity_B": (np.nan, 0.0, 0.0)},
         "joints": {"position_rad": {"arm_sh0": np.inf}},
-        "gripper": {"opening_rad": np.nan},
+        "gripper": {"opening": np.nan},
         "battery": {"charge": np.nan},
     }
     return dataclasses.replace(reading, **changes[call.verb])

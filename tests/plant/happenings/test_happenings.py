@@ -17,7 +17,9 @@ DOOR = DoorRule(name="door", at=AT, yaw=math.pi, width=0.9, closes=1.0, opens=5.
 
 
 def simulated(*, doors=(DOOR,), moves=(), start=None, seed=1):
-    return Simulation(FLAT.with_events(doors, moves), seed=seed, visuals=False, starts={} if start is None else {"Alice": start})
+    return Simulation(
+        FLAT.with_events(doors, moves), seed=seed, visuals=False, starts={} if start is None else {"Alice": start}
+    )
 
 
 def panel_W(simulation):

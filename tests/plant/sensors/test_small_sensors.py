@@ -68,7 +68,7 @@ def test_gripper_believes_it_holds_after_pressing_on_something_wide():
     assert not readings[0].holding
     assert readings[-1].holding
     assert np.mean([r.force_n for r in readings]) == pytest.approx(30.0, rel=0.1)
-    assert np.std([r.opening_rad for r in readings]) == pytest.approx(0.003, rel=0.4)
+    assert np.std([r.opening for r in readings]) == pytest.approx(0.003, rel=0.4)
 
 
 def test_gripper_pressing_on_itself_holds_nothing():

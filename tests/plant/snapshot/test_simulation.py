@@ -66,7 +66,7 @@ def test_things_stay_where_they_were(kept, restored):
 def test_sensors_go_on_with_their_errors(kept, restored):
     was, now = (each.robots["Alice"] for each in (kept[0], restored))
     assert now.battery().charge == pytest.approx(was.battery().charge, abs=0.01)
-    assert now.gripper().opening_rad == pytest.approx(was.gripper().opening_rad, abs=0.1)
+    assert now.gripper().opening == pytest.approx(was.gripper().opening, abs=0.1)
     assert now.scan() is not None
 
 

@@ -127,11 +127,11 @@ def test_impossible_arm_trajectories_are_refused(spot, lease, offset_rad, second
 def test_gripper_opens_and_closes_and_holds_nothing(engine, spot, lease):
     spot.set_gripper(1.0, 30.0, until_s=5.0, lease=lease)
     engine.advance(2.0)
-    assert spot.gripper().opening_rad == pytest.approx(1.0, abs=0.05)
+    assert spot.gripper().opening == pytest.approx(1.0, abs=0.05)
     closing = spot.set_gripper(0.0, 30.0, until_s=10.0, lease=lease)
     engine.advance(3.0)
     assert spot.command_status(closing).state is CommandState.DONE
-    assert spot.gripper().opening_rad == pytest.approx(0.0, abs=0.05)
+    assert spot.gripper().opening == pytest.approx(0.0, abs=0.05)
     assert not spot.gripper().holding
 
 

@@ -72,17 +72,17 @@ def test_a_moving_gripper_stays_where_it_is(engine, spot, lease):
     engine.advance(0.2)
     spot.stop(lease=lease)
     engine.advance(STILL_S)
-    opening_rad = spot.gripper().opening_rad
+    opening_rad = spot.gripper().opening
     assert 0.1 < opening_rad < 1.0
     engine.advance(0.5)
-    assert spot.gripper().opening_rad == pytest.approx(opening_rad, abs=0.02)
+    assert spot.gripper().opening == pytest.approx(opening_rad, abs=0.02)
 
 
 def test_a_gripper_that_is_stopped_before_it_opens_stays_closed(engine, spot, lease):
     spot.set_gripper(1.4, 20.0, until_s=engine.now() + 5.0, lease=lease)
     spot.stop(lease=lease)
     engine.advance(0.5)
-    assert spot.gripper().opening_rad < 0.05
+    assert spot.gripper().opening < 0.05
 
 
 def test_a_body_on_its_way_down_stays_where_it_is(engine, spot, lease):

@@ -103,7 +103,7 @@ def test_paused_at_any_moment_it_does_all_and_nothing_twice(bench, robot, tick):
     assert run(skill, bench, {tick}) == Succeeded("done")
     assert skill.story == ["stand", "reach", "open"]
     assert robot.q_rad == pytest.approx(REACH)
-    assert (robot.height_m, robot.opening_rad) == (pytest.approx(0.56, abs=0.021), pytest.approx(1.2))
+    assert (robot.height_m, robot.opening) == (pytest.approx(0.56, abs=0.021), pytest.approx(1.2))
 
 
 def test_pauses_again_and_again_let_it_come_to_its_end(bench):
@@ -126,7 +126,7 @@ def test_when_the_robot_was_elsewhere_it_looks_anew(bench, robot):
 
 def test_when_the_thing_was_lost_it_looks_anew(bench, robot):
     robot.in_gripper_rad = 0.3
-    robot.opening_rad, robot.clamp_force_n = 0.3, 20.0
+    robot.opening, robot.clamp_force_n = 0.3, 20.0
 
     def lose():
         robot.in_gripper_rad = None

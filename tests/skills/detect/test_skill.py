@@ -236,7 +236,7 @@ def test_what_may_be_meant_though_it_is_likelier_something_else_is_looked_at_fro
 def test_the_gripper_is_opened_to_look_and_closed_again():
     robot = ScriptedRobot(things=[])
     failed(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,)), Cause.POSTCONDITION, "no coke")
-    assert robot.opening_rad == 0.0
+    assert robot.opening == 0.0
 
 
 def test_the_same_scene_gives_the_same_log():

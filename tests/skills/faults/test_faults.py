@@ -268,7 +268,7 @@ def test_a_gripper_that_loses_it_lets_it_fall_and_closes(holding, clock):
     robot, inner, _ = holding
     assert all(polled(robot, clock, 0.95))
     assert not any(polled(robot, clock, 1.0)[3:])
-    assert robot.gripper().opening_rad == pytest.approx(0.0)
+    assert robot.gripper().opening == pytest.approx(0.0)
     assert any(block.loose and block.z0 == 0.0 for block in inner.blocks)
 
 

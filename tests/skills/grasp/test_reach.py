@@ -39,7 +39,7 @@ def test_a_body_of_one_height_has_one():
 
 def _check(boxes):
     return ReachCheck(
-        ArmScene(CAPABILITIES, MODEL, {}), boxes, HERE.transform(USUAL_M), CAN, CANDIDATES, GRIPPER.open_rad
+        ArmScene(CAPABILITIES, MODEL, {}), boxes, HERE.transform(USUAL_M), CAN, CANDIDATES, GRIPPER.widest
     )
 
 

@@ -12,7 +12,7 @@ BEER = ObjectObservation(0.0, Thing("beer"), (0.8, 0.0, 0.8), (0.066, 0.066, 0.2
 
 
 def test_a_full_gripper_is_a_failed_precondition():
-    robot = ScriptedRobot(holding=True, opening_rad=0.3)
+    robot = ScriptedRobot(holding=True, opening=0.3)
     failed(Grasp(context_of(robot)), SEEN, Cause.PRECONDITION, "holds something already")
     assert robot.arm_commands == []
 
@@ -21,7 +21,7 @@ def test_a_thing_that_is_gone_is_a_failed_precondition_and_the_arm_is_stowed():
     robot = ScriptedRobot()
     failed(Grasp(context_of(robot)), SEEN, Cause.PRECONDITION, "no longer where it was seen")
     assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
-    assert robot.opening_rad == 0.0
+    assert robot.opening == 0.0
 
 
 def test_a_refused_arm_is_a_failed_execution_with_the_robots_reason():
@@ -30,10 +30,10 @@ def test_a_refused_arm_is_a_failed_execution_with_the_robots_reason():
 
 
 def test_a_second_attempt_starts_anew():
-    robot = ScriptedRobot(holding=True, opening_rad=0.3)
+    robot = ScriptedRobot(holding=True, opening=0.3)
     skill = Grasp(context_of(robot))
     failed(skill, SEEN, Cause.PRECONDITION, "holds something already")
-    robot.holding, robot.opening_rad = False, 0.0
+    robot.holding, robot.opening = False, 0.0
     failed(skill, SEEN, Cause.PRECONDITION, "no longer where it was seen")
 
 
@@ -61,7 +61,7 @@ class Heavy(Grasp):
 
 
 def test_what_weighs_more_than_the_arm_carries_is_set_down_and_refused_with_its_mass():
-    robot = ScriptedRobot(q=np.array([0.0, -1.6, 1.6, 0.0, 0.4, 0.0]), holding=True, opening_rad=0.3)
+    robot = ScriptedRobot(q=np.array([0.0, -1.6, 1.6, 0.0, 0.4, 0.0]), holding=True, opening=0.3)
     before = MODEL.X_BH(robot.q).translation()
     why = "the coke weighs 5.6 kg, and the arm carries 5.0 kg at most"
     failed(Heavy(context_of(robot), 5.6), SEEN, Cause.PRECONDITION, why)
@@ -69,7 +69,7 @@ def test_what_weighs_more_than_the_arm_carries_is_set_down_and_refused_with_its_
 
 
 def test_what_the_arm_carries_is_not_set_down():
-    robot = ScriptedRobot(holding=True, opening_rad=0.3)
+    robot = ScriptedRobot(holding=True, opening=0.3)
     skill = Heavy(context_of(robot), 4.9)
     skill.begin(SEEN)
     assert isinstance(skill.step(), Succeeded)
@@ -86,11 +86,11 @@ def resumed(skill, inputs):
 
 
 def test_a_thing_that_is_held_after_a_restart_is_not_taken_again():
-    robot = ScriptedRobot(holding=True, opening_rad=0.3, gripper_stops_rad=0.3)
+    robot = ScriptedRobot(holding=True, opening=0.3, gripper_stops_rad=0.3)
     step = resumed(Grasp(context_of(robot)), SEEN)
     assert isinstance(step, Succeeded), step
     assert step.message == "the coke was in the gripper already; holding it"
-    assert (robot.opening_rad, robot.holding) == (0.3, True)
+    assert (robot.opening, robot.holding) == (0.3, True)
 
 
 def test_after_a_restart_with_an_empty_gripper_the_robot_looks_before_it_takes():

@@ -38,7 +38,7 @@ class _Person(ScriptedRobot):
 
 
 def _holding(**scripted):
-    return _Person(q=CARRYING.copy(), holding=True, opening_rad=0.3, **scripted)
+    return _Person(q=CARRYING.copy(), holding=True, opening=0.3, **scripted)
 
 
 def _before_robin(**how):
@@ -113,7 +113,7 @@ def test_what_is_lost_while_it_is_held_out_is_no_hand_over():
 
 def test_what_stays_in_the_open_gripper_is_told():
     robot = _before_robin()
-    robot.gripper = lambda: Gripper(robot.now_s, robot.opening_rad, 5.0, True)
+    robot.gripper = lambda: Gripper(robot.now_s, robot.opening, 5.0, True)
     failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "still in the open gripper")
 
 

@@ -25,14 +25,14 @@ def test_an_empty_gripper_is_a_failed_precondition():
 
 
 def test_a_surface_that_is_not_seen_is_a_failed_planning_and_the_thing_is_kept():
-    robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening_rad=0.3)
+    robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening=0.3)
     failed(Place(context_of(robot)), PlaceInputs(TABLE), Cause.PLANNING, "the kitchen table is not seen from here")
     assert robot.holding
-    assert robot.opening_rad == 0.3
+    assert robot.opening == 0.3
 
 
 def test_a_surface_without_a_spot_out_of_the_way_is_a_failed_planning_before_anything_moves():
-    robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening_rad=0.3)
+    robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening=0.3)
     inputs = PlaceInputs(TABLE, clear_of=((1.0, 0.0, 2.0),))
     failed(Place(context_of(robot)), inputs, Cause.PLANNING, "the kitchen table has no room out of the way")
     assert (robot.arm_commands, robot.holding) == ([], True)
@@ -64,7 +64,7 @@ def test_after_a_restart_an_empty_gripper_makes_the_robot_look_whether_the_thing
 
 
 def test_a_thing_still_held_after_a_restart_is_put_down_as_it_was_brought():
-    robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening_rad=0.3)
+    robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening=0.3)
     skill = Place(context_of(robot))
     skill.checkpoint = {"carried": np.eye(3).tolist()}
     assert np.array_equal(skill._carried().matrix(), np.eye(3))

@@ -14,7 +14,7 @@ def test_the_arm_takes_the_pose_and_the_gripper_opens():
     robot = ScriptedRobot()
     assert isinstance(outcome(PoseArm(context_of(robot)), PoseArmInputs(POSE, 0.5)), Succeeded)
     assert robot.q == pytest.approx(POSE)
-    assert robot.opening_rad == pytest.approx(0.5)
+    assert robot.opening == pytest.approx(0.5)
 
 
 def test_an_arm_in_the_pose_is_not_moved():
@@ -24,9 +24,9 @@ def test_an_arm_in_the_pose_is_not_moved():
 
 
 def test_what_is_held_stays_held():
-    robot = ScriptedRobot(holding=True, opening_rad=0.3)
+    robot = ScriptedRobot(holding=True, opening=0.3)
     outcome(PoseArm(context_of(robot)), PoseArmInputs(POSE, 1.0))
-    assert robot.opening_rad == 0.3
+    assert robot.opening == 0.3
 
 
 def test_a_pose_of_another_arm_is_refused():

@@ -23,18 +23,18 @@ def test_an_arm_that_is_out_is_stowed():
 
 
 def test_an_open_empty_gripper_is_closed_first():
-    robot = ScriptedRobot(q=OUT.copy(), opening_rad=1.4)
+    robot = ScriptedRobot(q=OUT.copy(), opening=1.4)
     outcome(Stow(context_of(robot)), StowInputs())
-    assert robot.opening_rad == 0.0
+    assert robot.opening == 0.0
 
 
 def test_a_held_thing_is_drawn_in_and_kept():
-    robot = ScriptedRobot(q=OUT.copy(), holding=True, opening_rad=0.3)
+    robot = ScriptedRobot(q=OUT.copy(), holding=True, opening=0.3)
     assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
     hand = MODEL.X_BH(robot.q).translation()
     assert hand[0] < 0.52
     assert abs(hand[1]) < 0.2
-    assert robot.opening_rad == 0.3
+    assert robot.opening == 0.3
 
 
 def test_an_arm_that_is_stopped_is_a_failed_execution():

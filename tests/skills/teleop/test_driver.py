@@ -164,11 +164,11 @@ def test_the_arm_stops_before_it_touches_the_body():
 
 def test_the_gripper_opens_and_closes_step_by_step(robot):
     driven(robot, {"open": 1.0}, 0.5)
-    assert robot.opening_rad == pytest.approx(0.5)
+    assert robot.opening == pytest.approx(0.5)
     driven(robot, {"open": 1.0}, 5.0)
-    assert robot.opening_rad == pytest.approx(GRIPPER.open_rad)
+    assert robot.opening == pytest.approx(GRIPPER.widest)
     driven(robot, {"open": -1.0}, 5.0)
-    assert robot.opening_rad == 0.0
+    assert robot.opening == 0.0
 
 
 def test_the_body_rises_within_its_range(robot):

@@ -124,7 +124,7 @@ def test_the_gripper_stops_at_what_is_in_it(clock, spot):
     robot.set_gripper(0.0, 60.0, until_s=9.0, lease=lease)
     clock.advance(1.0)
     assert robot.gripper().holding
-    assert robot.gripper().opening_rad == 0.4
+    assert robot.gripper().opening == 0.4
 
 
 def test_an_empty_gripper_closes_on_nothing(clock, spot):
@@ -134,7 +134,7 @@ def test_an_empty_gripper_closes_on_nothing(clock, spot):
     clock.advance(1.0)
     robot.set_gripper(0.0, 60.0, until_s=9.0, lease=lease)
     clock.advance(1.0)
-    assert (robot.gripper().opening_rad, robot.gripper().holding) == (pytest.approx(0.0), False)
+    assert (robot.gripper().opening, robot.gripper().holding) == (pytest.approx(0.0), False)
 
 
 def test_the_arm_follows_its_trajectory(clock, spot):

@@ -343,7 +343,7 @@ def slipping(compiled, run_tree, script, robot):
 
         def slip(progress):
             if left and progress.now_s > left[0]:
-                robot.opening_rad -= 0.06
+                robot.opening -= 0.06
                 left.pop(0)
 
         script.steps, robot.holding = 40, True

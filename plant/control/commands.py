@@ -18,6 +18,7 @@ class Part(enum.Enum):
     POSTURE = "posture"
     ARM = "arm"
     GRIPPER = "gripper"
+    HEAD = "head"
 
 
 @dataclass(frozen=True)

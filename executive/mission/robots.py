@@ -1,0 +1,141 @@
+"""The robots of a run: their names, and for each its kind and where and with what it begins."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from executive.mission.errors import InputError, known_names, suggestion
+from skills.quantities import Angle, Coordinate, in_range
+from skills.robot import Pose2D
+
+__all__ = [
+    "EVERYBODY",
+    "RobotSetup",
+    "checked_kind",
+    "checked_name",
+    "display_name",
+    "name_key",
+    "parse_robots",
+    "robot_called",
+    "same_name",
+]
+
+EVERYBODY: Final = frozenset({"all", "both", "everybody", "everyone", "you", "all robots", "all of you"})
+"""Words that call all robots: none is the name of one."""
+_FORM: Final = "write NAME=KIND for each, for instance alice=spot,bob=fetch"
+_START_FORM: Final = "write NAME=KIND@X,Y,YAW, x and y in metres and the heading in radians"
+_NAME: Final = re.compile(r"[^\W\d_][\w' .-]*")
+_ASSIGNED: Final = re.compile(r"([^=@,]*)=(.*)", re.DOTALL)
+_NUMBER: Final = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?\s*", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class RobotSetup:
+    """One robot of a run.
+
+    `kind` is a name of the entry-point group `errand.robots`; the robot begins at `start` (world frame), charges at the
+    place `dock` and uses the components of the file `stack`. What is None is as the world says, or the kind.
+    """
+
+    kind: str
+    start: Pose2D | None = None
+    dock: str | None = None
+    stack: Path | None = None
+
+
+def name_key(name: str) -> str:
+    """What two names of the same robot have in common: neither case nor signs between words count."""
+    return re.sub(r"[\W_]+", " ", name.casefold()).strip()
+
+
+def display_name(name: str) -> str:
+    """A robot's name as people read it: "alice" is Alice; capitals that are written stay."""
+    return name[:1].upper() + name[1:]
+
+
+def robot_called(said: str, names: Iterable[str]) -> str | None:
+    """Which of the robots `names` is meant, as that name is written; None for no robot."""
+    return next((name for name in names if name_key(name) == name_key(said)), None)
+
+
+def same_name(name: str, names: Iterable[str]) -> InputError | None:
+    """The error when `name` is one of `names`, or differs from it only in case or signs; None when it does not."""
+    other = robot_called(name, names)
+    if other is None:
+        return None
+    what = f"two robots are called '{name}'" if other == name else f"'{other}' and '{name}' are the same name"
+    return InputError(what, hint="give one of them another name")
+
+
+def checked_name(name: str) -> str:
+    """The name, if a robot can have it. Raises InputError."""
+    if not name:
+        raise InputError("a robot without a name", hint=_FORM)
+    if not _NAME.fullmatch(name) or not name_key(name).strip():
+        raise InputError(f"'{name[:60]}' is no name for a robot", hint="begin it with a letter, as in 'alice'")
+    if name_key(name) in EVERYBODY:
+        raise InputError(f"'{name}' calls all robots, and can be the name of none", hint="give it another name")
+    return name
+
+
+def checked_kind(kind: str, kinds: Collection[str]) -> str:
+    """The kind, if it is one of those known. Raises InputError, which lists them and suggests the nearest."""
+    if kind not in kinds:
+        known = known_names(kind, sorted(kinds))
+        near = suggestion(kind, kinds, known)
+        raise InputError(f"unknown kind of robot '{kind[:60]}'", hint=near if near == known else f"{near} ({known})")
+    return kind
+
+
+def parse_robots(text: str, kinds: Collection[str]) -> Mapping[str, RobotSetup]:
+    """The robots of the option `--robots`, in its order: "alice=spot,bob=fetch" or "alice=spot@1.0,2.0,1.57,bob=fetch".
+
+    Names stay as they are written.
+
+    Raises:
+        InputError: there is none, two have one name, a name or start is none, or a kind is not among `kinds`.
+    """
+    robots: dict[str, RobotSetup] = {}
+    for said in _entries(text):
+        match = _ASSIGNED.fullmatch(said)
+        if match is None:
+            raise InputError(f"'{said.strip()[:60]}' gives no robot with its kind", hint=_FORM)
+        name, (kind, at, start) = checked_name(match[1].strip()), match[2].partition("@")
+        if (double := same_name(name, robots)) is not None:
+            raise double
+        checked_kind(kind.strip(), kinds)
+        robots[name] = RobotSetup(kind.strip(), _start(name, start) if at else None)
+    return MappingProxyType(robots)
+
+
+def _entries(text: str) -> Iterator[str]:
+    """The parts of the option, one for each robot; the commas in a start separate none. Raises InputError: none."""
+    if not text.strip(" ,"):
+        raise InputError("no robots are named", hint=_FORM)
+    entry = ""
+    for piece in text.split(","):
+        if "@" in entry and _NUMBER.fullmatch(piece):
+            entry = f"{entry},{piece}"
+            continue
+        if entry:
+            yield entry
+        entry = piece
+        if not piece.strip():
+            raise InputError(f"'{text[:60]}' has a comma too many", hint=_FORM)
+    yield entry
+
+
+def _start(name: str, text: str) -> Pose2D:
+    error = InputError(f"'{text[:60]}' is no start for {name}", hint=_START_FORM)
+    try:
+        x, y, yaw = (float(part) for part in text.split(","))
+    except ValueError:
+        raise error from None
+    if not all(in_range(value, hint) for value, hint in ((x, Coordinate), (y, Coordinate), (yaw, Angle))):
+        raise error
+    return Pose2D(x, y, yaw)

@@ -1,0 +1,161 @@
+"""What all simulated robots share behind the Robot protocol: sensing, the command book and the lease."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from plant.control.commands import CommandTable, Part
+from plant.control.leases import LeaseManager
+from plant.sensors.suite import SensorSuite
+from skills.robot import (
+    Battery,
+    Capabilities,
+    CommandId,
+    CommandState,
+    CommandStatus,
+    Gripper,
+    Image,
+    Imu,
+    Joints,
+    Lease,
+    Odometry,
+    Scan,
+)
+
+
+class CommandedRobot(ABC):
+    """A robot that senses, keeps the book of its commands, and obeys who holds its lease."""
+
+    def __init__(self, name: str, capabilities: Capabilities, sensors: SensorSuite) -> None:
+        self._name, self._capabilities, self._sensors = name, capabilities, sensors
+        self._commands, self._leases = CommandTable(), LeaseManager(name)
+        self._now_s = 0.0
+
+    # -- know and sense -------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self._name
+
+    def capabilities(self) -> Capabilities:
+        """What this robot is and can do."""
+        return self._capabilities
+
+    def odometry(self) -> Odometry:
+        """Latest dead reckoning."""
+        return self._sensors.odometry
+
+    def imu(self) -> Imu:
+        """Latest inertial measurement."""
+        return self._sensors.imu
+
+    def scan(self) -> Scan | None:
+        """Latest LiDAR revolution, None before the first."""
+        return self._sensors.scan
+
+    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
+        """Take a picture with depth now, or only one of the two. Raises ValueError for an unknown source."""
+        return self._sensors.image(source, visual=visual, depth=depth)
+
+    def joints(self) -> Joints:
+        """Latest joint state."""
+        return self._sensors.joints
+
+    def gripper(self) -> Gripper:
+        """Latest gripper state."""
+        return self._sensors.gripper
+
+    def battery(self) -> Battery:
+        """Latest battery state."""
+        return self._sensors.battery
+
+    def faults(self) -> tuple[str, ...]:
+        """Present faults, empty when well."""
+        return ()
+
+    # -- act ------------------------------------------------------------------------------------------------------
+
+    def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
+        """Stop all motion, or only the given command if it still runs."""
+        refusal = self._leases.refusal(lease)
+        if refusal:
+            return self._commands.refuse(f"stop: {refusal}")
+        part = self._commands.part_of(only) if only is not None else None
+        for candidate in Part if only is None else ([part] if part else []):
+            self._halt(candidate, "stopped by command")
+        return self._commands.note(CommandState.DONE)
+
+    def command_status(self, command: CommandId) -> CommandStatus:
+        """What became of a command. Raises KeyError for an id never given."""
+        return self._commands.status(command)
+
+    # -- own ------------------------------------------------------------------------------------------------------
+
+    def lease_holder(self) -> Lease | None:
+        """The lease that counts now; None while it is free."""
+        return self._leases.current
+
+    def acquire_lease(self, holder: str) -> Lease:
+        """Take a free lease. Raises LeaseError when another holds it."""
+        return self._leases.acquire(holder)
+
+    def take_lease(self, holder: str) -> Lease:
+        """Take the lease from whoever holds it; the robot stops."""
+        self._halt_all("the lease was taken by " + repr(holder))
+        return self._leases.take(holder)
+
+    def return_lease(self, lease: Lease) -> None:
+        """Give the lease back; the robot stops. A lease that was taken away is ignored."""
+        if self._leases.give_back(lease):
+            self._halt_all("the lease was returned")
+
+    # -- called by the simulation ---------------------------------------------------------------------------------
+
+    def sense(self, now_s: float) -> None:
+        """Take new sensor readings."""
+        self._now_s = now_s
+        self._sensors.update(now_s)
+
+    # -- for the kinds of robots ----------------------------------------------------------------------------------
+
+    @abstractmethod
+    def _hold_still(self, part: Part) -> None:
+        """Make where a moving part is the place where it stays."""
+
+    def _forget_commands(self, now_s: float) -> None:
+        """Power up anew: nobody has the lease, no command runs."""
+        self._now_s = now_s
+        self._commands, self._leases = CommandTable(), LeaseManager(self._name)
+
+    def _begin(self, part: Part, payload: object, until_s: float, lease: Lease) -> CommandId:
+        refusal = self._leases.refusal(lease)
+        if refusal:
+            return self._commands.refuse(f"{part.value}: {refusal}")
+        if until_s <= self._now_s:
+            return self._commands.refuse(
+                f"{part.value}: expires at {until_s:.2f} s, and it is {self._now_s:.2f} s already"
+            )
+        return self._commands.begin(part, payload, self._now_s, until_s)
+
+    def _runs(self, command: CommandId) -> bool:
+        return self._commands.status(command).state is CommandState.RUNNING
+
+    def _halt_all(self, reason: str) -> None:
+        for part in Part:
+            self._halt(part, reason)
+
+    def _halt(self, part: Part, reason: str) -> None:
+        if self._commands.running(part) is not None:
+            self._hold_still(part)
+        self._commands.finish(part, CommandState.STOPPED, reason)
+
+    def _expire(self) -> None:
+        for part in Part:
+            active = self._commands.running(part)
+            if active is None or self._now_s < active.until_s - 1e-9:
+                continue
+            if part is Part.VELOCITY:
+                self._commands.finish(part, CommandState.DONE)
+            else:
+                self._halt(part, "expired before it was done")

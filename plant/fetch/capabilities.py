@@ -1,0 +1,103 @@
+"""What the simulated Fetch is and can do."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+from pydrake.math import RollPitchYaw, RotationMatrix
+
+from plant.models.fetch.description import FINGERS, HEAD_JOINTS, arm_joint_names, fetch_facts, fetch_urdf
+from plant.sensors.camera_spec import CameraSpec
+from skills.robot import (
+    ArmCapabilities,
+    BaseKind,
+    CameraCapabilities,
+    Capabilities,
+    GripperCapabilities,
+    GripperKind,
+    HeadCapabilities,
+    Mount,
+)
+
+HEAD_CAMERA = "head"
+_CORNERS = 12
+
+
+@cache
+def fetch_capabilities() -> Capabilities:
+    """The capabilities of Fetch."""
+    facts = fetch_facts()
+    body, arm, head = facts["capabilities"], facts["arm"], facts["head"]
+    height_m, (down_m, up_m) = facts["lift"]["height"], facts["lift"]["range"]
+    return Capabilities(
+        footprint_m=_round(body["footprint_radius"]),
+        max_speed_m_s=body["max_speed"],
+        max_turn_rate_rad_s=body["max_turn_rate"],
+        standing_height_m=height_m + body["travelling_lift"],
+        height_range_m=(height_m + down_m, height_m + up_m),
+        pitch_range_rad=(0.0, 0.0),
+        arm=ArmCapabilities(
+            tuple(arm_joint_names()),
+            body["max_reach"],
+            tuple(facts["stowed"][part["link"]] for part in arm),
+            body["max_payload"],
+        ),
+        gripper=_gripper(),
+        cameras=(CameraCapabilities(HEAD_CAMERA, head_camera().X_link_camera(), Mount.HEAD),),
+        description=fetch_urdf(root="body"),
+        base_kind=BaseKind.DIFFERENTIAL,
+        head=HeadCapabilities(
+            HEAD_JOINTS,
+            tuple(head[0]["offset"]),
+            tuple(head[1]["offset"]),
+            tuple(head[0]["range"]),
+            tuple(head[1]["range"]),
+        ),
+    )
+
+
+def _gripper() -> GripperCapabilities:
+    gripper = fetch_facts()["gripper"]
+    return GripperCapabilities(
+        finger_joints=tuple((finger, 0.5) for finger in FINGERS),
+        widest=gripper["max_opening"],
+        max_opening_m=gripper["max_opening"],
+        max_force_n=gripper["max_force"],
+        depth_m=gripper["depth"],
+        kind=GripperKind.PARALLEL,
+        **{f"{name}_m": value for name, value in gripper["in_hand"].items()},
+    )
+
+
+def _round(radius_m: float) -> tuple[tuple[float, float], ...]:
+    """A polygon about a circle, counter-clockwise."""
+    out_m = radius_m / math.cos(math.pi / _CORNERS)
+    angles = [(k + 0.5) * math.tau / _CORNERS for k in range(_CORNERS)]
+    return tuple((out_m * math.cos(a), out_m * math.sin(a)) for a in angles)
+
+
+@cache
+def head_camera() -> CameraSpec:
+    """The head's camera: colour and depth of the same size."""
+    camera = fetch_facts()["camera"]
+    width, height = camera["width"], camera["height"]
+    focal = width / 2.0 / math.tan(math.radians(camera["horizontal_field_of_view_deg"]) / 2.0)
+    ahead = RotationMatrix(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
+    rpy = np.degrees(RollPitchYaw(ahead).vector())
+    return CameraSpec(
+        name=HEAD_CAMERA,
+        link=camera["link"],
+        colour=True,
+        rpy_deg=(float(rpy[0]), float(rpy[1]), float(rpy[2])),
+        xyz_m=tuple(camera["xyz"]),
+        width=width,
+        height=height,
+        fx=focal,
+        fy=focal,
+        cx=(width - 1) / 2.0,
+        cy=(height - 1) / 2.0,
+        depth_shrink=camera["depth_shrink"],
+        depth_range_m=tuple(camera["depth"]),
+    )

@@ -1,0 +1,155 @@
+"""Fetch's model as URDF text, made of the facts in `fetch.yaml` and of primitive shapes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import yaml
+
+from plant.models import urdf
+
+FACTS = Path(__file__).with_name("fetch.yaml")
+BASE_LINK, BODY_LINK, CASTERS_LINK, HAND_LINK, HEAD_LINK = "base_link", "body", "casters", "wrist_roll", "head_tilt"
+WHEELS = ("left_wheel", "right_wheel")
+FINGERS = ("left_finger", "right_finger")
+LIFT_JOINT = "torso_lift"
+HEAD_JOINTS = ("head_pan", "head_tilt")
+
+
+@cache
+def fetch_facts() -> Mapping[str, Any]:
+    """The facts in `fetch.yaml`."""
+    facts: Mapping[str, Any] = yaml.load(FACTS.read_text(), Loader=yaml.CSafeLoader)
+    return facts
+
+
+def fetch_urdf(*, root: str = BASE_LINK) -> str:
+    """URDF text of Fetch whose free root link is `base_link`, or `body`, from which the base then hangs.
+
+    The lift's joint reads the same either way: 0 with the torso down.
+    """
+    facts = fetch_facts()
+    robot = ElementTree.Element("robot", name="fetch")
+    urdf.add_materials(robot, facts["colours"])
+    _add(robot, BASE_LINK, _base(facts))
+    _add(robot, BODY_LINK, facts["body"])
+    _add_lift(robot, facts["lift"], root)
+    _add_casters(robot, facts["casters"])
+    for name, side in zip(WHEELS, (1, -1), strict=True):
+        _add_wheel(robot, name, side, facts["wheel"])
+    for chain in (facts["head"], facts["arm"]):
+        parent = BODY_LINK
+        for part in chain:
+            _add(robot, part["link"], part)
+            kind = "continuous" if part["range"] is None else "revolute"
+            urdf.add_joint(robot, part["link"], parent, part["link"], part, kind)
+            parent = part["link"]
+    for name, side in zip(FINGERS, (1, -1), strict=True):
+        _add_finger(robot, name, side, facts["finger"])
+    ElementTree.indent(robot)
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _base(facts: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The base with the column on it, as one link."""
+    base, column = facts["base"], facts["column"]
+    offset = np.array(column["xyz"])
+    parts = [({**base, "mass": base["mass"] - facts["casters"]["mass"]}, np.zeros(3)), (column, offset)]
+    mass = sum(part["mass"] for part, _ in parts)
+    com = sum(part["mass"] * (np.array(part["com"]) + at) for part, at in parts) / mass
+    moments = np.zeros(3)
+    for part, at in parts:
+        x, y, z = np.array(part["com"]) + at - com
+        own = [part["inertia"][key] for key in ("ixx", "iyy", "izz")]
+        moments += np.array(own) + part["mass"] * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
+    return {
+        "mass": mass,
+        "com": com.tolist(),
+        "inertia": dict(zip(("ixx", "iyy", "izz"), moments.tolist(), strict=True)),
+        "shapes": [*base["shapes"], *(_moved(shape, offset) for shape in column["shapes"])],
+        "looks": [*base["looks"], *(_moved(shape, offset) for shape in column["looks"])],
+    }
+
+
+def _moved(shape: urdf.Shape, offset: Any) -> urdf.Shape:
+    return {**shape, "xyz": [a + float(b) for a, b in zip(shape["xyz"], offset, strict=True)]}
+
+
+def _add(robot: ElementTree.Element, name: str, part: Mapping[str, Any]) -> None:
+    """A link with what touches and what is drawn."""
+    link = urdf.add_link(robot, name, part)
+    for index, shape in enumerate(part["shapes"]):
+        urdf.add_collision(link, f"{name}_{index}", shape, {})
+    for index, shape in enumerate(part["looks"]):
+        urdf.add_look(link, f"{name}_look_{index}", shape, shape["colour"])
+    if "pads" in part:
+        facts = fetch_facts()
+        pads = urdf.pad_shapes(part["pads"], facts["pad_friction"], facts["pad_stiffness_n_m"])
+        for index, (shape, contact) in enumerate(pads):
+            urdf.add_collision(link, f"{name}_pad_{index}", shape, contact)
+
+
+def _add_casters(robot: ElementTree.Element, casters: Mapping[str, Any]) -> None:
+    """What else stands on the floor: a link of its own, since what touches there is no collision."""
+    radius = casters["radius"]
+    link = urdf.add_link(robot, CASTERS_LINK, {**casters, "com": (0, 0, radius)})
+    urdf.add_fixed(robot, CASTERS_LINK, BASE_LINK, CASTERS_LINK, (0, 0, 0))
+    for index, (x, y) in enumerate(casters["places"]):
+        shape = {"sphere": radius, "xyz": [x, y, radius + casters["lift"]]}
+        urdf.add_collision(link, f"caster_{index}", shape, urdf.friction(0.0))
+        urdf.add_look(link, f"caster_look_{index}", shape, "black")
+
+
+def _add_wheel(robot: ElementTree.Element, name: str, side: int, wheel: Mapping[str, Any]) -> None:
+    x, y, z = wheel["offset"]
+    part = {
+        **wheel,
+        "com": (0, 0, 0),
+        "offset": (x, side * y, z),
+        "axis": (0, 1, 0),
+    }
+    link = urdf.add_link(robot, name, part)
+    ball = {"sphere": wheel["radius"], "xyz": (0, 0, 0)}
+    urdf.add_collision(link, f"{name}_0", ball, urdf.friction(wheel["friction"]))
+    tyre = {"cylinder": (wheel["radius"], wheel["width"]), "xyz": (0, 0, 0), "rpy": (math.pi / 2, 0, 0)}
+    urdf.add_look(link, f"{name}_look_0", tyre, "black")
+    urdf.add_joint(robot, name, BASE_LINK, name, part, "continuous")
+
+
+def _add_lift(robot: ElementTree.Element, lift: Mapping[str, Any], root: str) -> None:
+    up = 1 if root == BASE_LINK else -1
+    parent, child = (BASE_LINK, BODY_LINK) if root == BASE_LINK else (BODY_LINK, BASE_LINK)
+    part = {**lift, "offset": (0, 0, up * lift["height"]), "axis": (0, 0, up)}
+    urdf.add_joint(robot, lift["joint"], parent, child, part, "prismatic")
+
+
+def _add_finger(robot: ElementTree.Element, name: str, side: int, finger: Mapping[str, Any]) -> None:
+    """A finger; the one of the side -1 is mirrored along the closing, z."""
+    pads = finger["pads"]
+    part = {
+        **finger,
+        "com": _mirrored(finger["com"], side),
+        "shapes": [{**shape, "xyz": _mirrored(shape["xyz"], side)} for shape in finger["shapes"]],
+        "looks": [{**shape, "xyz": _mirrored(shape["xyz"], side)} for shape in finger["looks"]],
+        "pads": {**pads, "xz": [[x, side * z] for x, z in pads["xz"]]},
+        "axis": (0, 0, side),
+        "range": (0.0, finger["travel"]),
+    }
+    _add(robot, name, part)
+    urdf.add_joint(robot, name, HAND_LINK, name, part, "prismatic")
+
+
+def _mirrored(xyz: Sequence[float], side: int) -> list[float]:
+    x, y, z = xyz
+    return [x, y, side * z]
+
+
+def arm_joint_names() -> Sequence[str]:
+    """The seven arm joints from the shoulder on, without the gripper."""
+    return tuple(part["link"] for part in fetch_facts()["arm"])

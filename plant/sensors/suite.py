@@ -1,0 +1,215 @@
+"""The sensors of one robot together: snapshots taken from the plant's state, with noise from the seed."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import FrameId
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import RigidBody
+
+from plant.control.joints import ActuatedJoints, Indices
+from plant.kinds import RobotBody, SensorOptions
+from plant.scene import RENDERER
+from plant.sensors.battery import BatteryModel, BatterySpec
+from plant.sensors.camera import Camera
+from plant.sensors.camera_spec import CameraSpec
+from plant.sensors.gripper import GripperModel, GripperNoise
+from plant.sensors.imu import ImuModel
+from plant.sensors.joints import JointModel
+from plant.sensors.lidar import Lidar, LidarSpec
+from plant.sensors.noisy import NoisySensor
+from plant.sensors.odometry import OdometryModel
+from plant.snapshot.values import State
+from skills.robot import Battery, FloatArray, FrameTree, Gripper, Image, Imu, Joints, Odometry, Scan
+
+_DOCKED_WITHIN_M = 0.2
+_STILL_M_S = 0.02
+
+
+@dataclass(frozen=True)
+class LidarMount:
+    """A LiDAR on a link: its pose there, what it is, and every how many seconds it has turned once."""
+
+    link: RigidBody
+    X_LinkL: RigidTransform
+    spec: LidarSpec
+    period_s: float
+
+
+class SensorSuite(ABC):
+    """All sensors of one robot. Pictures are taken when asked for; `update` takes the readings, which are attributes.
+
+    A kind of robot says how its gripper reads, and where the frames are that its encoders know of.
+    """
+
+    def __init__(
+        self,
+        body: RobotBody,
+        joints: ActuatedJoints,
+        arm: Indices,
+        options: SensorOptions,
+        *,
+        lidar: LidarMount,
+        cameras: Mapping[str, CameraSpec],
+        runtime_s: float,
+        gripper_noise: GripperNoise | None = None,
+    ) -> None:
+        """`arm` are the arm's joints among all; cameras sit on links of the body."""
+        self._body, self._index, self._arm = body, joints, arm
+        self._dock, self._scene, self._context = options.dock, options.scene, options.context
+        self._kinematics = body.plant.CreateDefaultContext()
+        rngs = _generators(options.seed, body.name)
+        self._odometry_model = OdometryModel(next(rngs))
+        self._imu_model = ImuModel(next(rngs))
+        self._joint_model = JointModel(next(rngs), joints.names)
+        self._gripper_model = GripperModel(next(rngs), gripper_noise)
+        self._battery_model = BatteryModel(next(rngs), options.charge, BatterySpec(runtime_s=runtime_s))
+        self._lidar_period_s = lidar.period_s
+        self._lidar = Lidar(
+            body.plant,
+            options.scene_graph.model_inspector(),
+            lidar.link,
+            lidar.X_LinkL,
+            next(rngs),
+            unseen=body.instances(),
+            spec=lidar.spec,
+            work=options.work,
+        )
+        self._cameras = {
+            name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER, work=options.work)
+            for name, spec in cameras.items()
+        }
+        self.scan: Scan | None = None
+        self.update(0.0)
+
+    def _link_frame(self, link: str) -> FrameId:
+        plant = self._body.plant
+        return plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(link, self._body.instance).index())
+
+    def update(self, now_s: float) -> None:
+        """Take new readings of all but the cameras."""
+        plant, index = self._body.plant, self._index
+        self._now_s = now_s
+        X_WB = plant.EvalBodyPoseInWorld(self._context, self._body.body)
+        V_WB = plant.EvalBodySpatialVelocityInWorld(self._context, self._body.body)
+        w_WB, v_WB = _array(V_WB.rotational()), _array(V_WB.translational())
+        self.odometry: Odometry = self._odometry_model.update(now_s, self._reckoned(X_WB), w_WB, v_WB)
+        self.imu: Imu = self._imu_model.update(now_s, X_WB, w_WB, v_WB)
+        positions = _array(plant.GetPositions(self._context)[index.positions])
+        rates = _array(plant.GetVelocities(self._context)[index.velocities])
+        efforts = self._efforts(positions, rates)
+        self.joints: Joints = self._joint_model.update(now_s, positions, rates, efforts)
+        self.gripper: Gripper = self._gripper_model.update(now_s, *self._gripper_feels(positions, rates, efforts))
+        load = min(1.0, float(np.linalg.norm(v_WB)) + float(np.abs(rates[self._arm]).sum()) / 4.0)
+        self.battery: Battery = self._battery_model.update(now_s, load, docked=self._docked(X_WB, v_WB))
+        if self.scan is None or now_s - self.scan.stamp_s >= self._lidar_period_s - 1e-6:
+            self.scan = self._lidar.scan(self._context, now_s, self.odometry.X_OB, self._X_BL())
+
+    def _reckoned(self, X_WB: RigidTransform) -> RigidTransform:
+        """The body's pose that odometry measures, but for its errors."""
+        return X_WB
+
+    @abstractmethod
+    def _gripper_feels(self, positions: FloatArray, rates: FloatArray, efforts: FloatArray) -> tuple[float, float]:
+        """The true opening, and the force at the tip (N), 0 while it moves freely."""
+
+    @abstractmethod
+    def _X_BL(self) -> RigidTransform:
+        """Pose of the LiDAR in the body frame, as far as the robot knows it."""
+
+    @abstractmethod
+    def _frames_of_links(self) -> Mapping[str, tuple[str, RigidTransform]]:
+        """Frames of links that bear cameras, or are the hand, by link: the frame's name and its pose in the body."""
+
+    def _efforts(self, positions: FloatArray, rates: FloatArray) -> FloatArray:
+        """What the motors do: the servos' law with limits, as the plant's solver has it at the end of a step."""
+        plant, instance = self._body.plant, self._body.instance
+        servos = plant.get_desired_state_input_port(instance)
+        if not servos.HasValue(self._context):
+            return np.zeros(len(positions))
+        desired = _array(servos.Eval(self._context))
+        feed_forward = _array(plant.get_actuation_input_port(instance).Eval(self._context))
+        return self._index.efforts_of(desired, feed_forward, positions, rates)
+
+    def _docked(self, X_WB: RigidTransform, v_WB: FloatArray) -> bool:
+        """Whether the body stands still at the dock."""
+        if self._dock is None:
+            return False
+        p_WB = X_WB.translation()
+        off_m = math.hypot(p_WB[0] - self._dock.x_m, p_WB[1] - self._dock.y_m)
+        return off_m < _DOCKED_WITHIN_M and float(np.linalg.norm(v_WB[:2])) < _STILL_M_S
+
+    def state(self) -> State:
+        """What changes from one reading to the next; the readings themselves are taken anew."""
+        return {name: part.state() for name, part in self._parts().items()}
+
+    def restore(self, state: State, now_s: float) -> None:
+        """Go on from such a state, and take readings."""
+        for name, part in self._parts().items():
+            part.restore(state[name])
+        self.scan = None
+        self.update(now_s)
+
+    def _parts(self) -> Mapping[str, NoisySensor]:
+        return {
+            "odometry": self._odometry_model,
+            "imu": self._imu_model,
+            "joints": self._joint_model,
+            "gripper": self._gripper_model,
+            "battery": self._battery_model,
+            "lidar": self._lidar,
+            **{f"camera {name}": camera for name, camera in self._cameras.items()},
+        }
+
+    def image(self, source: str, *, visual: bool, depth: bool) -> Image:
+        """Render a picture, its depth, or both.
+
+        Raises:
+            ValueError: the source is unknown.
+            LookupError: nothing is rendered.
+        """
+        if source not in self._cameras:
+            raise ValueError(f"{self._body.name} has no camera {source!r}; it has {', '.join(self._cameras)}")
+        if self._scene is None:
+            raise LookupError("nothing is rendered: build the Diagram with render=True")
+        query = self._scene.query_at(self._body.plant.GetPositions(self._context))
+        return self._cameras[source].take(query, self._now_s, self._frames(), visual=visual, depth=depth)
+
+    def _frames(self) -> FrameTree:
+        """The frame tree from odometry and joint encoders."""
+        links = self._frames_of_links()
+        edges = {"body": ("odom", self.odometry.X_OB), "lidar": ("body", self._X_BL())}
+        edges |= {frame: ("body", X_BF) for frame, X_BF in links.values()}
+        for camera in self._cameras.values():
+            frame = links[camera.spec.link][0] if camera.spec.link in links else "body"
+            edges[camera.spec.frame] = (frame, camera.spec.X_link_camera())
+        return FrameTree(edges)
+
+    def _X_BLinks(self, joint_names: tuple[str, ...], links: tuple[str, ...]) -> list[RigidTransform]:
+        """Poses of links in the body frame, with these joints where their encoders read."""
+        plant, instance = self._body.plant, self._body.instance
+        positions = plant.GetPositions(self._kinematics)
+        for name in joint_names:
+            positions[plant.GetJointByName(name, instance).position_start()] = self.joints.position_rad[name]
+        plant.SetPositions(self._kinematics, positions)
+        frames = [plant.GetBodyByName(link, instance).body_frame() for link in links]
+        body = self._body.body.body_frame()
+        return [plant.CalcRelativeTransform(self._kinematics, body, frame) for frame in frames]
+
+
+def _generators(seed: int, robot_name: str) -> Iterator[np.random.Generator]:
+    """Independent generators, the same for the same seed and name."""
+    sequence = np.random.SeedSequence([seed, zlib.crc32(robot_name.encode())])
+    while True:
+        (child,) = sequence.spawn(1)
+        yield np.random.default_rng(child)
+
+
+def _array(values: object) -> FloatArray:
+    return np.asarray(values, dtype=np.float64)

@@ -1,0 +1,167 @@
+"""Inverse kinematics of an arm with seven joints: shoulder pan and lift, then roll and flex three times over.
+
+The shoulder pan stands for the seventh degree of freedom: it is tried at angles all over its range, and all else
+follows in closed form. A roll by half a turn before and after a flex joint that bends the other way leaves the links
+where they are: solutions come with elbow and wrist bent to the positive side, but for those that are to be near others.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RotationMatrix
+
+from skills.estimate.compiled import compiled
+from skills.robot import FloatArray
+
+JOINTS = 7
+AXES = ((0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0))
+_PANS, _FOR_REACH = 17, 9
+_BESIDE_RAD = np.array([0.0, 0.03, -0.03, 0.08, -0.08, 0.16, -0.16, 0.3, -0.3, 0.5, -0.5])
+_MOST = 4 * 2 * _PANS
+
+
+@dataclass(frozen=True)
+class SevenJoints:
+    """The arm's lengths (m): the pan joint in B, from there to the lift joint (ahead, up), upper arm, forearm, wrist.
+
+    `wrist_m` is from the wrist's flex joint, where its three axes meet, to the last joint, whose frame is turned by
+    `roll_rad` about its axis. Limits (7,) in rad.
+    """
+
+    p_BS: FloatArray
+    ahead_m: float
+    up_m: float
+    upper_m: float
+    fore_m: float
+    wrist_m: float
+    roll_rad: float
+    lower_rad: FloatArray
+    upper_rad: FloatArray
+
+    def solutions(self, X_BL: RigidTransform, margin_rad: float) -> FloatArray:
+        """Joint angles (N, 7) that put the last link at X_BL, those far from the limits first; N may be 0."""
+        found, count = np.empty((_MOST, JOINTS)), 0
+        count = _solve(*self._pose(X_BL), self._pans(_PANS, margin_rad), *self._limits(margin_rad), False, False, found)
+        found = found[:count]
+        with np.errstate(invalid="ignore"):
+            middle, half = 0.5 * (self.lower_rad + self.upper_rad), 0.5 * (self.upper_rad - self.lower_rad)
+            strain = np.where(np.isfinite(half), np.abs(found - middle) / half, 0.0)
+        return np.asarray(found[np.argsort(np.max(strain, axis=1, initial=0.0), kind="stable")])
+
+    def reaches(self, X_BL: RigidTransform, margin_rad: float) -> bool:
+        """Whether there are joint angles that put the last link at X_BL."""
+        found, pose, limits = np.empty((1, JOINTS)), self._pose(X_BL), self._limits(margin_rad)
+        for pans in (self._pans(_FOR_REACH, margin_rad), self._pans(2 * _PANS, margin_rad)):
+            if _solve(*pose, pans, *limits, False, True, found):
+                return True
+        return False
+
+    def nearest(self, X_BL: RigidTransform, q_near_rad: FloatArray, margin_rad: float) -> FloatArray | None:
+        """The joint angles (7,) nearest to others, with the pan about as there; None: there are none."""
+        found = np.empty((_MOST, JOINTS))
+        low, high = self.lower_rad[0] + margin_rad, self.upper_rad[0] - margin_rad
+        pans = np.clip(q_near_rad[0] + _BESIDE_RAD, low, high)
+        count = _solve(*self._pose(X_BL), pans, *self._limits(margin_rad), True, False, found)
+        if not count:
+            pans = self._pans(_PANS, margin_rad)
+            count = _solve(*self._pose(X_BL), pans, *self._limits(margin_rad), True, False, found)
+        if not count:
+            return None
+        turned = found[:count] + math.tau * np.round((q_near_rad - found[:count]) / math.tau)
+        found = np.where(np.isinf(self.upper_rad), turned, found[:count])
+        return np.asarray(found[np.argmin(np.max(np.abs(found - q_near_rad), axis=1))])
+
+    def _pans(self, count: int, margin_rad: float) -> FloatArray:
+        return np.linspace(self.lower_rad[0] + margin_rad, self.upper_rad[0] - margin_rad, count)
+
+    def _limits(self, margin_rad: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        lengths = [self.ahead_m, self.up_m, self.upper_m, self.fore_m]
+        return np.array(lengths), self.lower_rad + margin_rad, self.upper_rad - margin_rad
+
+    def _pose(self, X_BL: RigidTransform) -> tuple[FloatArray, FloatArray]:
+        """The last link's rotation, and the wrist's middle from the pan joint."""
+        R = np.ascontiguousarray((X_BL.rotation() @ RotationMatrix.MakeXRotation(-self.roll_rad)).matrix())
+        return R, np.asarray(X_BL.translation() - self.wrist_m * R[:, 0] - self.p_BS)
+
+
+@compiled
+def _solve(
+    R: NDArray[np.float64],
+    p: NDArray[np.float64],
+    pans: NDArray[np.float64],
+    lengths: NDArray[np.float64],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    bent_both_ways: bool,
+    first_only: bool,
+    found: NDArray[np.float64],
+) -> int:
+    """Write solutions into the rows of `found` (N, 7), within limits; how many there are."""
+    ahead, up, a, f = lengths
+    count = 0
+    for k in range(len(pans)):
+        q1 = pans[k]
+        c1, s1 = math.cos(q1), math.sin(q1)
+        x, y, z = c1 * p[0] + s1 * p[1] - ahead, c1 * p[1] - s1 * p[0], p[2] - up
+        c4 = (x * x + y * y + z * z - a * a - f * f) / (2.0 * a * f)
+        if abs(c4) >= 1.0:
+            continue
+        q4 = math.acos(c4)
+        s4 = math.sin(q4)
+        s3 = y / (f * s4)
+        if abs(s3) > 1.0 or q4 > max(upper[3], -lower[3]):
+            continue
+        for side in range(2):
+            q3 = math.asin(s3) if side == 0 else math.pi - math.asin(s3)
+            c3 = math.cos(q3)
+            q2 = math.atan2(-f * s4 * c3, a + f * c4) - math.atan2(z, x)
+            q2 -= 2.0 * math.pi * math.floor(q2 / (2.0 * math.pi) + 0.5)
+            if q2 < lower[1] or q2 > upper[1]:
+                continue
+            c2, s2 = math.cos(q2), math.sin(q2)
+            # Columns of Rz(q1) Ry(q2) Rx(q3) Ry(q4), first in the panned frame.
+            y0, y1, y2 = s2 * s3, c3, c2 * s3
+            u0, u1, u2 = s2 * c3, -s3, c2 * c3
+            x0, x1, x2 = c4 * c2 - s4 * u0, -s4 * u1, -c4 * s2 - s4 * u2
+            z0, z1, z2 = s4 * c2 + c4 * u0, c4 * u1, -s4 * s2 + c4 * u2
+            ax, bx = c1 * x0 - s1 * x1, s1 * x0 + c1 * x1
+            ay, by = c1 * y0 - s1 * y1, s1 * y0 + c1 * y1
+            az, bz = c1 * z0 - s1 * z1, s1 * z0 + c1 * z1
+            m00 = ax * R[0, 0] + bx * R[1, 0] + x2 * R[2, 0]
+            m01 = ax * R[0, 1] + bx * R[1, 1] + x2 * R[2, 1]
+            m02 = ax * R[0, 2] + bx * R[1, 2] + x2 * R[2, 2]
+            m10 = ay * R[0, 0] + by * R[1, 0] + y2 * R[2, 0]
+            m20 = az * R[0, 0] + bz * R[1, 0] + z2 * R[2, 0]
+            sine = math.hypot(m01, m02)
+            q6 = math.atan2(sine, m00)
+            if q6 > max(upper[5], -lower[5]):
+                continue
+            if sine < 1e-9:
+                m11 = ay * R[0, 1] + by * R[1, 1] + y2 * R[2, 1]
+                m21 = az * R[0, 1] + bz * R[1, 1] + z2 * R[2, 1]
+                q5, q7 = 0.0, math.atan2(m21, m11)
+            else:
+                q5, q7 = math.atan2(m10, -m20), math.atan2(m01, m02)
+            for way in range(4):
+                elbow, wrist = way % 2, way // 2
+                if way > 0 and not bent_both_ways:
+                    break
+                t4, t6 = (-q4 if elbow else q4), (-q6 if wrist else q6)
+                if t4 < lower[3] or t4 > upper[3] or t6 < lower[5] or t6 > upper[5]:
+                    continue
+                t3, t5, t7 = q3 + math.pi * elbow, q5 + math.pi * (elbow + wrist), q7 + math.pi * wrist
+                t3 -= 2.0 * math.pi * math.floor(t3 / (2.0 * math.pi) + 0.5)
+                t5 -= 2.0 * math.pi * math.floor(t5 / (2.0 * math.pi) + 0.5)
+                t7 -= 2.0 * math.pi * math.floor(t7 / (2.0 * math.pi) + 0.5)
+                if t3 < lower[2] or t3 > upper[2] or t5 < lower[4] or t5 > upper[4] or t7 < lower[6] or t7 > upper[6]:
+                    continue
+                row = found[count]
+                row[0], row[1], row[2], row[3], row[4], row[5], row[6] = q1, q2, t3, t4, t5, t6, t7
+                count += 1
+                if first_only or count == len(found):
+                    return count
+    return count

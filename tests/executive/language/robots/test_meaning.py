@@ -1,0 +1,106 @@
+"""What a sentence means for several robots."""
+
+from __future__ import annotations
+
+import pytest
+
+from executive.language import Status, understand
+from executive.language.robots import Whom, understand_for_robots
+
+ROBOTS = ("alice", "bob")
+
+
+@pytest.fixture
+def said(parser, knowledge):
+    def meaning(sentence, robots=ROBOTS, **options):
+        return understand_for_robots(sentence, robots=robots, parser=parser, knowledge=knowledge, **options)
+
+    return meaning
+
+
+@pytest.mark.parametrize(
+    ("sentence", "robots"),
+    [
+        # sentence, whose its parts are
+        ("Hey Bob, go to the kitchen", ["bob"]),
+        ("go to the kitchen", [Whom.ANY]),
+        ("Hey everyone, come here", [Whom.ALL]),
+        ("you two, come here", [Whom.ALL]),
+        ("Hey Alice and Bob, go to the kitchen", ["alice", "bob"]),
+        ("Hey Alice, let Bob go to the kitchen", ["bob"]),
+        ("Alice, go to the kitchen, and Bob, come here", ["alice", "bob"]),
+    ],
+)
+def test_each_part_has_its_robot_under_the_name_of_the_run(said, sentence, robots):
+    assert [part.robot for part in said(sentence).parts] == robots
+
+
+@pytest.mark.parametrize(
+    ("sentence", "after"),
+    [
+        # sentence, which parts each part waits for
+        ("Alice, go to the kitchen, and Bob, go to the kitchen", [(), ()]),
+        ("Alice, go to the kitchen, then Bob, go to the kitchen", [(), (0,)]),
+        ("Alice, go to the kitchen. When Alice is done, Bob should go to the kitchen", [(), (0,)]),
+        ("Alice and Bob, go to the kitchen, then Bob should come here", [(), (), (0, 1)]),
+        ("Alice goes to the kitchen and Bob goes to the kitchen, then Eve should come here", [(), (), (0, 1)]),
+        ("everyone go to the kitchen, then Bob should come here", [(), (0,)]),
+    ],
+)
+def test_a_part_waits_where_that_is_said(said, sentence, after):
+    assert [part.after for part in said(sentence, robots=("Alice", "Bob", "Eve")).parts] == after
+
+
+def test_a_thing_that_is_handed_on_is_taken_from_where_it_was_put(said):
+    first, second = said("Alice, put the beer on the kitchen table and let Bob bring it to me").parts
+    assert second.after == (0,)
+    assert str(second.meaning.commands[0]) == "Take [Nothing] to [kitchen table] and do [grasp] to [beer]"
+    assert first.meaning.commands[-1].goal == second.meaning.commands[0].goal
+
+
+def test_the_speaker_stands_by_the_robot_that_is_spoken_to(said):
+    assert [part.speaker_by for part in said("Hey Alice, let Bob come here").parts] == ["alice"]
+    assert [part.speaker_by for part in said("Hey everyone, come here").parts] == [None]
+
+
+@pytest.mark.parametrize(
+    ("sentence", "reason"),
+    [
+        # sentence, what the refusal says
+        ("Hey Alice, go to Bob", "Bob is a robot"),
+        ("Hey Alice, bring Bob a beer", "Bob is a robot"),
+        ("Hey Charlie, bring me a beer", "there is no robot called Charlie; there are Alice and Bob"),
+        ("Alice, bring me the beer and let Bob put it on the kitchen table", "not where Bob can take it"),
+        ("Alice or Bob should come here", "say which of the robots is meant"),
+        ("Bob should not come here", "not what it is not to do"),
+        ("all three of you, come here", "there are 2 robots, Alice and Bob"),
+        ("when Alice is done, Bob should come here", "nothing was said that Alice is to do before"),
+        ("Hey everyone, bring me the hammer", "cannot all take the one hammer"),
+    ],
+)
+def test_what_no_robot_can_do_is_refused_with_a_sentence(said, sentence, reason):
+    meant = said(sentence)
+    assert meant.status is not Status.OK
+    assert meant.parts == ()
+    assert reason in meant.reason
+
+
+def test_where_a_name_must_be_said_the_reason_gives_the_names(said):
+    meant = said("go to the kitchen", require_wake=True)
+    assert meant.status is Status.NOT_ADDRESSED
+    assert '"Hey Alice" or "Hey Bob"' in meant.reason
+    assert said("Hey everyone, go to the kitchen", require_wake=True).status is Status.OK
+
+
+@pytest.mark.parametrize("sentence", ["Hey Alice, fetch me a beer", "bring it to Bob", "everyone, come here", "", "go"])
+def test_with_one_robot_a_sentence_means_what_it_always_does(said, parser, knowledge, sentence):
+    alone = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False, robot_name="Alice")
+    meant = said(sentence, robots=("Alice",))
+    assert (meant.status, meant.reason) == (alone.status, alone.reason)
+    assert [part.meaning for part in meant.parts] == [alone] * (alone.status is Status.OK)
+
+
+def test_a_robot_with_the_name_of_a_person_can_be_brought_things(said, knowledge):
+    person = next(iter(knowledge.people))
+    meant = said(f"Hey Alice, bring a beer to {person}", robots=("Alice", person))
+    assert [part.robot for part in meant.parts] == ["Alice"]

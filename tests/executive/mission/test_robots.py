@@ -1,0 +1,66 @@
+"""The robots of a run, from the option that names them."""
+
+from __future__ import annotations
+
+import pytest
+
+from executive.mission.errors import InputError
+from executive.mission.robots import RobotSetup, display_name, parse_robots, robot_called
+from skills.robot import Pose2D
+
+KINDS = ("fetch", "spot")
+
+
+def test_each_robot_has_its_kind_in_the_order_of_the_option():
+    assert list(parse_robots("bob=fetch, alice=spot", KINDS).items()) == [
+        ("bob", RobotSetup("fetch")),
+        ("alice", RobotSetup("spot")),
+    ]
+
+
+def test_a_start_may_follow_the_kind():
+    robots = parse_robots("alice=spot@1.0,-2,1.57,bob=fetch,eve=spot@0,0,0", KINDS)
+    assert robots == {
+        "alice": RobotSetup("spot", Pose2D(1.0, -2.0, 1.57)),
+        "bob": RobotSetup("fetch"),
+        "eve": RobotSetup("spot", Pose2D(0.0, 0.0, 0.0)),
+    }
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        # option, what the error says with its hint
+        ("", "no robots are named; write NAME=KIND"),
+        (" , ", "no robots are named"),
+        ("alice=spot,,bob=fetch", "has a comma too many"),
+        ("alice", "'alice' gives no robot with its kind; write NAME=KIND"),
+        ("alice=spot,bob", "'bob' gives no robot with its kind"),
+        ("=spot", "a robot without a name"),
+        ("7up=spot", "'7up' is no name for a robot"),
+        ("everyone=spot", "'everyone' calls all robots"),
+        ("alice=spot,alice=fetch", "two robots are called 'alice'; give one of them another name"),
+        ("alice=spot,Alice=fetch", "'alice' and 'Alice' are the same name"),
+        ("rob-1=spot,rob 1=fetch", "'rob-1' and 'rob 1' are the same name"),
+        ("alice=spto", "unknown kind of robot 'spto'; did you mean 'spot'? (known are fetch and spot)"),
+        ("alice=pr2", "unknown kind of robot 'pr2'; known are fetch and spot"),
+        ("alice=", "unknown kind of robot ''; known are fetch and spot"),
+        ("alice=spot@1,2", "'1,2' is no start for alice; write NAME=KIND@X,Y,YAW"),
+        ("alice=spot@x,2,3", "gives no robot with its kind|is no start for alice"),
+        ("alice=spot@1,2,1e9", "is no start for alice"),
+    ],
+)
+def test_what_is_no_list_of_robots_is_refused(option, message):
+    with pytest.raises(InputError) as error:
+        parse_robots(option, KINDS)
+    assert any(part in str(error.value) for part in message.split("|"))
+
+
+@pytest.mark.parametrize(("name", "shown"), [("alice", "Alice"), ("R2-D2", "R2-D2"), ("bob", "Bob")])
+def test_a_name_is_shown_with_a_capital(name, shown):
+    assert display_name(name) == shown
+
+
+def test_a_robot_is_called_without_regard_to_case():
+    assert robot_called("BOB", ["alice", "bob"]) == "bob"
+    assert robot_called("Robin", ["alice", "bob"]) is None

@@ -26,6 +26,7 @@ HOMES = (
     ("executive.store",),
     ("executive.conversation",),
     ("executive.view",),
+    ("executive.evaluation",),
     ("executive.testing",),
     ("executive.cli",),
 )

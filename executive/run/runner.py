@@ -205,13 +205,13 @@ class _Run:
 
     def _has_work(self) -> bool:
         """Whether a mission is under way, after those were begun that are given out now."""
-        for entry in () if self.dispatch is None else self.dispatch.begin():
-            self._begin_given(entry, self.dispatch)
+        while self.dispatch is not None and (given := self.dispatch.begin()):  # again while one cannot begin
+            for entry in given:
+                self._begin_given(entry, self.dispatch)
         return not all(session.finished for session in self._sessions)
 
-    def _begin_given(self, entry: RunEntry, dispatch: Dispatch | None) -> None:
+    def _begin_given(self, entry: RunEntry, dispatch: Dispatch) -> None:
         """Begin a mission that was given out; a robot that cannot be had is told of."""
-        assert dispatch is not None
         try:
             session = self._open(entry)
         except (Exception, VerbHung) as stop:

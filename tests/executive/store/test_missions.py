@@ -208,7 +208,7 @@ def test_a_store_of_another_version_is_refused(path):
     with sqlite3.connect(path) as other:
         other.execute("PRAGMA user_version = 9")
     other.close()
-    with pytest.raises(InputError, match="version 9, and this errand reads 5"):
+    with pytest.raises(InputError, match="version 9, and this errand reads 6"):
         MissionStore(path)
 
 

@@ -46,6 +46,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "log": _Command("log_command", "log", "Print what each node of a run did and why, detections and the outcome."),
     "replay": _Command("replay_command", "replay", "Show a run at any time of it: tree, map, pictures, events, 3D."),
     "queue": _Command("queue_command", "queue", "Missions kept in a store, to be run one after another."),
+    "fleet": _Command("fleet_command", "fleet", "What is queued, given out among several robots."),
     "resume": _Command("resume_command", "resume", "Resume the mission that was interrupted; then run its queue."),
     "evaluate": _Command(
         "main",

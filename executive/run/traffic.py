@@ -55,6 +55,7 @@ class TrafficTable:
         if robot.turn is None:
             self._turns += 1
             robot.turn = self._turns
+            robot.way = None if robot.pose is None else robot.pose[None, :]
 
     def announce(self, name: str, way: FloatArray, discs: FloatArray) -> None:
         """See `Traffic.announce`."""

@@ -26,6 +26,7 @@ _CELL_M = 0.1
 _YAWS = 8
 _SLACK_M = 0.03
 _ABOUT_M = 1.2
+_BODY_M = 0.6
 
 
 @dataclass(frozen=True)
@@ -168,17 +169,20 @@ class GivingWay:
         self._making_room_since_s = None
         return None
 
-    def near(self, place_W: tuple[float, float] | None) -> str | None:
-        """The robot that stands about a place (x, y) and goes somewhere; None: nobody."""
-        return self.name_at(place_W, going=True)
+    def somebody_goes(self) -> bool:
+        """Whether another robot is on its way."""
+        return any(one.way is not None for one in self._traffic.others())
 
-    def name_at(self, place_W: tuple[float, float] | None, *, going: bool = False) -> str | None:
-        """The robot that stands about a place (x, y), or one that is `going` somewhere; None: nobody."""
-        for one in self._traffic.others():
-            known = one.way is not None or not going
-            if place_W is not None and known and math.dist(place_W, one.pose[:2].tolist()) < _ABOUT_M:
-                return one.name
-        return None
+    def is_robot(self, place_W: tuple[float, float]) -> bool:
+        """Whether another robot covers a place (x, y)."""
+        return any(math.dist(place_W, one.pose[:2].tolist()) < _BODY_M for one in self._traffic.others())
+
+    def name_at(self, place_W: tuple[float, float] | None) -> str | None:
+        """The robot that stands about a place (x, y); None: nobody."""
+        if place_W is None:
+            return None
+        about = (one.name for one in self._traffic.others() if math.dist(place_W, one.pose[:2].tolist()) < _ABOUT_M)
+        return next(about, None)
 
     def stands_in_way(self, here: Pose2D, footprint: Footprint) -> bool:
         """Whether the robot stands where a way is reserved against it."""

@@ -13,6 +13,7 @@ from skills.api import (
     Cause,
     Costmap,
     Failed,
+    ForgettingCostmap,
     Job,
     Part,
     PlanningError,
@@ -32,6 +33,7 @@ from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
 from skills.navigate.scan_health import ScanHealth, ScanHealthOptions
+from skills.perception.people import SeenPerson
 from skills.perception.people_watch import PeopleOptions, PeopleWatch
 from skills.quantities import Delay, Duration, Length, Margin, Speed, Tries, Turn, TurnRate
 from skills.robot import Pose2D
@@ -113,7 +115,7 @@ class Navigate(Skill[NavigateInputs]):
         self._aside: Pose2D | None = None
         self._around = True
         self._giving = GivingWay(self.context, self.options.giving_way)
-        self._around_due_s = self._neighbour_since_s = -math.inf
+        self._around_due_s = self._neighbour_s = self._neighbour_since_s = -math.inf
         self._outline = ArmFootprint(self.context)
         self._footprint = self._outline.now()
         self._outline_due_s = -math.inf
@@ -198,7 +200,7 @@ class Navigate(Skill[NavigateInputs]):
 
     def _ask_for_plan(self, start: Pose2D | None = None) -> None:
         """Sample the costmap now and plan in the Worker, from a pose or from here."""
-        if not self._people.people():
+        if not self._persons():
             self._room_m = self.options.space.room_m
         self._footprint = self._pace.footprint = self._guard.footprint = self._outline.now()
         self._outline_due_s = self._now() + _OUTLINE_PERIOD_S
@@ -227,7 +229,7 @@ class Navigate(Skill[NavigateInputs]):
         """
         fixed = (here, self._goal)
         costmap = (self._giving.reserved if around else self._giving.bodies)(self.context.costmap)
-        return spaced(costmap, self._footprint, fixed, self._people.people(), self._room_m)
+        return spaced(costmap, self._footprint, fixed, self._persons(), self._room_m)
 
     def _look_out(self) -> None:
         """Look for low things and for people; what was seen comes in later."""
@@ -269,7 +271,7 @@ class Navigate(Skill[NavigateInputs]):
         self._base.stop()
         if self._other_plan():
             return None
-        if self._people.people() and self._room_m > self.options.space.least_room_m:
+        if self._persons() and self._room_m > self.options.space.least_room_m:
             self._room_m = self.options.space.least_room_m
             self._phase = self._planning
             return None
@@ -285,7 +287,7 @@ class Navigate(Skill[NavigateInputs]):
     def _people_may_go(self) -> bool:
         """Whether a failure may be due to people who are near or were a moment ago, and patience lasts."""
         now_s = self._now()
-        if self._people.people():
+        if self._persons():
             gap_s, self._person_s = now_s - self._person_s, now_s
             self._person_since_s = now_s if gap_s > self.options.after_person_s else self._person_since_s
         recently = now_s - self._person_s < self.options.after_person_s
@@ -306,16 +308,26 @@ class Navigate(Skill[NavigateInputs]):
         return True
 
     def _neighbour_may_go(self) -> bool:
-        """Whether a failure may be due to a robot that goes somewhere itself, and patience lasts."""
-        places = (self._obstacle, (self._goal.x_m, self._goal.y_m))
-        place = next((place for place in places if self._giving.near(place)), None)
-        if place is None:
-            self._neighbour_since_s = -math.inf
+        """Whether a failure may be due to a robot that is about, or was a moment ago, and patience lasts.
+
+        What the costmap remembers of it is forgotten; what still stands there is seen anew.
+        """
+        now_s, costmap = self._now(), self.context.costmap
+        if self._giving.somebody_goes():
+            gap_s, self._neighbour_s = now_s - self._neighbour_s, now_s
+            if gap_s > self.options.after_person_s:
+                self._neighbour_since_s = now_s
+        recently = now_s - self._neighbour_s < self.options.after_person_s
+        if not recently or now_s - self._neighbour_since_s >= self.options.giving_way.blocked_patience_s:
             return False
-        self._obstacle, now_s = place, self._now()
-        self._neighbour_since_s = max(self._neighbour_since_s, -1.0)
-        self._neighbour_since_s = now_s if self._neighbour_since_s < 0.0 else self._neighbour_since_s
-        return now_s - self._neighbour_since_s < self.options.giving_way.blocked_patience_s
+        self._obstacle = self._obstacle or (self._goal.x_m, self._goal.y_m)
+        if isinstance(costmap, ForgettingCostmap):
+            costmap.forget_seen()
+        return True
+
+    def _persons(self) -> tuple[SeenPerson, ...]:
+        """The people near; what a camera takes for one where a robot says that it stands is that robot."""
+        return tuple(one for one in self._people.people() if not self._giving.is_robot(one.place_W))
 
     def _step_aside(self) -> Step:
         """Go out of a way that is reserved, to the nearest place where it is free; change turns where there is none."""
@@ -423,7 +435,7 @@ class Navigate(Skill[NavigateInputs]):
     def _paced(self, follower: LocalController, pose: Pose2D) -> Pace:
         """How fast people near the way let the robot go."""
         ahead = follower.ahead(self.options.space.look_ahead_m)
-        people, most_m_s = self._people.people(), self._inputs.max_speed_m_s
+        people, most_m_s = self._persons(), self._inputs.max_speed_m_s
         return self._pace.pace(self._now(), pose, ahead, people, most_m_s, self._goal)
 
     def _wait_for_person(self, pace: Pace, place_W: tuple[float, float]) -> Step:
@@ -479,7 +491,7 @@ class Navigate(Skill[NavigateInputs]):
 
     def _replan(self, why: str) -> Step:
         """Plan anew from here; fail when that was done too often."""
-        self._replans += not self._neighbour_may_go()
+        self._replans += not self._giving.somebody_goes()
         self._around = True
         if self._replans > self.options.replans:
             self._base.stop()

@@ -24,6 +24,7 @@ from skills.detection import Detector as Detector
 from skills.quantities import Angle, Coordinate, Delay, Height, Margin, Share
 from skills.robot import Clock, Image, Lease, Pose2D, Robot, Scan
 from skills.stack import RobotStack, default_stack
+from skills.traffic import NO_TRAFFIC, Traffic
 
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform, RotationMatrix
@@ -358,6 +359,7 @@ class SkillContext:
     stack: RobotStack = field(default_factory=default_stack)
     payload: Payload = field(default_factory=Payload)
     solid: SeenSolid = field(default_factory=SeenSolid)
+    traffic: Traffic = NO_TRAFFIC
 
     def X_WB(self) -> RigidTransform:
         """The body's pose in the world, as estimated."""

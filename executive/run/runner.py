@@ -20,6 +20,7 @@ from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
 from executive.run.outcome import Outcome, RobotResult, RobotStatus, RunResult
 from executive.run.session import Session
+from executive.run.traffic import TrafficTable
 from executive.run.tree_run import Ending
 from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog
 from executive.tree.behaviours.board import Board
@@ -31,8 +32,10 @@ from executive.tree.compiling.builder import slug
 from executive.tree.snapshot import Snapshot
 from skills.api import Cause, Costmap, Detector, Localiser, Publish, Worker
 from skills.detection import NO_DETECTOR
+from skills.navigate.footprint import Footprint
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
+from skills.traffic import NO_TRAFFIC
 
 HOLDER = "errand"
 ResultT = TypeVar("ResultT")
@@ -165,6 +168,7 @@ class _Run:
         self._over: list[tuple[RobotResult, CompiledTree]] = []
         self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
+        self._traffic: TrafficTable | None = None
         self._after: dict[str, tuple[str, ...]] = {}
         self._ticks = 0
         self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
@@ -182,6 +186,8 @@ class _Run:
         ending: Ending | None = None
         full: BaseException | None = None
         try:
+            if len(entries) > 1 or self.dispatch is not None:
+                self._traffic = TrafficTable({}, self._clock.now)
             for entry in sorted(entries, key=lambda entry: entry.robot.name):
                 self._sessions.append(self._open(entry))
                 self._after[entry.robot.name] = entry.after
@@ -278,7 +284,7 @@ class _Run:
                 self._clock.advance(self._settings.tick_period_s)
                 for session in self._sessions:
                     if session.ends:
-                        session.sense()
+                        self._sense(session)
                         if requests.hold is not None:
                             session.hold()
                         elif session.may_move():
@@ -294,6 +300,8 @@ class _Run:
         robot = GuardedRobot(
             entry.robot, self._watchdog, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s
         )
+        if self._traffic is not None:
+            self._traffic.join(entry.robot.name, Footprint.of(entry.robot.capabilities()).discs)
         context = RunContext(
             robot=cast(Robot, robot),
             lease=robot.claim(HOLDER),
@@ -311,6 +319,7 @@ class _Run:
             detector=entry.detector,
             work=self.work,
             stack=entry.stack,
+            traffic=NO_TRAFFIC if self._traffic is None else self._traffic.view_of(entry.robot.name),
         )
         try:
             return Session(
@@ -327,7 +336,7 @@ class _Run:
         requests = self._poll(live)
         self._clock.advance(self._settings.tick_period_s)
         for session in live:
-            self._for(session, session.sense, None)
+            self._for(session, partial(self._sense, session), None)
         turn = [session for session in live if session.result is None and self._is_its_turn(session)]
         moving = [session for session in turn if self._for(session, session.may_move, False) and requests.hold is None]
         self._tick(moving, requests.breakpoints)
@@ -336,12 +345,20 @@ class _Run:
                 self._end_given(session, session.result.message)  # its lease was another's for too long
             elif session.finished:
                 session.close()
+                if self._traffic is not None:
+                    self._traffic.release(session.name)
                 self._end_given(session, None)
             elif self.dispatch is not None:
                 self._for(session, partial(self._look, session), False)
         if self.observer is not None:
             self.observer(self._progress())
         self._keep_pace(begun_wall_s)
+
+    def _sense(self, session: Session) -> None:
+        """Bring a robot's estimators up to date, and tell the others where it believes to be."""
+        session.sense()
+        if self._traffic is not None:
+            self._traffic.heard(session.name, session.context.known_pose())
 
     def _is_its_turn(self, session: Session) -> bool:
         """Whether the robots that a mission waits for are done; it ends when one of them has failed."""

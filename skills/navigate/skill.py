@@ -13,6 +13,7 @@ from skills.api import (
     Cause,
     Costmap,
     Failed,
+    ForgettingCostmap,
     Job,
     Part,
     PlanningError,
@@ -27,10 +28,12 @@ from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.footprint import footprint_clearance_m
+from skills.navigate.giving_way import GivingWay, GivingWayOptions
 from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
 from skills.navigate.scan_health import ScanHealth, ScanHealthOptions
+from skills.perception.people import SeenPerson
 from skills.perception.people_watch import PeopleOptions, PeopleWatch
 from skills.quantities import Delay, Duration, Length, Margin, Speed, Tries, Turn, TurnRate
 from skills.robot import Pose2D
@@ -79,6 +82,7 @@ class NavigateOptions:
     space: SpaceOptions = field(default_factory=SpaceOptions)
     guard: GuardOptions = field(default_factory=GuardOptions)
     scans: ScanHealthOptions = field(default_factory=ScanHealthOptions)
+    giving_way: GivingWayOptions = field(default_factory=GivingWayOptions)
 
 
 class Navigate(Skill[NavigateInputs]):
@@ -108,6 +112,10 @@ class Navigate(Skill[NavigateInputs]):
         self._base.stop()
         self._base = Base(self.context)
         self._inputs = inputs
+        self._aside: Pose2D | None = None
+        self._around = True
+        self._giving = GivingWay(self.context, self.options.giving_way)
+        self._around_due_s = self._neighbour_s = self._neighbour_since_s = -math.inf
         self._outline = ArmFootprint(self.context)
         self._footprint = self._outline.now()
         self._outline_due_s = -math.inf
@@ -146,8 +154,9 @@ class Navigate(Skill[NavigateInputs]):
         return self._phase()
 
     def end(self) -> None:
-        """Stop what this skill set in motion."""
+        """Stop what this skill set in motion, and give the way back."""
         self._base.stop()
+        self.context.traffic.release()
 
     def undone(self, inputs: NavigateInputs) -> str | None:
         """The robot's place tells; skills that came after may have gone a little aside."""
@@ -191,21 +200,36 @@ class Navigate(Skill[NavigateInputs]):
 
     def _ask_for_plan(self, start: Pose2D | None = None) -> None:
         """Sample the costmap now and plan in the Worker, from a pose or from here."""
-        if not self._people.people():
+        if not self._persons():
             self._room_m = self.options.space.room_m
         self._footprint = self._pace.footprint = self._guard.footprint = self._outline.now()
         self._outline_due_s = self._now() + _OUTLINE_PERIOD_S
         speed = max(0.1, self._inputs.max_speed_m_s)
-        begin, goal = start or self.context.pose(), self._inputs.goal
+        begin, goal = start or self.context.pose(), self._goal
+        around = self._around and self._aside is None
         plan = self.context.stack.planner.problem(
-            self._costmap(begin), self._footprint, begin, goal, max_speed_m_s=speed, work=self.context.work
+            self._costmap(begin, around=around),
+            self._footprint,
+            begin,
+            goal,
+            max_speed_m_s=speed,
+            work=self.context.work,
         )
         self._job = self.context.worker.submit(plan, latency_s=self.options.planning_latency_s, name="plan a path")
 
-    def _costmap(self, here: Pose2D) -> Costmap:
-        """What is in the way, with room about people as far as `here` and the goal leave it."""
-        fixed = (here, self._inputs.goal)
-        return spaced(self.context.costmap, self._footprint, fixed, self._people.people(), self._room_m)
+    @property
+    def _goal(self) -> Pose2D:
+        """Where the robot goes just now: the goal, or a place where it waits for others to pass."""
+        return self._aside or self._inputs.goal
+
+    def _costmap(self, here: Pose2D, *, around: bool = False) -> Costmap:
+        """What is in the way, with room about people as far as `here` and the goal leave it.
+
+        Other robots stand in the way, and their ways too where the plan is to lead `around` them.
+        """
+        fixed = (here, self._goal)
+        costmap = (self._giving.reserved if around else self._giving.bodies)(self.context.costmap)
+        return spaced(costmap, self._footprint, fixed, self._persons(), self._room_m)
 
     def _look_out(self) -> None:
         """Look for low things and for people; what was seen comes in later."""
@@ -216,6 +240,8 @@ class Navigate(Skill[NavigateInputs]):
         """Stand and wait for a plan, or for the time of the next attempt."""
         self._look_out()
         if self._job is None:
+            if self._giving.stands_in_way(self.context.pose(), self._footprint):
+                return self._step_aside()
             if self._now() < self._wait_until_s:
                 return Running(self._waiting_sentence())
             self._ask_for_plan()
@@ -243,13 +269,16 @@ class Navigate(Skill[NavigateInputs]):
     def _plan_failed(self, why: str) -> Step | None:
         """Go nearer to people, or wait and try again when something seen may go away; give up at the bound."""
         self._base.stop()
-        if self._people.people() and self._room_m > self.options.space.least_room_m:
+        if self._other_plan():
+            return None
+        if self._persons() and self._room_m > self.options.space.least_room_m:
             self._room_m = self.options.space.least_room_m
             self._phase = self._planning
             return None
-        self._replans += not self._people_may_go()
+        self._replans += not (self._people_may_go() or self._neighbour_may_go())
         if self._obstacle is None or self._replans >= self.options.replans:
-            seen = f" The way is blocked by something seen at {_xy(self._obstacle)}." if self._obstacle else ""
+            who = self._giving.name_at(self._obstacle) or "something seen"
+            seen = f" The way is blocked by {who} at {_xy(self._obstacle)}." if self._obstacle else ""
             return Failed(Cause.PLANNING, why + seen)
         self._wait_until_s = self._now() + self.options.replan_pause_s
         self._phase = self._planning
@@ -258,11 +287,99 @@ class Navigate(Skill[NavigateInputs]):
     def _people_may_go(self) -> bool:
         """Whether a failure may be due to people who are near or were a moment ago, and patience lasts."""
         now_s = self._now()
-        if self._people.people():
+        if self._persons():
             gap_s, self._person_s = now_s - self._person_s, now_s
             self._person_since_s = now_s if gap_s > self.options.after_person_s else self._person_since_s
         recently = now_s - self._person_s < self.options.after_person_s
         return recently and now_s - self._person_since_s < self.options.person_patience_s
+
+    def _other_plan(self) -> bool:
+        """Whether there is another plan to try after one failed that led around reserved ways, or aside."""
+        if self._aside is not None:
+            self._aside = None
+            for one in self._giving.ahead_of_us():
+                self.context.traffic.let_pass(one.name)
+        elif self._around and self._giving.ahead_of_us():
+            self._around = False
+        else:
+            return False
+        self._phase = self._planning
+        self._ask_for_plan()
+        return True
+
+    def _neighbour_may_go(self) -> bool:
+        """Whether a failure may be due to a robot that is about, or was a moment ago, and patience lasts.
+
+        What the costmap remembers of it is forgotten; what still stands there is seen anew.
+        """
+        now_s, costmap = self._now(), self.context.costmap
+        if self._giving.somebody_goes():
+            gap_s, self._neighbour_s = now_s - self._neighbour_s, now_s
+            if gap_s > self.options.after_person_s:
+                self._neighbour_since_s = now_s
+        recently = now_s - self._neighbour_s < self.options.after_person_s
+        if not recently or now_s - self._neighbour_since_s >= self.options.giving_way.blocked_patience_s:
+            return False
+        self._obstacle = self._obstacle or (self._goal.x_m, self._goal.y_m)
+        if isinstance(costmap, ForgettingCostmap):
+            costmap.forget_seen()
+        return True
+
+    def _persons(self) -> tuple[SeenPerson, ...]:
+        """The people near; what a camera takes for one where a robot says that it stands is that robot."""
+        return tuple(one for one in self._people.people() if not self._giving.is_robot(one.place_W))
+
+    def _step_aside(self) -> Step:
+        """Go out of a way that is reserved, to the nearest place where it is free; change turns where there is none."""
+        self._base.stop()
+        place = self._giving.waiting_place(self.context.costmap, self._footprint, self.context.pose())
+        first = ", ".join(one.name for one in self._giving.ahead_of_us())
+        if place is None:
+            for one in self._giving.ahead_of_us():
+                self.context.traffic.let_pass(one.name)
+        self._aside, self._around = place, True
+        self._best_m, self._best_s = math.inf, self._now()
+        self._phase = self._planning
+        self._ask_for_plan()
+        return Running(f"making way for {first}")
+
+    def _waiting_aside(self) -> Step:
+        """Stand at a waiting place until there is a way that nobody has reserved."""
+        self._look_out()
+        self._giving.stand(self.context.pose(), self._footprint)
+        self._best_s = self._now()
+        if self._giving.stands_in_way(self.context.pose(), self._footprint):
+            return self._step_aside()
+        if self._giving.ahead_of_us() and self._now() < self._wait_until_s:
+            return Running("waiting aside for another robot to pass")
+        self._wait_until_s = self._now() + self.options.giving_way.again_s
+        self._aside, self._around, self._phase = None, True, self._planning
+        self._ask_for_plan()
+        return Running("planning a path")
+
+    def _give_way(self, follower: LocalController, pose: Pose2D) -> tuple[float, Step | None]:
+        """How fast others' rights let the robot go (m/s), and what it does while it stands for them."""
+        self._giving.announce(follower, self._footprint)
+        if self._aside is not None:
+            return math.inf, None
+        options, conflict = self.options.giving_way, self._giving.conflict_m(follower, self._footprint)
+        if conflict is None:
+            name = self._giving.room_for(follower, self._footprint)
+            return (math.inf, None) if name is None else (0.0, self._waits_for(name, "to make way"))
+        way_m, name = conflict
+        if self._giving.stands_in_way(pose, self._footprint):
+            return 0.0, self._step_aside()
+        left_m = way_m - options.short_m
+        if left_m > 0.02:
+            return math.sqrt(2.0 * 0.4 * left_m), None
+        if self._job is None and self._now() >= self._around_due_s:
+            self._around, self._around_due_s = True, self._now() + 2.0 * options.again_s
+            self._ask_for_plan()
+        return 0.0, self._waits_for(name, "to pass")
+
+    def _waits_for(self, name: str, what: str) -> Step:
+        self._best_s, self._blocked_since_s = self._now(), None
+        return Running(f"waiting for {name} {what}")
 
     def _waiting_sentence(self) -> str:
         place = _xy(self._obstacle) if self._obstacle else "ahead"
@@ -282,11 +399,21 @@ class Navigate(Skill[NavigateInputs]):
         if danger is not None:
             return self._stand_at_once(danger)
         pace = self._paced(self._follower, pose)
-        costmap = self._costmap(pose)
-        answer = self._follower.command(pose, velocity, self._base.last_velocity, costmap, pace.most_m_s)
+        most_m_s, waits = self._give_way(self._follower, pose)
+        if self._phase != self._following:
+            return waits or Running("making way")
+        costmap, most_m_s = self._costmap(pose), min(most_m_s, pace.most_m_s)
+        answer = self._follower.command(pose, velocity, self._base.last_velocity, costmap, most_m_s)
         self._base.drive(answer.velocity)
+        if waits is not None:
+            return waits
         if pace.waiting and pace.person is not None:
             return self._wait_for_person(pace, pace.person.place_W)
+        if self._aside is not None and self._arrived(pose, 1.0):
+            self._base.stop()
+            self._wait_until_s = self._now() + self.options.giving_way.again_s
+            self._phase = self._waiting_aside
+            return Running("waiting aside for another robot to pass")
         if self._arrived(pose, 0.4):
             self._wait_until_s = self._now() + self.options.settle_s
             self._phase = self._settling
@@ -308,8 +435,8 @@ class Navigate(Skill[NavigateInputs]):
     def _paced(self, follower: LocalController, pose: Pose2D) -> Pace:
         """How fast people near the way let the robot go."""
         ahead = follower.ahead(self.options.space.look_ahead_m)
-        people, most_m_s = self._people.people(), self._inputs.max_speed_m_s
-        return self._pace.pace(self._now(), pose, ahead, people, most_m_s, self._inputs.goal)
+        people, most_m_s = self._persons(), self._inputs.max_speed_m_s
+        return self._pace.pace(self._now(), pose, ahead, people, most_m_s, self._goal)
 
     def _wait_for_person(self, pace: Pace, place_W: tuple[float, float]) -> Step:
         """Stand; once that has taken long, plan around whoever stands there."""
@@ -364,7 +491,8 @@ class Navigate(Skill[NavigateInputs]):
 
     def _replan(self, why: str) -> Step:
         """Plan anew from here; fail when that was done too often."""
-        self._replans += 1
+        self._replans += not self._giving.somebody_goes()
+        self._around = True
         if self._replans > self.options.replans:
             self._base.stop()
             return Failed(Cause.EXECUTION, f"{why} Planning anew {self.options.replans} times did not help.")
@@ -384,7 +512,7 @@ class Navigate(Skill[NavigateInputs]):
 
     def _arrived(self, pose: Pose2D, share: float) -> bool:
         """Whether a pose lies within a share of the tolerances of the goal."""
-        off = relative(self._inputs.goal, pose)
+        off = relative(self._goal, pose)
         near = math.hypot(off.x_m, off.y_m) <= share * self._inputs.position_tolerance_m
         return near and abs(off.yaw_rad) <= share * self._inputs.yaw_tolerance_rad
 

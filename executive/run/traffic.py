@@ -1,0 +1,119 @@
+"""The robots' ways in one place: who is where by its own belief, where it goes, and who goes first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from skills.robot import FloatArray, Pose2D
+from skills.traffic import Neighbour, Traffic
+
+__all__ = ["SILENT_S", "TrafficTable"]
+
+SILENT_S = 2.0
+"""Who was not heard of for so long (s of the run's clock) has no claim and no way any more."""
+
+
+@dataclass
+class _Robot:
+    """What is known of one robot. `turn` is its place in the order of claims, None without one."""
+
+    discs: FloatArray
+    pose: FloatArray | None = None
+    stamp_s: float = -np.inf
+    way: FloatArray | None = None
+    turn: int | None = None
+
+
+class TrafficTable:
+    """Claims in the order in which they come. Each robot holds one at most, and no two have the same turn.
+
+    Since turns are a strict order, nobody waits for somebody who waits for them.
+    """
+
+    def __init__(self, outlines: dict[str, FloatArray], now: Callable[[], float]) -> None:
+        """`outlines` are each robot's discs (x, y, radius in the body frame); `now` is the run's clock (s)."""
+        self._robots = {name: _Robot(discs) for name, discs in sorted(outlines.items())}
+        self._now, self._turns = now, 0
+
+    def join(self, name: str, discs: FloatArray) -> None:
+        """One more robot with its discs (x, y, radius in the body frame); one that is known already stays as it is."""
+        self._robots.setdefault(name, _Robot(discs))
+
+    def heard(self, name: str, pose: Pose2D | None) -> None:
+        """A robot still answers, and believes to be at a pose of the world; None: it does not know."""
+        robot = self._robots[name]
+        robot.stamp_s = self._now()
+        if pose is not None:
+            robot.pose = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
+
+    def view_of(self, name: str) -> Traffic:
+        """What one robot sees of it."""
+        return _View(self, name)
+
+    def claim(self, name: str) -> None:
+        """See `Traffic.claim`."""
+        robot = self._robots[name]
+        if robot.turn is None:
+            self._turns += 1
+            robot.turn = self._turns
+            robot.way = None if robot.pose is None else robot.pose[None, :]
+
+    def announce(self, name: str, way: FloatArray, discs: FloatArray) -> None:
+        """See `Traffic.announce`."""
+        robot = self._robots[name]
+        robot.way, robot.discs = way, discs
+
+    def release(self, name: str) -> None:
+        """See `Traffic.release`."""
+        robot = self._robots[name]
+        robot.way = robot.turn = None
+
+    def others(self, name: str) -> Sequence[Neighbour]:
+        """See `Traffic.others`."""
+        return tuple(
+            Neighbour(other, robot.pose, robot.way, robot.discs, robot.stamp_s, self.goes_before(other, name))
+            for other, robot in self._robots.items()
+            if other != name and robot.pose is not None and not self._silent(robot)
+        )
+
+    def goes_before(self, one: str, other: str) -> bool:
+        """Whether one has the right of way: it claimed first, and still answers."""
+        turn, against = self._robots[one].turn, self._robots[other].turn
+        if turn is None or self._silent(self._robots[one]):
+            return False
+        return against is None or self._silent(self._robots[other]) or turn < against
+
+    def change_turns(self, one: str, other: str) -> None:
+        """See `Traffic.let_pass`."""
+        a, b = self._robots[one], self._robots[other]
+        if a.turn is not None and b.turn is not None:
+            a.turn, b.turn = b.turn, a.turn
+
+    def _silent(self, robot: _Robot) -> bool:
+        return self._now() - robot.stamp_s > SILENT_S
+
+
+@dataclass(frozen=True)
+class _View:
+    """The table as one robot uses it (`skills.traffic.Traffic`)."""
+
+    table: TrafficTable
+    name: str
+
+    def claim(self) -> None:
+        self.table.claim(self.name)
+
+    def announce(self, way: FloatArray, discs: FloatArray) -> None:
+        self.table.announce(self.name, way, discs)
+
+    def release(self) -> None:
+        self.table.release(self.name)
+
+    def others(self) -> Sequence[Neighbour]:
+        return self.table.others(self.name)
+
+    def let_pass(self, name: str) -> None:
+        self.table.change_turns(self.name, name)

@@ -1,0 +1,259 @@
+"""Right of way among robots: what the others' bodies and ways take up, where to stop short, and where to step aside."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from skills.api import Costmap, LocalisationEstimate, SkillContext
+from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
+from skills.navigate.path import TURN_M_PER_RAD
+from skills.quantities import Delay, Length, Margin
+from skills.robot import FloatArray, Pose2D, Robot
+from skills.stack import LocalController
+from skills.traffic import Neighbour
+
+__all__ = ["GivingWay", "GivingWayOptions", "WithBodies", "first_that_suits", "reachable", "with_bodies"]
+
+_WAY_STEP_M = 0.12
+_CELL_M = 0.1
+_YAWS = 8
+_SLACK_M = 0.03
+_ABOUT_M = 1.2
+_BODY_M = 0.6
+
+
+@dataclass(frozen=True)
+class GivingWayOptions:
+    """Distances are between outlines (m), times on the robot's clock (s).
+
+    A way that comes within `apart_m` of one that is reserved waits for it, `short_m` before. Who goes first stops
+    `room_m` before one who makes way, for `patience_s` at most. A waiting place lies `aside_m` off reserved ways, and
+    within `reach_m`; the way on is looked for every `again_s`.
+    """
+
+    apart_m: Margin = 0.15
+    short_m: Length = 0.25
+    look_m: Length = 3.0
+    room_m: Margin = 0.35
+    room_look_m: Length = 0.9
+    patience_s: Delay = 20.0
+    blocked_patience_s: Delay = 60.0
+    aside_m: Margin = 0.25
+    reach_m: Length = 5.0
+    again_s: Delay = 1.5
+
+
+@dataclass(frozen=True)
+class WithBodies:
+    """A costmap in which discs (centres (N, 2) with one radius (m)) stand as well."""
+
+    costmap: Costmap
+    tree: cKDTree
+    radius_m: float
+
+    def clearance_m(self, points_W: FloatArray) -> FloatArray:
+        """Distance from each (x, y) row to the nearest obstacle or disc."""
+        points = np.asarray(points_W, dtype=np.float64)[:, :2]
+        nearest, _ = self.tree.query(points)
+        return np.asarray(np.minimum(self.costmap.clearance_m(points), nearest - self.radius_m))
+
+    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
+        """As the costmap does."""
+        self.costmap.update(robot, localisation)
+
+    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
+        """As the costmap does."""
+        self.costmap.add_points(points_W, stamp_s)
+
+
+def with_bodies(costmap: Costmap, swept: Sequence[tuple[FloatArray, FloatArray]]) -> Costmap:
+    """The costmap with outlines (discs) at poses (N, 3)."""
+    for discs, poses in swept:
+        radius = float(discs[:, 2].max())
+        round_ones = discs[discs[:, 2] >= 0.9 * radius]
+        costmap = WithBodies(costmap, cKDTree(_centres(round_ones, poses)), radius)
+    return costmap
+
+
+def _centres(discs: FloatArray, poses: FloatArray) -> FloatArray:
+    """World (x, y) of all discs at all poses, one list."""
+    c, s = np.cos(poses[:, 2:3]), np.sin(poses[:, 2:3])
+    x = poses[:, 0:1] + c * discs[:, 0] - s * discs[:, 1]
+    y = poses[:, 1:2] + s * discs[:, 0] + c * discs[:, 1]
+    return np.column_stack([x.ravel(), y.ravel()])
+
+
+@dataclass(frozen=True)
+class _Nothing:
+    """A costmap without anything."""
+
+    def clearance_m(self, points_W: FloatArray) -> FloatArray:
+        return np.full(len(points_W), np.inf)
+
+    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
+        return None
+
+    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
+        return None
+
+
+class GivingWay:
+    """One navigation among other robots. With none about, every answer is that of a robot alone."""
+
+    def __init__(self, context: SkillContext, options: GivingWayOptions) -> None:
+        self._traffic, self._options = context.traffic, options
+        self._clock = context.clock
+        self._making_room_since_s: float | None = None
+        self._traffic.release()
+        self._traffic.claim()
+
+    def end(self) -> None:
+        """Give everything back."""
+        self._traffic.release()
+
+    def announce(self, follower: LocalController, footprint: Footprint) -> None:
+        """Tell what is left of the way."""
+        self._traffic.announce(follower.ahead(math.inf), footprint.discs)
+
+    def stand(self, pose: Pose2D, footprint: Footprint) -> None:
+        """Tell that the robot stays where it is for now."""
+        self._traffic.announce(np.array([[pose.x_m, pose.y_m, pose.yaw_rad]]), footprint.discs)
+
+    def others(self) -> Sequence[Neighbour]:
+        """All others that were heard of lately."""
+        return self._traffic.others()
+
+    def ahead_of_us(self) -> Sequence[Neighbour]:
+        """Those who go first, and go somewhere."""
+        return [one for one in self._traffic.others() if one.first and one.way is not None]
+
+    def bodies(self, costmap: Costmap) -> Costmap:
+        """The costmap with the others where they are."""
+        return with_bodies(costmap, [(one.discs, one.pose[None, :]) for one in self._traffic.others()])
+
+    def reserved(self, costmap: Costmap) -> Costmap:
+        """The costmap with the others where they are, and all of the ways that are reserved against us."""
+        return with_bodies(self.bodies(costmap), [(one.discs, _thinned(one)) for one in self.ahead_of_us()])
+
+    def conflict_m(self, follower: LocalController, footprint: Footprint) -> tuple[float, str] | None:
+        """How far (m) it is along the path to where it meets a reserved way, and whose; None: it meets none."""
+        ahead = follower.ahead(self._options.look_m)
+        found: tuple[float, str] | None = None
+        for one in self.ahead_of_us():
+            ways = with_bodies(_Nothing(), [(one.discs, _thinned(one))])
+            met = np.flatnonzero(footprint_clearance_m(ways, footprint, ahead) < self._options.apart_m)
+            if len(met):
+                way_m = float(_along(ahead)[met[0]])
+                found = (way_m, one.name) if found is None or way_m < found[0] else found
+        return found
+
+    def room_for(self, follower: LocalController, footprint: Footprint) -> str | None:
+        """Who is to make way and stands near ahead, so that we wait a while; None: nobody does."""
+        ahead = follower.ahead(self._options.room_look_m)
+        for one in self._traffic.others():
+            if one.first or one.way is None:
+                continue
+            body = with_bodies(_Nothing(), [(one.discs, one.pose[None, :])])
+            clearance = footprint_clearance_m(body, footprint, ahead)
+            if clearance.min() < min(self._options.room_m, float(clearance[0]) - 0.02):
+                now_s = self._clock.now()
+                since_s = self._making_room_since_s = self._making_room_since_s or now_s
+                return one.name if now_s - since_s < self._options.patience_s else None
+        self._making_room_since_s = None
+        return None
+
+    def somebody_goes(self) -> bool:
+        """Whether another robot is on its way."""
+        return any(one.way is not None for one in self._traffic.others())
+
+    def is_robot(self, place_W: tuple[float, float]) -> bool:
+        """Whether another robot covers a place (x, y)."""
+        return any(math.dist(place_W, one.pose[:2].tolist()) < _BODY_M for one in self._traffic.others())
+
+    def name_at(self, place_W: tuple[float, float] | None) -> str | None:
+        """The robot that stands about a place (x, y); None: nobody."""
+        if place_W is None:
+            return None
+        about = (one.name for one in self._traffic.others() if math.dist(place_W, one.pose[:2].tolist()) < _ABOUT_M)
+        return next(about, None)
+
+    def stands_in_way(self, here: Pose2D, footprint: Footprint) -> bool:
+        """Whether the robot stands where a way is reserved against it."""
+        ways = [(one.discs, _thinned(one)[1:]) for one in self.ahead_of_us()]
+        if not ways:
+            return False
+        clearance = footprint_clearance_m(with_bodies(_Nothing(), ways), footprint, pose_array([here]))
+        return bool(clearance[0] < self._options.apart_m)
+
+    def waiting_place(self, costmap: Costmap, footprint: Footprint, here: Pose2D) -> Pose2D | None:
+        """The nearest pose that can be reached and lies off all reserved ways; None: there is none."""
+        options = self._options
+        n = int(2.0 * options.reach_m / _CELL_M) + 1
+        axis = np.linspace(-options.reach_m, options.reach_m, n)
+        x, y = np.meshgrid(here.x_m + axis, here.y_m + axis)
+        everything = self.bodies(costmap)
+        clearance = everything.clearance_m(np.column_stack([x.ravel(), y.ravel()]))
+        free = clearance.reshape(n, n) > footprint.inscribed_m + SAFE_MARGIN_M
+        ways = with_bodies(_Nothing(), [(one.discs, _thinned(one)) for one in self.ahead_of_us()])
+        yaws = here.yaw_rad + np.arange(_YAWS) * (2.0 * math.pi / _YAWS)
+
+        def suits(row: int, column: int) -> Pose2D | None:
+            poses = np.column_stack([np.full(_YAWS, x[row, column]), np.full(_YAWS, y[row, column]), yaws])
+            room = footprint_clearance_m(everything, footprint, poses) > SAFE_MARGIN_M + _SLACK_M
+            aside = footprint_clearance_m(ways, footprint, poses) > options.aside_m
+            good = np.flatnonzero(room & aside)
+            return Pose2D(*poses[good[0]].tolist()) if len(good) else None
+
+        return first_that_suits(reachable(free, (n // 2, n // 2)), suits)
+
+
+def reachable(free: NDArray[np.bool_], begin: tuple[int, int]) -> list[tuple[int, int]]:
+    """Cells (row, column) that can be reached over free ones, nearest first. The beginning counts as free."""
+    seen, order, queue = {begin}, [begin], deque([begin])
+    rows, columns = free.shape
+    while queue:
+        row, column = queue.popleft()
+        for cell in ((row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)):
+            if cell not in seen and 0 <= cell[0] < rows and 0 <= cell[1] < columns and free[cell]:
+                seen.add(cell)
+                order.append(cell)
+                queue.append(cell)
+    return order
+
+
+def first_that_suits(
+    candidates: Sequence[tuple[int, int]], suits: Callable[[int, int], Pose2D | None]
+) -> Pose2D | None:
+    """The first place that suits, every third cell looked at; None: there is none."""
+    for row, column in candidates:
+        if (row + column) % 3 == 0 and (place := suits(row, column)) is not None:
+            return place
+    return None
+
+
+def _thinned(one: Neighbour) -> FloatArray:
+    """The poses that a robot still covers: where it is, and its way, not closer than needed."""
+    way = one.way if one.way is not None else np.empty((0, 3))
+    along = _along(way)
+    kept, last = [one.pose], -math.inf
+    for pose, at in zip(way, along, strict=True):
+        if at - last >= _WAY_STEP_M:
+            kept.append(pose)
+            last = float(at)
+    return np.vstack([*kept, way[-1:]])
+
+
+def _along(poses: FloatArray) -> FloatArray:
+    """Way up to each pose (m), turns counted."""
+    if not len(poses):
+        return np.empty(0)
+    steps = np.diff(poses, axis=0)
+    ways = np.hypot(steps[:, 0], steps[:, 1]) + TURN_M_PER_RAD * np.abs(steps[:, 2])
+    return np.concatenate([[0.0], np.cumsum(ways)])

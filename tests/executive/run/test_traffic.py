@@ -1,0 +1,123 @@
+"""Tests of who goes first among robots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from executive.run.traffic import SILENT_S, TrafficTable
+from skills.robot import Pose2D
+
+DISCS = np.array([[0.0, 0.0, 0.3]])
+WAY = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+NAMES = ("alice", "bob", "carl")
+
+
+@dataclass
+class Time:
+    """A clock that is set by hand."""
+
+    now_s: float = 0.0
+
+    def now(self) -> float:
+        """The time (s)."""
+        return self.now_s
+
+
+def table(time: Time, *names: str) -> TrafficTable:
+    """A table in which each robot has been heard of."""
+    made = TrafficTable(dict.fromkeys(names, DISCS), time.now)
+    for name in names:
+        made.heard(name, Pose2D(0.0, 0.0, 0.0))
+    return made
+
+
+def test_whoever_claims_first_goes_first() -> None:
+    """| claims | goes first |
+    | bob, alice | bob |"""
+    made = table(Time(), "alice", "bob")
+    made.claim("bob")
+    made.claim("alice")
+    assert made.goes_before("bob", "alice")
+    assert not made.goes_before("alice", "bob")
+
+
+def test_a_claim_that_is_held_keeps_its_turn() -> None:
+    """Claiming again does not put a robot back."""
+    made = table(Time(), "alice", "bob")
+    made.claim("bob")
+    made.claim("alice")
+    made.claim("bob")
+    assert made.goes_before("bob", "alice")
+
+
+def test_a_claim_that_is_given_back_is_free_for_the_next() -> None:
+    """After release the other goes first, and the way is gone."""
+    made = table(Time(), "alice", "bob")
+    made.claim("alice")
+    made.announce("alice", WAY, DISCS)
+    made.claim("bob")
+    made.release("alice")
+    assert made.goes_before("bob", "alice")
+    assert made.others("bob")[0].way is None
+
+
+def test_a_robot_that_falls_silent_loses_its_right_and_is_not_heard_of() -> None:
+    """Others see it as an obstacle only."""
+    time = Time()
+    made = table(time, "alice", "bob")
+    made.claim("alice")
+    made.claim("bob")
+    time.now_s = SILENT_S + 0.1
+    made.heard("bob", Pose2D(0.0, 0.0, 0.0))
+    assert made.goes_before("bob", "alice")
+    assert made.others("bob") == ()
+
+
+def test_a_robot_does_not_see_itself() -> None:
+    """`others` are the others, with what they announced."""
+    made = table(Time(), "alice", "bob")
+    made.view_of("alice").claim()
+    made.view_of("alice").announce(WAY, DISCS)
+    (seen,) = made.view_of("bob").others()
+    assert seen.name == "alice" and seen.first and seen.way is WAY
+
+
+def test_turns_can_be_changed() -> None:
+    """One that cannot make way goes first instead."""
+    made = table(Time(), "alice", "bob")
+    made.claim("alice")
+    made.claim("bob")
+    made.view_of("bob").let_pass("alice")
+    assert made.goes_before("bob", "alice")
+
+
+ACTIONS = st.lists(
+    st.tuples(st.sampled_from(("claim", "release", "heard", "wait", "change")), st.sampled_from(NAMES)), max_size=40
+)
+
+
+@given(ACTIONS)
+def test_the_right_of_way_is_a_strict_order(actions: list[tuple[str, str]]) -> None:
+    """Never do two go before each other, and never do robots wait for each other in a circle."""
+    time = Time()
+    made = table(time, *NAMES)
+    for what, name in actions:
+        if what == "claim":
+            made.claim(name)
+        elif what == "release":
+            made.release(name)
+        elif what == "heard":
+            made.heard(name, None)
+        elif what == "wait":
+            time.now_s += 0.8
+        else:
+            made.change_turns(name, NAMES[(NAMES.index(name) + 1) % 3])
+        before = {(a, b) for a in NAMES for b in NAMES if a != b and made.goes_before(a, b)}
+        assert all((b, a) not in before for a, b in before)
+        a, b, c = NAMES
+        assert not {(a, b), (b, c), (c, a)} <= before
+        assert not {(b, a), (c, b), (a, c)} <= before

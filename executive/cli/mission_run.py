@@ -200,5 +200,5 @@ def _report(prepared: Prepared, worst: RobotReport, result: RunResult, *, log: s
         real_time_factor=round(result.sim_time_s / max(result.wall_time_s, 1e-6), 2),
         ticks=result.ticks,
         log=log,
-        scenario=prepared.request.scenario.lines(),
+        scenario=(*prepared.request.scenario.lines(), *prepared.request.variation.lines()),
     )

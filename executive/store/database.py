@@ -10,7 +10,7 @@ from typing import Final
 
 from executive.mission.errors import InputError, disk_is_full
 
-VERSION: Final = 6
+VERSION: Final = 7
 APPLICATION_ID: Final = 0x45525244  # "ERRD"
 BUSY_S: Final = 2.0
 _DAMAGED: Final = "move it away (its missions are lost), or name another by --store"
@@ -93,8 +93,11 @@ CREATE TABLE given (
     referee TEXT
 );
 """
+_VARIATIONS: Final = """
+ALTER TABLE mission ADD COLUMN variation TEXT;
+"""
 _OLDEST: Final = 4
-_ADDED: Final = {5: _TRIGGERS + _SCENARIOS_AND_TIMES, 6: _FLEET}
+_ADDED: Final = {5: _TRIGGERS + _SCENARIOS_AND_TIMES, 6: _VARIATIONS, 7: _FLEET}
 """What each version has added to the one before; `_OLDEST` is `_SCHEMA`."""
 
 

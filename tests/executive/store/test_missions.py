@@ -208,7 +208,7 @@ def test_a_store_of_another_version_is_refused(path):
     with sqlite3.connect(path) as other:
         other.execute("PRAGMA user_version = 9")
     other.close()
-    with pytest.raises(InputError, match="version 9, and this errand reads 6"):
+    with pytest.raises(InputError, match="version 9, and this errand reads 7"):
         MissionStore(path)
 
 
@@ -216,9 +216,9 @@ def test_a_store_of_version_4_is_brought_up_to_date(path):
     with MissionStore(path) as store:
         kept = store.add(REQUEST, queued=True)
     with sqlite3.connect(path) as old:
-        for table in ("standing", "origin", "battery"):
+        for table in ("standing", "origin", "battery", "given"):
             old.execute(f"DROP TABLE {table}")
-        for column in ("scenario", "time_of_day", "time_limit_s"):
+        for column in ("scenario", "time_of_day", "time_limit_s", "variation"):
             old.execute(f"ALTER TABLE mission DROP COLUMN {column}")
         old.execute("PRAGMA user_version = 4")
     old.close()

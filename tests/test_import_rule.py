@@ -24,6 +24,7 @@ HOMES = (
     ("executive.record",),
     ("executive.run",),
     ("executive.store",),
+    ("executive.fleet",),
     ("executive.conversation",),
     ("executive.view",),
     ("executive.evaluation",),

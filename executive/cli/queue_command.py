@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import nullcontext
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +14,7 @@ import typer
 from executive.cli.durable import STORE
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.requests import prepare
-from executive.cli.run_options import SET
+from executive.cli.run_options import ROBOTS, SET, robots_of
 from executive.cli.serve_command import AsJson, Out, Store, serve
 from executive.cli.stack_command import STACK
 from executive.mission.errors import InputError
@@ -67,6 +68,7 @@ def add(
     ] = None,
     given: SET = None,
     stack: STACK = None,
+    robots: ROBOTS = None,
     out: Out = Path("out"),
     store: Store = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
@@ -83,6 +85,7 @@ def add(
         load_stack(stack)
         values = given_values(given or ())
         asked = Request(say, file, world, wake, seed=seed, out=out, record=not no_record, stack=stack, given=values)
+        asked = replace(asked, robots=robots_of(robots))
         prepared = prepare(asked)
         if not anyway:
             from executive.cli.feasibility import refuse_impossible

@@ -1,0 +1,45 @@
+"""`errand fleet`: what is left to do in a store, and whose faults are whose."""
+
+import pytest
+
+from executive.cli.fleet_command import _faults, _to_do
+from executive.mission.errors import InputError
+from executive.mission.request import Request
+from executive.store.given import GivenMissions
+from executive.store.missions import MissionState, MissionStore
+
+REQUEST = Request(commands=("Take ...",), name="work", world_name="flat")
+
+
+@pytest.fixture
+def store(tmp_path):
+    with MissionStore(tmp_path / "missions.sqlite") as opened:
+        yield opened
+
+
+def test_a_run_that_was_killed_goes_on_without_what_is_over_and_what_had_changed_something(store):
+    over, begun, stuck, waiting = (store.add(REQUEST, queued=True).id for _ in range(4))
+    given = GivenMissions(store)
+    for number in (over, begun, stuck):
+        given.give(number, "Alice")
+        store.begin(number)
+    store.finish(over, MissionState.SUCCESS, "done")
+    given.progress(begun, 2, None)
+    given.progress(stuck, 0, "it was begun")
+    assert [each.id for each in _to_do(store)] == [begun, waiting]
+    assert (given.all()[begun].done, given.all()[begun].reassigned) == (2, 1)
+    assert store.mission(stuck).message == "the run was broken off, and Alice had begun it"
+
+
+def test_a_mission_that_another_command_was_broken_off_in_is_not_touched(store):
+    store.begin(store.add(REQUEST, queued=True).id)
+    with pytest.raises(InputError, match="was broken off"):
+        _to_do(store)
+
+
+def test_a_fault_is_for_the_robot_named_before_it_else_for_all():
+    faults = _faults(["bob: robot dies at 20 s", "lidar: dropout 1 s at 2 s"], ("Alice", "Bob"))
+    assert faults == {
+        "Alice": ["lidar: dropout 1 s at 2 s"],
+        "Bob": ["robot dies at 20 s", "lidar: dropout 1 s at 2 s"],
+    }

@@ -275,7 +275,7 @@ class Navigate(Skill[NavigateInputs]):
             self._room_m = self.options.space.least_room_m
             self._phase = self._planning
             return None
-        self._replans += not (self._people_may_go() or self._neighbour_may_go())
+        self._replans += not (self._neighbour_may_go() or self._people_may_go())
         if self._obstacle is None or self._replans >= self.options.replans:
             who = self._giving.name_at(self._obstacle) or "something seen"
             seen = f" The way is blocked by {who} at {_xy(self._obstacle)}." if self._obstacle else ""

@@ -33,8 +33,8 @@ _BODY_M = 0.6
 class GivingWayOptions:
     """Distances are between outlines (m), times on the robot's clock (s).
 
-    A way that comes within `apart_m` of one that is reserved waits for it, `short_m` before. Who goes first waits for one
-    who stands within `room_m` of the next `room_look_m` of its way, for `patience_s` at most. A waiting place lies
+    A way that comes within `apart_m` of one that is reserved waits for it, `short_m` before. Who goes first waits for
+    one who stands within `room_m` of the next `room_look_m` of its way, for `patience_s` at most. A waiting place lies
     `aside_m` off reserved ways, and within `reach_m`; the way on is looked for every `again_s`.
     """
 

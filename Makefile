@@ -27,7 +27,7 @@ endef
 env: $(VENV)/.ready
 
 $(VENV)/.ready: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,objects,test,browser,bench,dev]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,objects,cluster,test,browser,bench,dev]'
 	@touch $@
 
 $(VENV)/.run: pyproject.toml constraints.txt | debian

@@ -31,6 +31,7 @@ from plant.kinds import BodyOptions, RobotBody, robot_kind
 from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.scene import Scene
 from plant.scenery import add_model, add_scenery
+from plant.variation import multiply_friction
 from plant.worlds.world import DoorRule
 
 TIME_STEP_S = 0.0125
@@ -94,6 +95,7 @@ def build_diagram(
     render: bool = True,
     renderer_parameters: RenderEngineVtkParams | None = None,
     meshcat: Meshcat | None = None,
+    friction: float = 1.0,
 ) -> WorldDiagram:
     """A Diagram of the directives' world (or an empty one) with models and robots.
 
@@ -102,7 +104,7 @@ def build_diagram(
     `robots` names the kind of each; `doors` have panels, which are models, too.
     `renderer_parameters` set light and sky; `meshcat` shows the world there.
     `visuals` draws robots with meshes where they are installed; `render` makes the scene for cameras; `locomotion`
-    limits what bears each robot.
+    limits what bears each robot. `friction` multiplies the coefficients of all that moves.
     """
     rebuild = partial(
         build_diagram,
@@ -131,6 +133,8 @@ def build_diagram(
         for name, kind in sorted(robots.items())
     }
     plant.Finalize()
+    if friction != 1.0:
+        multiply_friction(plant, scene_graph, friction)
     for model in models:
         if not (model.fixed or model.slides):
             (body,) = plant.GetBodyIndices(instances[model.name])[:1]

@@ -15,7 +15,6 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
 from pydrake.systems.framework import Context
 
-from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.scene import Scene
 from plant.snapshot.values import State
 from skills.robot import Capabilities, Pose2D, Robot
@@ -70,11 +69,14 @@ class PlantRobot(Robot, Protocol):
 
 @dataclass(frozen=True)
 class BodyOptions:
-    """How a robot is put into a plant: with meshes where they are installed, borne by a floating base within limits."""
+    """How a robot is put into a plant: with meshes where they are installed, moved within the limits of its stack.
+
+    Limits of another kind of robot's locomotion do not concern it.
+    """
 
     visuals: bool = True
     carried: bool = True
-    locomotion: FloatingBaseLimits | None = None
+    locomotion: object | None = None
 
 
 @dataclass(frozen=True)

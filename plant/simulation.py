@@ -29,6 +29,8 @@ from plant.sleeping import Sleepers
 from plant.snapshot.file import read_snapshot
 from plant.snapshot.values import State
 from plant.snapshot.writer import SnapshotWriter, restore
+from plant.variation import AS_IT_IS, Variation
+from plant.worlds.clutter import place_clutter
 from plant.worlds.lights import render_parameters
 from plant.worlds.placement import Placement, Receiving, place_objects, place_people
 from plant.worlds.route import Route
@@ -230,19 +232,22 @@ class Simulation:
         extra_models: Sequence[LooseModel] = (),
         starts: Mapping[str, Pose2D] = MappingProxyType({}),
         docks: Mapping[str, Pose2D] = MappingProxyType({}),
+        variation: Variation = AS_IT_IS,
     ) -> None:
         """Build the plant of `world`; things and people stand where the seed puts them.
 
         `robots` names the kind of each. They stand at their `starts`, one alone by default at the world's, and charge
         at their `docks`, by default the world's. Batteries begin at `charge` (0 to 1). `extra_models` stand in the
-        world though no map knows them; `locomotion` limits what bears each robot. Raises WorldError when the things do
-        not fit into the world, or a person's route leads through something. Raises ValueError: a robot has no start.
+        world though no map knows them; `locomotion` limits what bears each robot; `variation` says how it differs.
+        Raises WorldError when the things do not fit into the world, or a person's route leads through something.
+        Raises ValueError: a robot has no start.
         """
         self.seed, self.world, self.starts = seed, world, {**_default_starts(world, robots), **starts}
         if missing := robots.keys() - self.starts.keys():
             raise ValueError(f"there is no start for {', '.join(sorted(missing))}")
         own_docks = dict(docks) if world.dock is None else {name: docks.get(name, world.dock) for name in robots}
         things, people = place_objects(world, seed), place_people(world, seed)
+        things += place_clutter(world, things, variation.clutter, seed, spared=variation.spared)
         built = build_diagram(
             directives=world.directives_path,
             models=[
@@ -254,7 +259,8 @@ class Simulation:
             doors=world.doors,
             visuals=visuals,
             locomotion=locomotion,
-            renderer_parameters=render_parameters(),
+            renderer_parameters=render_parameters(variation.light),
+            friction=variation.friction,
         )
         self.engine = Engine(
             built,

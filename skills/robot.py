@@ -69,6 +69,9 @@ InverseKinematics = Callable[["RigidTransform"], Sequence[FloatArray]]
 class ArmCapabilities:
     """The arm: joint names from the shoulder on, the furthest reach from the first joint (m), what it lifts (kg).
 
+    `standing_m` are the distances of the body's origin from something to take or to put down, the best first, and
+    `nearer_m` those for what is held from above; `carry_x_m` and `carry_z_m` are where in B the hand carries, best at
+    `carry_best_x_m` and low.
     Joints that turn without end are `continuous` in the description. `inverse` solves its inverse kinematics; None for
     the families whose closed form `skills.arm.kinematics` reads from the description.
     """
@@ -78,6 +81,16 @@ class ArmCapabilities:
     stowed_rad: tuple[float, ...]
     max_payload_kg: float
     inverse: InverseKinematics | None = None
+    standing_m: tuple[float, ...] = (0.90, 0.94, 0.87, 0.84, 0.98, 0.81, 1.02, 1.06)
+    nearer_m: tuple[float, ...] = (0.76, 0.72, 0.68, 0.64)
+    carry_x_m: tuple[float, ...] = (0.3, 0.35, 0.4, 0.45, 0.5)
+    carry_z_m: tuple[float, ...] = (0.26, 0.29, 0.32, 0.36, 0.41, 0.46, 0.54)
+    carry_best_x_m: float = 0.35
+
+    @property
+    def comfortable_m(self) -> tuple[float, float]:
+        """The range of distances at which there is no need to go elsewhere."""
+        return min(self.standing_m) - 0.01, max(self.standing_m) - 0.04
 
 
 class GripperKind(enum.Enum):
@@ -117,6 +130,10 @@ class GripperCapabilities:
     def finger_positions(self, opening: float) -> dict[str, float]:
         """Where each finger joint is at an opening, by name."""
         return {name: share * opening for name, share in self.finger_joints}
+
+    def like_turn(self, turn_rad: float) -> float:
+        """The part of the opening that a turn is of that of a hinged finger, which opens to about a right angle."""
+        return turn_rad if self.kind is GripperKind.HINGED else self.widest * turn_rad / (0.5 * math.pi)
 
     def opening_for(self, gap_m: float) -> float:
         """The opening at which the tips are about so far apart."""
@@ -181,8 +198,10 @@ class HeadCapabilities:
 class Capabilities:
     """What a robot is and can do; `arm`, `gripper` or `head` is None on a robot without one.
 
+    `lift_joint` is the joint of a torso that slides up from the lowest of `height_range_m` while the base stays.
     `footprint_m` is the standing outline in the body frame as (x, y) corners; `description` the robot's URDF text with
     collision shapes and a free base (link `body`); `height_range_m` that of the body origin while it walks.
+    `lidar_height_m` is that of the LiDAR over the floor, the robot standing as usual: maps differ by it.
     """
 
     footprint_m: tuple[tuple[float, float], ...]
@@ -197,6 +216,8 @@ class Capabilities:
     description: str
     base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL
     head: HeadCapabilities | None = None
+    lift_joint: str | None = None
+    lidar_height_m: float | None = None
 
     @property
     def body_cameras(self) -> tuple[CameraCapabilities, ...]:

@@ -24,8 +24,10 @@ HOMES = (
     ("executive.record",),
     ("executive.run",),
     ("executive.store",),
+    ("executive.fleet",),
     ("executive.conversation",),
     ("executive.view",),
+    ("executive.evaluation",),
     ("executive.testing",),
     ("executive.cli",),
 )

@@ -17,6 +17,7 @@ from executive.tree.compiler import CompiledTree
 from plant.referee import Verdict
 from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
+from plant.variation import AS_IT_IS, Variation
 from plant.worlds.world import World, WorldError
 from skills.detection import Detector
 from skills.estimate.grid_map import MapError
@@ -25,7 +26,14 @@ from skills.robot import Pose2D
 from skills.stack import DetectorComponent, RobotStack, default_stack
 
 
-def simulate(world: World, robots: Mapping[str, PlacedRobot], *, seed: int, record: bool) -> Simulation:
+def simulate(
+    world: World,
+    robots: Mapping[str, PlacedRobot],
+    *,
+    seed: int,
+    record: bool,
+    variation: Variation = AS_IT_IS,
+) -> Simulation:
     """The plant of a world, things set by the seed. Raises InputError when they do not fit into it."""
     logging.getLogger("drake").setLevel(logging.WARNING)  # Drake sets its own level when it is imported
     try:
@@ -37,6 +45,7 @@ def simulate(world: World, robots: Mapping[str, PlacedRobot], *, seed: int, reco
             locomotion={name: robot.stack.locomotion for name, robot in robots.items()},
             starts={name: robot.start for name, robot in robots.items()},
             docks={name: robot.dock for name, robot in robots.items() if robot.dock is not None},
+            variation=variation,
         )
     except WorldError as error:
         raise InputError(str(error)) from error
@@ -63,7 +72,8 @@ def run_entry(
     if tree.robot_name not in simulation.robots:
         known = ", ".join(simulation.robots)
         raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", hint=f"known: {known}")
-    scan_map, keepout_map = grid_at(world.scan_map_path), grid_at(world.keepout_map_path)
+    seen_from_m = simulation.robots[tree.robot_name].capabilities().lidar_height_m
+    scan_map, keepout_map = grid_at(world.scan_map_seen_from(seen_from_m)), grid_at(world.keepout_map_path)
     start = believed or (simulation.starts[tree.robot_name] if told else None)
     try:
         localiser = stack.localiser.build(scan_map, start, surely=told and believed is None)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +18,8 @@ from executive.cli.output import console_for, print_json, refusals, show_table
 from executive.cli.refine_command import refine_command
 from executive.cli.score_command import score_command
 from executive.cli.train_command import train_command
+from executive.cli.worker_pool import Pool
+from executive.evaluation.workers import Workers
 from executive.mission.errors import InputError
 from plant.dataset.errors import DatasetError
 
@@ -45,19 +49,24 @@ def render_command(
     images: Annotated[int, typer.Option(min=1, help="How many pictures.")],
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same pictures.")] = 1,
     jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="A local Dask cluster of so many workers.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="tcp://HOST:PORT", help="The scheduler of a Dask cluster.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
     """Render pictures of things in random rooms, with boxes and masks as COCO files."""
     console = console_for(as_json)
     began = time.monotonic()
     with refusals():
-        summary = _rendered(out, images, seed, jobs or os.cpu_count() or 1, console)
+        pool = Pool(jobs or os.cpu_count() or 1, workers, scheduler)
+        summary = _rendered(out, images, seed, pool, console)
     _show(console, out, summary, time.monotonic() - began)
     if as_json:
         print_json({"out": str(out), **asdict(summary)})
 
 
-def _rendered(out: Path, images: int, seed: int, jobs: int, console: Console) -> Summary:
+def _rendered(out: Path, images: int, seed: int, pool: Pool, console: Console) -> Summary:
     from plant.dataset.shards import render
 
     columns = (
@@ -74,9 +83,21 @@ def _rendered(out: Path, images: int, seed: int, jobs: int, console: Console) ->
             bar.update(task, completed=done, total=total)
 
         try:
-            return render(out, images=images, seed=seed, jobs=jobs, progress=show)
+            if pool.workers is None and pool.scheduler is None:
+                return render(out, images=images, seed=seed, jobs=pool.jobs, progress=show)
+            with pool.opened() as others:
+                made = partial(_given_out, others)
+                return render(out, images=images, seed=seed, jobs=pool.jobs, progress=show, give_out=made)
         except DatasetError as error:
             raise InputError(error.message, hint=error.hint) from error
+
+
+def _given_out(
+    workers: Workers, function: Callable[[int], Mapping[str, bytes]], numbers: list[int]
+) -> Iterator[tuple[int, Mapping[str, bytes] | None]]:
+    """As `plant.dataset.shards.GiveOut` says."""
+    for finished in workers.give_out(function, numbers):
+        yield finished.item, finished.result
 
 
 def _show(console: Console, out: Path, summary: Summary, seconds: float) -> None:

@@ -41,6 +41,7 @@ def run_arguments(asked: Request, prepared: Prepared) -> list[str]:
     arguments += [f"--fault={words}" for words in asked.scenario.faults]
     arguments += [f"--random-faults={asked.scenario.random}"] if asked.scenario.random else []
     arguments += [f"--scenario={path}" for path in asked.scenario_files]
+    arguments += asked.variation.arguments()
     if asked.file is None:
         return arguments
     arguments += [part for answer in asked.answers for part in ("--answer", answer)]
@@ -88,7 +89,7 @@ def same_world(one: StoredMission, other: StoredMission) -> bool:
     """Whether two missions are to be done by one robot in one world."""
     a, b = one.request, other.request
     same = (a.world, a.world_name, a.seed, a.robot) == (b.world, b.world_name, b.seed, b.robot)
-    return same and a.scenario == b.scenario
+    return same and (a.scenario, a.variation) == (b.scenario, b.variation)
 
 
 @dataclass(frozen=True)

@@ -46,10 +46,14 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "log": _Command("log_command", "log", "Print what each node of a run did and why, detections and the outcome."),
     "replay": _Command("replay_command", "replay", "Show a run at any time of it: tree, map, pictures, events, 3D."),
     "queue": _Command("queue_command", "queue", "Missions kept in a store, to be run one after another."),
+    "fleet": _Command("fleet_command", "fleet", "What is queued, given out among several robots."),
     "resume": _Command("resume_command", "resume", "Resume the mission that was interrupted; then run its queue."),
     "evaluate": _Command(
-        "main", "evaluate", "Run a mission at many seeds and count what the trees claim and what the referee saw."
+        "main",
+        "evaluate",
+        "Run a scenario file, or a mission at many seeds; count claims and what the referee saw.",
     ),
+    "report": _Command("report_command", "report", "Report the results of an evaluation: rates, causes, failures."),
     "teleop": _Command("teleop_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "dataset": _Command("dataset_command", "dataset", "Labelled pictures rendered in the plant; scores, training."),

@@ -20,7 +20,11 @@ from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.page_view import PageView, queueing
 from executive.cli.requests import Prepared, prepare
 from executive.cli.run_options import (
+    CLUTTER,
     FAULT,
+    FRICTION,
+    LIGHT,
+    PEOPLE,
     RANDOM_FAULTS,
     ROBOTS,
     SCENARIO,
@@ -42,14 +46,17 @@ from executive.cli.sweep import (
     conditions,
     folders,
     rows,
-    seed_range,
     sweep,
     totals,
 )
+from executive.evaluation.scenario import is_evaluation
+from executive.evaluation.seeds import seed_range
 from executive.language.questions import QuestionPolicy
+from executive.mission.errors import InputError
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
 from executive.mission.scenario import Scenario
+from executive.mission.variation import NORMAL_LIGHT, Variation
 from executive.record.profile import Profile, lines
 from executive.speech.voice import Voice
 from executive.store.missions import MissionStore
@@ -70,6 +77,12 @@ Questions = Annotated[
 ]
 Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
 Anyway = Annotated[bool, typer.Option("--anyway", help="Begin although `errand check` would refuse it.")]
+ScenarioOrMission = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="FILE", help="A scenario file, a mission file, or a name of `errand missions`.", show_default=False
+    ),
+]
 OwnMap = Annotated[
     Path | None, typer.Option("--map", help="The robot's map, a folder of `errand map build`; else the world's own.")
 ]
@@ -101,6 +114,10 @@ def run(
     fault: FAULT = None,
     random_faults: RANDOM_FAULTS = 0,
     scenario: SCENARIO = None,
+    light: LIGHT = NORMAL_LIGHT,
+    clutter: CLUTTER = 0,
+    people: PEOPLE = 0,
+    friction: FRICTION = 1.0,
     day_time: TIME_OF_DAY = None,
     time_limit: TIME_LIMIT = None,
     anyway: Anyway = False,
@@ -128,6 +145,7 @@ def run(
         asked = replace(asked, time_of_day=time_of_day(day_time), time_limit_s=time_limit_s(time_limit))
         asked = replace(asked, robots=robots_of(robots))
         asked = _disturbed(asked, fault, random_faults, scenario)
+        asked = replace(asked, variation=Variation(light, clutter, people, friction))
         finished, page = _run_kept(
             asked,
             kept_in,
@@ -151,12 +169,19 @@ def run(
 
 
 def evaluate(
-    file: MissionFile = None,
+    file: ScenarioOrMission = None,
     say: Say = None,
     world: World = None,
     given: SET = None,
-    seeds: Annotated[str, typer.Option(help="Such as 1-20 or 1,4,7.")] = "1-20",
-    jobs: Annotated[int, typer.Option(min=1, help="How many runs at a time.")] = 2,
+    seeds: Annotated[str | None, typer.Option(help="Such as 1-20 or 1,4,7; 1-20 unless said.")] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="How many processes on this machine.")] = 2,
+    workers: Annotated[int | None, typer.Option(min=1, help="A local Dask cluster of so many workers.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="tcp://HOST:PORT", help="The scheduler of a Dask cluster.")
+    ] = None,
+    results: Annotated[
+        Path | None, typer.Option(help="Where results land; results.sqlite in the folder for logs.")
+    ] = None,
     wake: Wake = None,
     answer: Answer = None,
     questions: Questions = None,
@@ -173,12 +198,28 @@ def evaluate(
     out: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("out/evaluate"),
     as_json: AsJson = False,
 ) -> None:
-    """Run a mission at many seeds and count what the trees claim and what the referee saw.
+    """Run a scenario file, or a mission at many seeds; count what the trees claim and what the referee saw.
 
-    Faults and scenarios are all in each run, unless each is to be tried alone.
+    A scenario file says what is run, where and with what varied; its results land in a file, and the same command goes
+    on where it stopped. Of a mission, faults and scenarios are all in each run, unless each is to be tried alone.
     """
     with refusals():
-        chosen = seed_range(seeds)
+        if file is not None and is_evaluation(file):
+            own = (say, world, given, seeds, wake, answer, questions, stack, own_map, start, fault, scenario)
+            if any(each is not None for each in own) or random_faults or each_fault:
+                what = "a scenario file says itself what is run"
+                raise InputError(what, hint="write missions, worlds, seeds, faults and stacks into it", file=file)
+            from executive.cli.evaluate_scenario import evaluate_scenario
+            from executive.cli.worker_pool import Pool
+
+            pool, told = Pool(jobs, workers, scheduler), console_for(as_json)
+            raise typer.Exit(
+                evaluate_scenario(file, told, pool=pool, results=results, out=out, anyway=anyway, as_json=as_json)
+            )
+        if workers is not None or scheduler is not None or results is not None:
+            what = "--workers, --scheduler and --results are for a scenario file"
+            raise InputError(what, hint="write one: missions, worlds, seeds, variations")
+        chosen = seed_range(seeds or "1-20")
         at = None if start is None else Start.of(start)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, stack=stack, start=at, map=own_map)
         asked = replace(asked, given=given_values(given or ()))

@@ -69,7 +69,7 @@ def run_request(
     """
     out, clock, work = prepared.request.out, backend.clock, Work()
     scenario = prepared.request.scenario
-    entries = [_entry(each, backend, durable, work) for each in prepared.all]
+    entries = [entry_for(each, backend, durable, work) for each in prepared.all]
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
     if listener is not None:
         log.listen(listener)
@@ -113,7 +113,7 @@ def run_request(
     return replace(finished, report=report)
 
 
-def _entry(prepared: Prepared, backend: Backend, durable: Durable | None, work: Work) -> RunEntry:
+def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None, work: Work) -> RunEntry:
     """The robot of a mission with its faults, its pictures counted, and its numeric code warm."""
     entry, clock = backend.entry(prepared.tree, durable), backend.clock
     warm_up(entry)
@@ -200,5 +200,5 @@ def _report(prepared: Prepared, worst: RobotReport, result: RunResult, *, log: s
         real_time_factor=round(result.sim_time_s / max(result.wall_time_s, 1e-6), 2),
         ticks=result.ticks,
         log=log,
-        scenario=prepared.request.scenario.lines(),
+        scenario=(*prepared.request.scenario.lines(), *prepared.request.variation.lines()),
     )

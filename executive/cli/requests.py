@@ -181,6 +181,10 @@ def prepared_for(
 
         request = with_scenario(request, world, knowledge)
         world = with_happenings(world, request.scenario)
+    if request.variation:
+        from executive.cli.variations import with_people
+
+        world = with_people(world, request)
     tree = compile_mission(mission, knowledge=knowledge, registry=usable_skills())
     compiled = _of_tree(replace(request, world_name=world.name, robot=mission.robot_name), tree)
     return Prepared(compiled, mission, world, knowledge, tree, meant)

@@ -15,7 +15,11 @@ if TYPE_CHECKING:
     from skills.robot import Pose2D
 
 __all__ = [
+    "CLUTTER",
     "FAULT",
+    "FRICTION",
+    "LIGHT",
+    "PEOPLE",
     "RANDOM_FAULTS",
     "ROBOTS",
     "SCENARIO",
@@ -55,6 +59,12 @@ TIME_LIMIT = Annotated[
     str | None,
     typer.Option("--time-limit", metavar="TIME", help='The run ends after so long: seconds, or "2 h"; 20 min.'),
 ]
+LIGHT = Annotated[
+    str, typer.Option(metavar="NAME", help="normal, dim, bright, evening, low sun, or a brightness (1 is day light).")
+]
+CLUTTER = Annotated[int, typer.Option(min=0, help="So many more objects lie about, by the seed.")]
+PEOPLE = Annotated[int, typer.Option(min=0, help="So many more people walk about, by the seed.")]
+FRICTION = Annotated[float, typer.Option(help="A factor on the friction of loose objects and robots.")]
 ROBOTS = Annotated[
     str | None,
     typer.Option(

@@ -20,7 +20,7 @@ from executive.mission.request import Request
 from plant.worlds.world import World
 from skills.robot import Pose2D
 
-__all__ = ["prepare_several"]
+__all__ = ["prepare_several", "prepared_part"]
 
 
 def prepare_several(request: Request, *, ask: Answerer | None) -> Prepared:
@@ -49,7 +49,9 @@ def prepare_several(request: Request, *, ask: Answerer | None) -> Prepared:
     waits = _waits(meant.parts, robots)
     every = [
         replace(
-            _prepared(name, [part.meaning for part in parts if part.robot == name], request, world, knowledge, robots),
+            prepared_part(
+                name, [part.meaning for part in parts if part.robot == name], request, world, knowledge, robots
+            ),
             after=waits.get(name, ()),
             speaker_W=next((_speaker_W(part, robots) for part in parts if part.robot == name), None),
         )
@@ -80,7 +82,7 @@ def _soonest(
     bids: dict[str, float] = {}
     reasons: list[str] = []
     for name in robots:
-        checked = check_prepared(_prepared(name, [meant], request, world, knowledge, robots))
+        checked = check_prepared(prepared_part(name, [meant], request, world, knowledge, robots))
         if checked.errors:
             reasons.append(f"{name}: {checked.errors[0].message}")
         else:
@@ -90,7 +92,7 @@ def _soonest(
     return min(bids, key=lambda name: bids[name])
 
 
-def _prepared(
+def prepared_part(
     name: str,
     meanings: Sequence[Understanding],
     request: Request,
@@ -98,7 +100,7 @@ def _prepared(
     knowledge: Knowledge,
     robots: Mapping[str, PlacedRobot],
 ) -> Prepared:
-    """What one robot is to do."""
+    """What one robot is to do: all that was meant for it, from where it stands. Raises InputError: it cannot be."""
     robot = robots[name]
     own_world = replace(world, start=robot.start, dock=robot.dock)
     steps = tuple(step for meant in meanings for step in steps_of(meant))

@@ -87,7 +87,7 @@ def show_run(
     """
     for told in prepared.mission.notes:
         console.print(f"{told}.", markup=False)
-    for line in prepared.request.scenario.lines():
+    for line in (*prepared.request.scenario.lines(), *prepared.request.variation.lines()):
         console.print(f"Scenario: {line}", markup=False)
     for command in prepared.mission.commands:
         console.print(str(command), markup=False)

@@ -15,6 +15,7 @@ from executive.cli.page_view import PageView
 from executive.cli.report import RefereeReport
 from executive.cli.requests import Prepared
 from executive.cli.starts import PlacedRobot, alone
+from executive.cli.variations import plant_variation
 from executive.mission.errors import InputError
 from executive.record.event_log import Listener
 from executive.record.profile import Profile
@@ -22,6 +23,7 @@ from executive.run.control import Control
 from executive.run.outcome import RobotResult
 from executive.run.runner import Observer, RunEntry
 from executive.tree.compiler import CompiledTree
+from plant.variation import AS_IT_IS, Variation
 from plant.worlds.world import World
 from skills.robot import Clock
 
@@ -31,10 +33,18 @@ __all__ = ["SimulatedBackend", "run_simulated"]
 class SimulatedBackend:
     """Robots in the plant of a world (`executive.cli.backend.Backend`)."""
 
-    def __init__(self, world: World, robots: Mapping[str, PlacedRobot], *, seed: int, record: bool) -> None:
+    def __init__(
+        self,
+        world: World,
+        robots: Mapping[str, PlacedRobot],
+        *,
+        seed: int,
+        record: bool,
+        variation: Variation = AS_IT_IS,
+    ) -> None:
         """Build the plant, things set by the seed. Raises InputError when they do not fit into the world."""
         self._world, self._robots, self._record = world, robots, record
-        self._simulation = simulate(world, robots, seed=seed, record=record)
+        self._simulation = simulate(world, robots, seed=seed, record=record, variation=variation)
 
     @property
     def clock(self) -> Clock:
@@ -105,7 +115,13 @@ def run_simulated(
 ) -> Finished:
     """Run a request in the plant, as `run_request` does. Raises InputError: the world cannot be used."""
     request = prepared.request
-    backend = SimulatedBackend(prepared.world, robots_of(prepared), seed=request.seed, record=request.record)
+    backend = SimulatedBackend(
+        prepared.world,
+        robots_of(prepared),
+        seed=request.seed,
+        record=request.record,
+        variation=plant_variation(prepared),
+    )
     return run_request(
         prepared,
         backend,

@@ -23,26 +23,6 @@ Found = tuple[str, Sequence[RunReport]]
 """A condition's name, and its reports."""
 
 
-def seed_range(text: str) -> tuple[int, ...]:
-    """Seeds from "1-20", "3" or "1,4,7-9".
-
-    Raises:
-        InputError: anything else.
-    """
-    try:
-        seeds = tuple(seed for part in text.split(",") for seed in _span(part))
-    except ValueError as error:
-        raise InputError(f"'{text}' is no range of seeds", hint="write it like 1-20 or 1,4,7") from error
-    if not seeds:
-        raise InputError(f"'{text}' holds no seed", hint="write it like 1-20")
-    return seeds
-
-
-def _span(part: str) -> range:
-    first, dash, last = part.partition("-")
-    return range(int(first), int(last if dash else first) + 1)
-
-
 def conditions(asked: Request, *, each: bool) -> list[tuple[str, Request]]:
     """The request under each condition by name: with all its faults and scenarios, or without, and with `each` alone.
 

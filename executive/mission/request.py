@@ -12,6 +12,7 @@ from executive.language.questions import QuestionPolicy
 from executive.mission.errors import InputError
 from executive.mission.robots import RobotSetup
 from executive.mission.scenario import NO_SCENARIO, Scenario
+from executive.mission.variation import NO_VARIATION, Variation
 from skills.robot import Pose2D
 
 __all__ = ["Request", "Start"]
@@ -55,7 +56,7 @@ class Request:
     further ones. `given` are values for a file's parameters; the robot stands at `start`, where the world's own is not
     meant. `out` is the folder for the run's files, `stack` the file that says what the robot uses, `map` the
     folder of the map that it has in place of the world's own. `scenario` is what goes wrong and happens meanwhile, and
-    `scenario_files` hold more of it.
+    `scenario_files` hold more of it; `variation` is how the world differs from what its files say.
 
     `robots` are those of a run with several, or with one of another kind or start than the world's, by their names.
 
@@ -80,6 +81,7 @@ class Request:
     start: Start | None = None
     scenario: Scenario = NO_SCENARIO
     scenario_files: tuple[Path, ...] = ()
+    variation: Variation = NO_VARIATION
     given: Mapping[str, Any] = field(default_factory=dict)
     time_of_day: str | None = None
     time_limit_s: float | None = None

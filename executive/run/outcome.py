@@ -44,10 +44,12 @@ class RobotResult:
 
 @dataclass(frozen=True)
 class RobotStatus:
-    """A robot at one moment: where it believes to be (world frame; None when lost), and whether it holds something."""
+    """A robot at one moment: where it believes to be (world frame; None when lost), whether it holds something, and
+    its battery's charge (0 to 1; None: not asked for)."""
 
     pose: Pose2D | None
     holding: bool
+    charge: float | None = None
 
 
 @dataclass(frozen=True)

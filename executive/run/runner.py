@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, cast
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, TypeVar, cast
 
 from executive.mission.errors import disk_is_full
 from executive.record.profile import Profile
@@ -14,6 +15,7 @@ from executive.record.schemas import CONTROL
 from executive.record.ticks import TickMeter
 from executive.record.work import Work
 from executive.run.control import Control, ControlRequests, Event
+from executive.run.dispatch import Dispatch, MissionEnd
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
 from executive.run.outcome import Outcome, RobotResult, RobotStatus, RunResult
@@ -36,6 +38,7 @@ from skills.stack import RobotStack, default_stack
 from skills.traffic import NO_TRAFFIC
 
 HOLDER = "errand"
+ResultT = TypeVar("ResultT")
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,7 @@ def run(
     observer: Observer | None = None,
     work: Work | None = None,
     profile: Profile | None = None,
+    dispatch: Dispatch | None = None,
 ) -> RunResult:
     """Run trees to their end, robots in the order of their names.
 
@@ -117,18 +121,20 @@ def run(
     what changed. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree is not
     ticked, and that time counts against no limit. In every case all trees and robots are stopped and all leases
     returned before this returns. Without control, equal seeds give equal logs. `work` counts what is computed,
-    `profile` times the skills. Raises ValueError: no entries, two robots of one name, one that waits for a robot that
-    is not there, or a breakpoint at a node that there is not. Raises OSError, when all is stopped: the disk is full.
+    `profile` times the skills. With `dispatch`, robots are given missions as long as it has any, one that fails ends
+    only its own, and the result has one entry for each mission. Raises ValueError: no entries, two robots of one name,
+    one that waits for a robot that is not there, or a breakpoint at a node that there is not. Raises OSError, when all
+    is stopped: the disk is full.
     """
     names = [entry.robot.name for entry in entries]
-    if not entries or len(set(names)) != len(names):
+    if (not entries and dispatch is None) or len(set(names)) != len(names):
         raise ValueError(f"a run needs robots of different names, not {names}")
     if strangers := {name for entry in entries for name in entry.after} - set(names):
         raise ValueError(f"there is no robot {', '.join(sorted(strangers))} to wait for")
     control = control or Control(pace=None)
     control.begin({entry.tree.robot_name: entry.tree for entry in entries})
     made = _Run(clock, worker, publish, settings, control)
-    made.observer, made.work, made.profile = observer, work or Work(), profile
+    made.observer, made.work, made.profile, made.dispatch = observer, work or Work(), profile, dispatch
     return made.run(entries)
 
 
@@ -157,6 +163,9 @@ class _Run:
         self.observer: Observer | None = None
         self.work = Work()
         self.profile: Profile | None = None
+        self.dispatch: Dispatch | None = None
+        self._seen: dict[str, RobotStatus] = {}
+        self._over: list[tuple[RobotResult, CompiledTree]] = []
         self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
         self._traffic: TrafficTable | None = None
@@ -177,13 +186,12 @@ class _Run:
         ending: Ending | None = None
         full: BaseException | None = None
         try:
-            if len(entries) > 1:
-                outlines = {each.robot.name: Footprint.of(each.robot.capabilities()).discs for each in entries}
-                self._traffic = TrafficTable(outlines, self._clock.now)
+            if len(entries) > 1 or self.dispatch is not None:
+                self._traffic = TrafficTable({}, self._clock.now)
             for entry in sorted(entries, key=lambda entry: entry.robot.name):
                 self._sessions.append(self._open(entry))
                 self._after[entry.robot.name] = entry.after
-            while not all(session.finished for session in self._sessions):
+            while self._has_work():
                 self._cycle()
         except (Exception, VerbHung, KeyboardInterrupt) as stop:
             self._publish.ending = True
@@ -195,10 +203,72 @@ class _Run:
             self._publish.ending = True
             for session in self._sessions:
                 session.close(ending)
+                self._dispatched(session, None)
             self._tell(self._control.end())
         if full is not None:
             raise full
         return self._result(entries, ending)
+
+    def _has_work(self) -> bool:
+        """Whether a mission is under way, after those were begun that are given out now."""
+        while self.dispatch is not None and (given := self.dispatch.begin()):  # again while one cannot begin
+            for entry in given:
+                self._begin_given(entry, self.dispatch)
+        return not all(session.finished for session in self._sessions)
+
+    def _begin_given(self, entry: RunEntry, dispatch: Dispatch) -> None:
+        """Begin a mission that was given out; a robot that cannot be had is told of."""
+        try:
+            session = self._open(entry)
+        except (Exception, VerbHung) as stop:
+            ending = self._ending(stop)
+            result = _never_began(entry, ending)
+            self._over.append((result, entry.tree))
+            dispatch.ended(MissionEnd(result, self._seen.get(entry.robot.name), gone=ending.message))
+            return
+        self._sessions.append(session)
+        self._after[session.name] = ()
+        self._control.mission_begun(session.name, entry.tree)
+
+    def _for(self, session: Session, call: Callable[[], ResultT], otherwise: ResultT) -> ResultT:
+        """What a call for one robot gives. Where missions are given out, one that fails ends only that robot's."""
+        if self.dispatch is None:
+            return call()
+        try:
+            return call()
+        except (Exception, VerbHung) as stop:
+            if disk_is_full(stop):
+                raise
+            ending = self._ending(stop)
+            session.close(ending)
+            self._end_given(session, ending.message)
+            return otherwise
+
+    def _look(self, session: Session) -> bool:
+        """See how a robot is."""
+        charge = session.context.robot.battery().charge
+        self._seen[session.name] = replace(session.status, charge=charge)
+        return True
+
+    def _end_given(self, session: Session, gone: str | None) -> None:
+        """A robot's mission is over, and it is free again unless it is `gone`."""
+        if session not in self._sessions or self.dispatch is None:
+            return
+        if gone is None:
+            try:
+                self._look(session)
+            except (Exception, VerbHung) as stop:
+                gone = self._ending(stop).message
+        self._dispatched(session, gone)
+        self._sessions.remove(session)
+        self._control.mission_ended(session.name)
+
+    def _dispatched(self, session: Session, gone: str | None) -> None:
+        """Tell how a mission that was given out ended."""
+        if self.dispatch is not None and session.result is not None:
+            session.log_end(self._ticks)
+            self._over.append((session.result, session.main_tree))
+            self.dispatch.ended(MissionEnd(session.result, self._seen.get(session.name), gone))
 
     def _end_early(self) -> None:
         """Do what missions always do in the end, for `endings_limit_s` at most; a second cancel ends that as well."""
@@ -230,6 +300,8 @@ class _Run:
         robot = GuardedRobot(
             entry.robot, self._watchdog, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s
         )
+        if self._traffic is not None:
+            self._traffic.join(entry.robot.name, Footprint.of(entry.robot.capabilities()).discs)
         context = RunContext(
             robot=cast(Robot, robot),
             lease=robot.claim(HOLDER),
@@ -264,14 +336,20 @@ class _Run:
         requests = self._poll(live)
         self._clock.advance(self._settings.tick_period_s)
         for session in live:
-            self._sense(session)
-        turn = [session for session in live if self._is_its_turn(session)]
-        self._tick([session for session in turn if session.may_move() and requests.hold is None], requests.breakpoints)
+            self._for(session, partial(self._sense, session), None)
+        turn = [session for session in live if session.result is None and self._is_its_turn(session)]
+        moving = [session for session in turn if self._for(session, session.may_move, False) and requests.hold is None]
+        self._tick(moving, requests.breakpoints)
         for session in live:
-            if session.finished:
+            if session.result is not None:
+                self._end_given(session, session.result.message)  # its lease was another's for too long
+            elif session.finished:
                 session.close()
                 if self._traffic is not None:
                     self._traffic.release(session.name)
+                self._end_given(session, None)
+            elif self.dispatch is not None:
+                self._for(session, partial(self._look, session), False)
         if self.observer is not None:
             self.observer(self._progress())
         self._keep_pace(begun_wall_s)
@@ -326,18 +404,18 @@ class _Run:
         changes = []
         for session in moving:
             with self._watchdog.over_tick(session.name, self._settings.tick_limit_s):
-                changes.append(session.tick(breakpoints))
+                changes.append(self._for(session, partial(session.tick, breakpoints), False))
         self._ticks += 1
         self._meter(time.perf_counter() - begun)
         if moving:
             self._control.ticked(changed=any(changes))
-        for path_id in filter(None, (session.waiting_at for session in moving)):
+        for path_id in filter(None, (session.waiting_at for session in moving if session.result is None)):
             self._control.arrived_at(path_id)
 
     def _progress(self) -> Progress:
         states = {session.name: session.states for session in self._sessions}
         trees = {session.name: session.tree for session in self._sessions}
-        robots = {session.name: session.status for session in self._sessions}
+        robots = self._seen if self.dispatch else {session.name: session.status for session in self._sessions}
         return Progress(self._clock.now(), self._ticks, self._meter.overruns, states, trees, robots)
 
     def _keep_pace(self, begun_wall_s: float) -> None:
@@ -363,15 +441,17 @@ class _Run:
         return Ending(Outcome.ERROR, Cause.ERROR, f"{type(stop).__name__}: {stop}")
 
     def _result(self, entries: Sequence[RunEntry], ending: Ending | None) -> RunResult:
-        robots = tuple(session.close(ending) for session in self._sessions)
-        for session in self._sessions:
-            session.log_end(self._ticks)
+        if self.dispatch is None:
+            for session in self._sessions:
+                session.log_end(self._ticks)
+                self._over.append((session.close(ending), session.main_tree))
+        robots = tuple(result for result, _ in self._over)
         wall_time_s = time.perf_counter() - self._begun_wall_s
         self._meter.close(wall_time_s)
         began = {session.name for session in self._sessions}
         absent = tuple(_never_began(e, ending) for e in entries if ending is not None and e.robot.name not in began)
         sim_time_s = self._clock.now() - self._begun_s
-        trees = {session.name: session.main_tree for session in self._sessions}
+        trees = {result.robot_name: tree for result, tree in self._over}
         overruns, work = self._meter.overruns, self.work.totals()
         return RunResult(robots + absent, self._ticks, overruns, sim_time_s, wall_time_s, trees, work)
 

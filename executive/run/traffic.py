@@ -38,6 +38,10 @@ class TrafficTable:
         self._robots = {name: _Robot(discs) for name, discs in sorted(outlines.items())}
         self._now, self._turns = now, 0
 
+    def join(self, name: str, discs: FloatArray) -> None:
+        """One more robot with its discs (x, y, radius in the body frame); one that is known already stays as it is."""
+        self._robots.setdefault(name, _Robot(discs))
+
     def heard(self, name: str, pose: Pose2D | None) -> None:
         """A robot still answers, and believes to be at a pose of the world; None: it does not know."""
         robot = self._robots[name]

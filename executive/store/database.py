@@ -10,7 +10,7 @@ from typing import Final
 
 from executive.mission.errors import InputError, disk_is_full
 
-VERSION: Final = 5
+VERSION: Final = 7
 APPLICATION_ID: Final = 0x45525244  # "ERRD"
 BUSY_S: Final = 2.0
 _DAMAGED: Final = "move it away (its missions are lost), or name another by --store"
@@ -83,8 +83,21 @@ ALTER TABLE mission ADD COLUMN scenario TEXT;
 ALTER TABLE mission ADD COLUMN time_of_day TEXT;
 ALTER TABLE mission ADD COLUMN time_limit_s REAL;
 """
+_VARIATIONS: Final = """
+ALTER TABLE mission ADD COLUMN variation TEXT;
+"""
+_FLEET: Final = """
+CREATE TABLE given (
+    mission INTEGER PRIMARY KEY REFERENCES mission (id) ON DELETE CASCADE,
+    robot TEXT,
+    reassigned INTEGER NOT NULL DEFAULT 0,
+    done INTEGER NOT NULL DEFAULT 0,
+    blocked TEXT,
+    referee TEXT
+);
+"""
 _OLDEST: Final = 4
-_ADDED: Final = {5: _TRIGGERS + _SCENARIOS_AND_TIMES}
+_ADDED: Final = {5: _TRIGGERS + _SCENARIOS_AND_TIMES, 6: _VARIATIONS, 7: _FLEET}
 """What each version has added to the one before; `_OLDEST` is `_SCHEMA`."""
 
 

@@ -12,6 +12,7 @@ from py_trees.common import Status
 
 from executive.mission.request import Request, Start
 from executive.mission.scenario import NO_SCENARIO, Scenario
+from executive.mission.variation import NO_VARIATION, Variation
 from skills.api import Cause
 from skills.robot import Pose2D
 
@@ -56,7 +57,8 @@ def row_of(request: Request) -> dict[str, Any]:
     flags = {"require_wake": _WORLD if request.require_wake is None else request.require_wake, "record": request.record}
     start = None if request.start is None else str(request.start)
     scenario = request.scenario.to_text() if request.scenario else None
-    told = {"given": json.dumps(dict(request.given)), "start": start, "scenario": scenario}
+    variation = request.variation.to_text() if request.variation else None
+    told = {"given": json.dumps(dict(request.given)), "start": start, "scenario": scenario, "variation": variation}
     return {**own, **flags, **paths, **told, "commands": json.dumps(request.commands), "out": str(request.out)}
 
 
@@ -71,6 +73,7 @@ def request_of(row: Mapping[str, Any]) -> Request:
         given=json.loads(row["given"]),
         start=None if row["start"] is None else Start.of(row["start"]),
         scenario=NO_SCENARIO if row["scenario"] is None else Scenario.of_text(row["scenario"]),
+        variation=NO_VARIATION if row["variation"] is None else Variation.of_text(row["variation"]),
         out=Path(row["out"]),
         require_wake=None if row["require_wake"] == _WORLD else bool(row["require_wake"]),
         record=bool(row["record"]),

@@ -14,13 +14,14 @@ import json
 import multiprocessing
 import os
 import shutil
+import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -38,6 +39,10 @@ MANIFEST: Final = "dataset.json"
 SPLITS: Final = ("train", "val")
 LEAST_FREE_BYTES: Final = 50_000_000
 _SCENES: Final = "scenes"
+
+
+GiveOut = Callable[[Callable[[int], Mapping[str, bytes]], list[int]], Iterator[tuple[int, Mapping[str, bytes] | None]]]
+"""Has a function called with each number somewhere: numbers with results as they come, None for what is lost."""
 
 
 @dataclass(frozen=True)
@@ -59,17 +64,27 @@ def digest() -> str:
     return made.hexdigest()[:10]
 
 
-def render(out: Path, *, images: int, seed: int, jobs: int, progress: Callable[[int, int], None]) -> Summary:
+def render(
+    out: Path,
+    *,
+    images: int,
+    seed: int,
+    jobs: int,
+    progress: Callable[[int, int], None],
+    give_out: GiveOut | None = None,
+) -> Summary:
     """Render what is still missing of a data set and write its COCO files. Raises DatasetError.
 
-    `progress` is told how many scenes are there, and how many there will be.
+    `progress` is told how many scenes are there, and how many there will be. `give_out` has others write the scenes,
+    who may be on other machines; else `jobs` processes of this one do.
     """
     scenes = len(_taken(images))
     with _told(out):
         _claim(out, seed)
         missing = [index for index in range(scenes) if not _scene_folder(out, index).is_dir()]
         progress(scenes - len(missing), scenes)
-        for done, _ in enumerate(_rendered(out, seed, missing, jobs), start=scenes - len(missing) + 1):
+        made = _rendered(out, seed, missing, jobs) if give_out is None else _elsewhere(out, seed, missing, give_out)
+        for done, _ in enumerate(made, start=scenes - len(missing) + 1):
             progress(done, scenes)
         return _assemble(out, images, seed)
 
@@ -156,6 +171,29 @@ def _rendered(out: Path, seed: int, missing: list[int], jobs: int) -> Iterator[i
             yield tasks[task]
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _elsewhere(out: Path, seed: int, missing: list[int], give_out: GiveOut) -> Iterator[int]:
+    """Have others make scenes, and write each whole into its folder here; each number as soon as that is there."""
+    for index, files in give_out(partial(scene_files, seed), missing):
+        if files is None:
+            raise BrokenProcessPool(f"scene {index}")
+
+        def fill(fresh: Path, files: Mapping[str, bytes] = files) -> None:
+            for name, data in files.items():
+                (fresh / name).write_bytes(data)
+
+        kept_folder(_scene_folder(out, index), fill)
+        yield index
+
+
+def scene_files(seed: int, index: int) -> Mapping[str, bytes]:
+    """The files of one scene by name, made in a folder that is thrown away."""
+    with tempfile.TemporaryDirectory(prefix="errand-scene-") as made:
+        out = Path(made)
+        (out / _SCENES).mkdir()
+        write_scene(out, seed, index)
+        return {path.name: path.read_bytes() for path in sorted(_scene_folder(out, index).iterdir())}
 
 
 def end_with_starter() -> None:

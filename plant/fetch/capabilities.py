@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from pydrake.math import RollPitchYaw, RotationMatrix
 
-from plant.models.fetch.description import FINGERS, HEAD_JOINTS, arm_joint_names, fetch_facts, fetch_urdf
+from plant.models.fetch.description import FINGERS, HEAD_JOINTS, LIFT_JOINT, arm_joint_names, fetch_facts, fetch_urdf
 from plant.sensors.camera_spec import CameraSpec
 from skills.robot import (
     ArmCapabilities,
@@ -30,6 +30,7 @@ def fetch_capabilities() -> Capabilities:
     """The capabilities of Fetch."""
     facts = fetch_facts()
     body, arm, head = facts["capabilities"], facts["arm"], facts["head"]
+    arm_room = facts["arm_room"]
     height_m, (down_m, up_m) = facts["lift"]["height"], facts["lift"]["range"]
     return Capabilities(
         footprint_m=_round(body["footprint_radius"]),
@@ -43,11 +44,18 @@ def fetch_capabilities() -> Capabilities:
             body["max_reach"],
             tuple(facts["stowed"][part["link"]] for part in arm),
             body["max_payload"],
+            standing_m=tuple(arm_room["standing"]),
+            nearer_m=tuple(arm_room["nearer"]),
+            carry_x_m=tuple(arm_room["carry_x"]),
+            carry_z_m=tuple(arm_room["carry_z"]),
+            carry_best_x_m=arm_room["carry_best_x"],
         ),
         gripper=_gripper(),
         cameras=(CameraCapabilities(HEAD_CAMERA, head_camera().X_link_camera(), Mount.HEAD),),
         description=fetch_urdf(root="body"),
         base_kind=BaseKind.DIFFERENTIAL,
+        lift_joint=LIFT_JOINT,
+        lidar_height_m=facts["lidar"]["xyz"][2],
         head=HeadCapabilities(
             HEAD_JOINTS,
             tuple(head[0]["offset"]),

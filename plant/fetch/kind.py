@@ -7,6 +7,7 @@ from pathlib import Path
 from pydrake.multibody.plant import MultibodyPlant
 
 from plant.fetch.capabilities import fetch_capabilities
+from plant.fetch.wheels import WheelLimits
 from plant.kinds import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
 from plant.models.fetch.description import (
     BASE_LINK,
@@ -21,10 +22,10 @@ from plant.models.fetch.description import (
 
 
 def _add(plant: MultibodyPlant, name: str, options: BodyOptions) -> RobotBody:
-    """Its wheels bear it, whatever the options say of a floating base."""
     from plant.fetch.model import FetchModel
 
-    return FetchModel(plant, name, kind=FETCH)
+    limits = options.locomotion if isinstance(options.locomotion, WheelLimits) else WheelLimits()
+    return FetchModel(plant, name, kind=FETCH, limits=limits)
 
 
 def _drive(body: RobotBody, options: SensorOptions) -> PlantRobot:

@@ -10,6 +10,7 @@ from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RigidB
 from pydrake.systems.framework import Context
 
 from plant.control.joints import ActuatedJoints
+from plant.fetch.wheels import WheelLimits
 from plant.kinds import RobotKind
 from plant.models.fetch.description import (
     BASE_LINK,
@@ -44,9 +45,9 @@ _GAINS = {
 class FetchModel:
     """Fetch's bodies and joints in a plant. Its fingers are geared together."""
 
-    def __init__(self, plant: MultibodyPlant, name: str, *, kind: RobotKind) -> None:
+    def __init__(self, plant: MultibodyPlant, name: str, *, kind: RobotKind, limits: WheelLimits) -> None:
         """Add the robot to `plant` (before Finalize)."""
-        self.plant, self.name, self.kind = plant, name, kind
+        self.plant, self.name, self.kind, self.limits = plant, name, kind, limits
         parser = Parser(plant)
         parser.SetAutoRenaming(True)
         (self.instance,) = parser.AddModelsFromString(fetch_urdf(), "urdf")

@@ -57,7 +57,7 @@ class FetchRobot(CommandedRobot):
         self._arm = ArmServos(index, index.arm, index.fastest_arm_rad_s, joints)
         self._gripper = GripperServo(float(joints[index.fingers].sum()), _GRIPPER_TOLERANCES)
         self._fingers_m = joints[index.fingers]
-        self._wheels = WheelServos(axle(), joints[index.wheels])
+        self._wheels = WheelServos(axle(), joints[index.wheels], model.limits)
         self._head = self._head_goal = joints[index.head]
         self._lift = self._lift_goal = float(joints[index.lift])
         facts = fetch_facts()

@@ -16,7 +16,7 @@ _MEAN_AHEAD = 0.75
 
 @dataclass(frozen=True)
 class WheelLimits:
-    """What the base can do. Its wheels' motors alone could push it at 2.6 m/s^2.
+    """Two driven wheels that bear a base: what they make of a velocity; the motors alone could push at 2.6 m/s^2.
 
     `lead_rad` is how far a wheel's set point runs ahead of it where it cannot follow.
     """
@@ -51,9 +51,9 @@ class Axle:
 class WheelServos:
     """Set points of the wheels for a wanted velocity; at rest they hold the wheels where they are."""
 
-    def __init__(self, axle: Axle, now_rad: FloatArray, limits: WheelLimits | None = None) -> None:
+    def __init__(self, axle: Axle, now_rad: FloatArray, limits: WheelLimits) -> None:
         """The wheels (2,) stand at `now_rad`."""
-        self._axle, self._limits = axle, limits or WheelLimits()
+        self._axle, self._limits = axle, limits
         self._speed = self._turn_rate = 0.0
         self.goal_rad, self.rate_rad_s, self._due_rad = now_rad.copy(), np.zeros(2), now_rad.copy()
 

@@ -50,6 +50,7 @@ def spot_capabilities() -> Capabilities:
         ),
         cameras=_cameras(),
         description=spot_urdf(),
+        lidar_height_m=body["standing_height"] + facts["lidar"]["xyz"][2],
     )
 
 

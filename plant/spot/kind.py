@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydrake.multibody.plant import MultibodyPlant
 
 from plant.kinds import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
+from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.models.spot.description import FACTS, LEGS
 from plant.spot.capabilities import spot_capabilities
 
@@ -14,9 +15,8 @@ HAND_LINK, FINGER_LINK = "arm_wr1", "arm_f1x"
 def _add(plant: MultibodyPlant, name: str, options: BodyOptions) -> RobotBody:
     from plant.spot.model import SpotModel
 
-    return SpotModel(
-        plant, name, kind=SPOT, visuals=options.visuals, carried=options.carried, limits=options.locomotion
-    )
+    limits = options.locomotion if isinstance(options.locomotion, FloatingBaseLimits) else None
+    return SpotModel(plant, name, kind=SPOT, visuals=options.visuals, carried=options.carried, limits=limits)
 
 
 def _drive(body: RobotBody, options: SensorOptions) -> PlantRobot:

@@ -60,7 +60,7 @@ def place_objects(world: World, seed: int) -> tuple[Placement, ...]:
     for index, rule in enumerate(world.seed_rules.objects):
         class_name, form = _model(catalogue, rule.model, world, seed, index)
         rng = np.random.default_rng([seed, _OBJECT_STREAM, index])
-        placement, outline = _place(world, rule, (class_name, form), outlines, rng)
+        placement, outline = place_one(world, rule, (class_name, form), outlines, rng)
         placed.append(placement)
         outlines.append(outline)
     return tuple(placed)
@@ -95,14 +95,14 @@ def _form(model: ModelClass, seed: int, index: int) -> ModelForm:
     return forms[int(np.random.default_rng([seed, _FORM_STREAM, index]).integers(len(forms)))]
 
 
-def _place(
+def place_one(
     world: World,
     rule: ObjectRule,
     model: tuple[str, ModelForm],
     others: Sequence[FloatArray],
     rng: np.random.Generator,
 ) -> tuple[Placement, FloatArray]:
-    """A free pose for one thing of a class and form, and its outline there."""
+    """A free pose for one thing of a class and form, and its outline there. Raises WorldError: there is none."""
     rules, (class_name, form) = world.seed_rules.rules, model
     first = int(rng.integers(len(rule.surfaces)))
     obstacles = [*others, *(np.array(polygon) for polygon in world.seed_rules.keep_clear)]
@@ -154,6 +154,12 @@ def _before_start(
     x = world.start.x_m + distance * np.cos(direction)
     y = world.start.y_m + distance * np.sin(direction)
     return float(x), float(y), float(yaw)
+
+
+def outline_of(placement: Placement) -> FloatArray:
+    """The convex outline (K, 2) from above of an object that is placed, in the world."""
+    x, y, _ = placement.X_WO.translation()
+    return outline_W(placement.form, (float(x), float(y)), RollPitchYaw(placement.X_WO.rotation()).yaw_angle())
 
 
 def outline_W(form: ModelForm, centre: Point, yaw_rad: float) -> FloatArray:

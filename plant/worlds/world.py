@@ -6,7 +6,9 @@ Only what a plant needs is read of `knowledge.yaml`: the start pose, rooms and s
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
 WORLDS_FOLDER = Path(__file__).resolve().parent
 PACKAGE_NAME = "errand"
+ROBOTS: Final = "map"
+"""The folder of the grids that the robots are given."""
 TRUTH: Final = "truth"
 """The folder of a world's surveyed grids, where the robot has made its own map."""
 MAX_BYTES = 1_000_000
@@ -298,12 +302,32 @@ class World:
     @property
     def scan_map_path(self) -> Path:
         """The grid of what the LiDAR sees."""
-        return (self.maps or self.folder / "map") / "scan.yaml"
+        return self._maps / "scan.yaml"
+
+    def scan_map_seen_from(self, height_m: float | None) -> Path:
+        """The grid of what a LiDAR at a height sees: the one of the narrowest band about it, else `scan_map_path`."""
+        if height_m is None:
+            return self.scan_map_path
+        bands = {path: _band_m(path) for path in sorted(self._maps.glob("*scan.yaml"))}
+        fitting = [(high - low, path) for path, (low, high) in bands.items() if low <= height_m <= high]
+        return min(fitting)[1] if fitting else self.scan_map_path
 
     @property
     def keepout_map_path(self) -> Path:
         """The grid of what the body would touch."""
-        return (self.maps or self.folder / "map") / "keepout.yaml"
+        return self._maps / "keepout.yaml"
+
+    @property
+    def _maps(self) -> Path:
+        return self.maps or self.folder / ROBOTS
+
+
+def _band_m(path: Path) -> tuple[float, float]:
+    """The heights that a grid speaks of; none where its file does not say."""
+    with suppress(yaml.YAMLError, ValueError, TypeError, AttributeError, OSError):
+        low, high = yaml.load(path.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader).get("height_band_m")
+        return float(low), float(high)
+    return math.inf, -math.inf
 
 
 def add_package(package_map: PackageMap) -> None:

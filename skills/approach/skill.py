@@ -90,7 +90,7 @@ class Approach(ArmSkill[ApproachInputs]):
         The first is where the robot stands already, when that is good enough.
         """
         seen, here, enough = inputs.observation, self.context.pose(), self.options.good_grasp
-        comfortable = is_comfortable(here, (seen.position_W[0], seen.position_W[1]))
+        comfortable = is_comfortable(here, (seen.position_W[0], seen.position_W[1]), self.arm)
         free, off_m = self._free_places(seen), math.hypot(seen.position_W[0] - here.x_m, seen.position_W[1] - here.y_m)
         heights_m = body_heights_m(seen.position_W[2] - 0.5 * seen.size_m[2], self.context.robot.capabilities())
         check_now = reach_check(self, seen, own_surfaces(inputs), beyond_m=off_m)
@@ -136,7 +136,8 @@ class Approach(ArmSkill[ApproachInputs]):
         context = self.context
         point_W = (seen.position_W[0], seen.position_W[1])
         footprint = Footprint.of(context.robot.capabilities())
-        return free_places(point_W, context.pose(), context.costmap, footprint)
+        distances_m = self.arm.standing_m
+        return free_places(point_W, context.pose(), context.costmap, footprint, distances_m, distances_m[0])
 
     def _why_none(self, seen: ObjectObservation) -> str:
         """Whether the object itself is beyond the gripper, or only the places about it are."""

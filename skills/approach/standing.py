@@ -15,12 +15,10 @@ from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.robot import Pose2D
+from skills.robot import ArmCapabilities, Pose2D
 
-DISTANCES_M = (0.90, 0.94, 0.87, 0.84, 0.98, 0.81, 1.02, 1.06)
 BEARINGS = 24
 REACH_WEIGHT = 4.0
-COMFORTABLE_M = (0.80, 1.02)
 COMFORTABLE_BEARING_RAD = 0.35
 _LOOKED_AT = 40
 _OFFERED = 5
@@ -35,11 +33,12 @@ class Standing:
     cost: float
 
 
-def is_comfortable(pose: Pose2D, point_W: tuple[float, float]) -> bool:
+def is_comfortable(pose: Pose2D, point_W: tuple[float, float], arm: ArmCapabilities) -> bool:
     """Whether the point lies before the robot at a good distance already."""
+    nearest_m, farthest_m = arm.comfortable_m
     dx, dy = point_W[0] - pose.x_m, point_W[1] - pose.y_m
     bearing = wrap(math.atan2(dy, dx) - pose.yaw_rad)
-    return COMFORTABLE_M[0] <= math.hypot(dx, dy) <= COMFORTABLE_M[1] and abs(bearing) < COMFORTABLE_BEARING_RAD
+    return nearest_m <= math.hypot(dx, dy) <= farthest_m and abs(bearing) < COMFORTABLE_BEARING_RAD
 
 
 def free_places(
@@ -47,15 +46,16 @@ def free_places(
     here: Pose2D,
     costmap: Costmap,
     footprint: Footprint,
-    distances_m: Sequence[float] = DISTANCES_M,
+    distances_m: Sequence[float],
+    best_m: float,
 ) -> list[Standing]:
-    """Free poses around point_W that face it, the cheapest first."""
+    """Free poses around point_W that face it, the cheapest first; at a distance of best_m the reach is best."""
     found = []
     for k, distance in itertools.product(range(BEARINGS), distances_m):
         yaw = 2 * math.pi * k / BEARINGS
         pose = Pose2D(point_W[0] - distance * math.cos(yaw), point_W[1] - distance * math.sin(yaw), yaw)
         if footprint_clear(costmap, footprint, pose):
-            found.append(Standing(pose, _cost(pose, here, distance)))
+            found.append(Standing(pose, _cost(pose, here, abs(distance - best_m))))
     return sorted(found, key=lambda standing: standing.cost)[:_LOOKED_AT]
 
 
@@ -85,11 +85,11 @@ def _sure_cost(pose: Pose2D, reach_cost: Callable[[Pose2D], float | None]) -> fl
     return cost + _UNSURE_COST if behind is None else max(cost, behind)
 
 
-def _cost(pose: Pose2D, here: Pose2D, distance_m: float) -> float:
+def _cost(pose: Pose2D, here: Pose2D, off_m: float) -> float:
     """Metres to go, turning, and how far the distance is from the best."""
     turn = abs(wrap(pose.yaw_rad - here.yaw_rad))
     way = float(np.hypot(pose.x_m - here.x_m, pose.y_m - here.y_m))
-    return way + 0.3 * turn + 4.0 * abs(distance_m - DISTANCES_M[0])
+    return way + 0.3 * turn + 4.0 * off_m
 
 
 def go_to_one(skill: RoutineSkill[Any], goals: Sequence[NavigateInputs]) -> Routine[None]:

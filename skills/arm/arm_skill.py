@@ -11,14 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, InputsT, Running, SkillContext
+from skills.api import Cause, InputsT, PlanningError, Running, SkillContext
 from skills.arm.collision import ArmScene, Box
-from skills.arm.hold import Grip, HoldWatch, grip_again
+from skills.arm.gaze import head_angles, without_arm
+from skills.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.arm.kinematics import ArmModel, arm_model
+from skills.arm.poses import look_configuration
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.arm.solid_cells import solid_boxes, with_picture, with_view
 from skills.estimate.self_filter import segment_distance
-from skills.robot import ArmTrajectory, CameraCapabilities, CommandId, FloatArray, GripperCapabilities, Image
+from skills.robot import (
+    ArmCapabilities,
+    ArmTrajectory,
+    CameraCapabilities,
+    CommandId,
+    FloatArray,
+    GripperCapabilities,
+    GripperKind,
+    Image,
+)
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
 PlannedT = TypeVar("PlannedT")
@@ -42,6 +53,7 @@ _ASIDE_M, _LEVEL = 0.018, 0.5
 _BACK_M = (0.16, 0.12, 0.08, 0.05)
 _AT_ARM_M = 0.12
 _BEYOND_M = 0.5
+_HEAD_EXPIRY_S, _HELD_RADIUS_M = 5.0, 0.2
 
 
 def held_mass_kg(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> float:
@@ -185,6 +197,7 @@ class ArmSkill(RoutineSkill[InputsT]):
 
         def prepared() -> ArmScene:
             self._scene = scene = self._scene or ArmScene(capabilities, model, joints.position_rad, work=work)
+            scene.set_joints(joints.position_rad)
             scene.set_boxes(boxes)
             scene.hold(held)
             scene.set_padding(0.01)
@@ -210,6 +223,11 @@ class ArmSkill(RoutineSkill[InputsT]):
             return np.asarray(out | self._own(points_W))
 
         return solid_boxes(self.context.solid.cells, X_WB, self._reach_m() + beyond_m, left_out)
+
+    def arm_points_B(self) -> list[FloatArray]:
+        """The arm as it is now, from the shoulder to the tip beyond the hand: points (3,) in B."""
+        q_rad = self.q_rad()
+        return [*self.model.points_B(q_rad), self.model.X_BH(q_rad) @ np.array([self.gripper.length_m, 0.0, 0.0])]
 
     def _reach_m(self) -> float:
         """How far from the body's origin the arm and what it holds may come."""
@@ -351,12 +369,24 @@ class ArmSkill(RoutineSkill[InputsT]):
         return gripper
 
     @property
-    def hand_camera(self) -> CameraCapabilities:
-        """The camera on the hand. Raises SkillFailure with cause PRECONDITION when there is none."""
-        camera = self.context.robot.capabilities().hand_camera
+    def arm(self) -> ArmCapabilities:
+        """What the arm can do. Raises SkillFailure with cause PRECONDITION when there is none."""
+        arm = self.context.robot.capabilities().arm
+        if arm is None:
+            raise SkillFailure(Cause.PRECONDITION, "the robot has no arm")
+        return arm
+
+    @property
+    def object_camera(self) -> CameraCapabilities:
+        """The camera that looks for objects. Raises SkillFailure with cause PRECONDITION when there is none."""
+        camera = self.context.robot.capabilities().object_camera
         if camera is None:
-            raise SkillFailure(Cause.PRECONDITION, "the robot has no camera on its hand")
+            raise SkillFailure(Cause.PRECONDITION, "the robot has no camera on its hand or head")
         return camera
+
+    def hold_watch(self) -> HoldWatch:
+        """A watch over what the gripper holds, from now on."""
+        return hold_watch(self.context.robot.capabilities())
 
     @property
     def widest(self) -> float:
@@ -370,12 +400,16 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def release_rad(self) -> float:
         """How far the gripper opens to let go of what it holds."""
-        return min(self.context.robot.gripper().opening + _RELEASE_RAD, 0.75 * self.widest)
+        most = 0.75 if self.gripper.kind is GripperKind.HINGED else 1.0
+        return min(self.context.robot.gripper().opening + self.gripper.like_turn(_RELEASE_RAD), most * self.widest)
 
     def leave_object(self) -> Routine[bool]:
-        """Take fixed finger and palm off what was let go of, and draw the hand back; whether there was a way."""
+        """Take fixed finger and palm off what was let go of, and draw the hand back; whether there was a way.
+
+        Fingers that both open are off it already.
+        """
         fingers, _, closing = self.model.X_BH(self.q_rad()).rotation().matrix().T
-        if abs(closing[2]) < _LEVEL:
+        if abs(closing[2]) < _LEVEL and self.gripper.kind is GripperKind.HINGED:
             aside = -_ASIDE_M * (closing * [1.0, 1.0, 0.0] + fingers)
             yield from self.try_shift_hand(aside, "letting go")
         up_B = np.array([0.0, 0.0, 1.0])
@@ -383,6 +417,40 @@ class ArmSkill(RoutineSkill[InputsT]):
             if (yield from self.try_shift_hand(way_B, "drawing the hand back")):
                 return True
         return False
+
+    def look_at(
+        self,
+        p_BT: FloatArray,
+        viewpoints_B: Sequence[FloatArray],
+        message: str,
+        speed_rad_s: float | None = None,
+        raised_m: float | None = None,
+    ) -> Routine[None]:
+        """Point the camera that looks for objects at p_BT.
+
+        One on the hand goes to the first possible of some viewpoints; one on the head turns there, from a body that is
+        raised by so much where that is given, and the arm is out of its view. Raises SkillFailure.
+        """
+        camera, head = self.object_camera, self.context.robot.capabilities().head
+        if camera.on_hand or head is None:
+
+            def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
+                return look_configuration(scene, camera.X_FC, viewpoints_B, p_BT, q)
+
+            yield from self.look_from(goal, message, speed_rad_s)
+            return
+        p_WT = self.X_WB() @ p_BT
+        if not self.context.robot.gripper().holding:
+            yield from self.stow(message)
+        if raised_m is not None:
+            yield from self.stand_at(self.context.robot.capabilities().standing_height_m + raised_m, message)
+        try:
+            pan_rad, tilt_rad = head_angles(head, camera, self.X_WB().inverse() @ p_WT)
+        except PlanningError as error:
+            raise SkillFailure(Cause.PLANNING, str(error)) from error
+        until_s = self.context.clock.now() + _HEAD_EXPIRY_S
+        command = self.context.robot.point_head(pan_rad, tilt_rad, until_s=until_s, lease=self.context.lease)
+        yield from self.finish(self.issue(command), message, "the head")
 
     def look_from(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[None]:
         """Go where `goal` says to take a picture; an empty gripper, which else stands before the camera, opens."""
@@ -394,26 +462,30 @@ class ArmSkill(RoutineSkill[InputsT]):
         """Close the gripper and fold the arm onto the body; nothing is done where it lies there already."""
         stowed = self.model.stowed_rad
         gripper = self.context.robot.gripper()
-        closing_rad = 0.0 if not gripper.holding and gripper.opening > 0.05 else None
-        if np.max(np.abs(self.q_rad() - stowed)) > 0.05:
+        closing_rad = 0.0 if not gripper.holding and gripper.opening > self.gripper.like_turn(0.05) else None
+        if self.model.off_rad(self.q_rad(), stowed) > 0.05:
             yield from self.move_to(lambda scene, q: stowed, message, opening=closing_rad)
         elif closing_rad is not None:
             yield from self.move_gripper(closing_rad, GRIPPER_FORCE_N, message)
 
     def picture(self, message: str, settle_s: float = SETTLE_S) -> Routine[Image]:
-        """A new picture of the hand camera, once the arm is still.
+        """A new picture of the camera that looks for objects, once it is still; one on the head leaves out the arm.
 
         Raises SkillFailure with cause EXECUTION when the camera gives none, or an old one.
         """
         yield from self.pause(settle_s, message)
         robot, asked_s = self.context.robot, self.context.clock.now()
-        source = self.hand_camera.source
+        camera = self.object_camera
+        source, name = camera.source, camera.mount.value
         image = yield from self.sense(
-            lambda: robot.image(source), latency_s=PICTURE_LATENCY_S, name="hand picture", message=message
+            lambda: robot.image(source), latency_s=PICTURE_LATENCY_S, name=f"{name} picture", message=message
         )
         if image.stamp_s < asked_s - OLDEST_PICTURE_S:
             age_s = asked_s - image.stamp_s
-            raise SkillFailure(Cause.EXECUTION, f"the hand camera gives only a picture that is {age_s:.1f} s old")
+            raise SkillFailure(Cause.EXECUTION, f"the {name} camera gives only a picture that is {age_s:.1f} s old")
+        if not camera.on_hand:
+            held_m = _HELD_RADIUS_M if robot.gripper().holding else None
+            image = without_arm(image, self.arm_points_B(), held_m)
         solid, X_WO = self.context.solid, self.context.localiser.estimate().X_WO
         solid.cells, solid.views = (
             with_picture(solid.cells, image, X_WO, self._own),

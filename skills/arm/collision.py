@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import combinations
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -59,29 +60,29 @@ class ArmScene:
         self._description = _without_visuals(capabilities.description)
         self._joints_rad = dict(joint_positions_rad)
         self._padding_m, self._opening = padding_m, 0.0
-        self._gripper = capabilities.gripper
+        self._gripper, self._capabilities = capabilities.gripper, capabilities
         self._held: tuple[Box, ...] = ()
         self._built: dict[bytes, _BuiltScene] = {}
-        self._now = self._with(())
+        self._now, self._X_BF = self._with(()), RigidTransform()
 
     def set_boxes(self, boxes: Sequence[Box], X_BF: RigidTransform | None = None) -> None:
         """Replace the boxes around the robot, given in frame F, the body's own where X_BF is left out.
 
         Boxes of one of the last few calls are found again at once; only X_BF may differ.
         """
-        self._now = self._with(tuple(boxes))
-        self._now.place(RigidTransform() if X_BF is None else X_BF)
+        self._now, self._X_BF = self._with(tuple(boxes)), RigidTransform() if X_BF is None else X_BF
+        self._now.place(self._X_BF)
 
     @contextmanager
     def with_only(self, boxes: Sequence[Box], opening: float) -> Iterator[None]:
         """For a while other boxes (frame B) stand around, and the gripper is open so far."""
-        before, opening_before_rad = self._now, self._opening
+        before, X_BF, opening_before_rad = self._now, self._X_BF, self._opening
         self.set_boxes(boxes)
         self._opening = opening
         try:
             yield
         finally:
-            self._now, self._opening = before, opening_before_rad
+            self._now, self._X_BF, self._opening = before, X_BF, opening_before_rad
 
     def hold(self, boxes: Sequence[Box]) -> None:
         """Replace the boxes fixed to the hand (frame H), for a thing held."""
@@ -91,6 +92,12 @@ class ArmScene:
         """Opening of the gripper in later checks, 0 closed."""
         self._opening = opening
 
+    def set_joints(self, joint_positions: Mapping[str, float]) -> None:
+        """Where the robot's other joints are in later checks: legs, lift, head."""
+        self._joints_rad = dict(joint_positions)
+        for built in self._built.values():
+            built.set_joints(self._joints_rad)
+
     def set_padding(self, padding_m: float) -> None:
         """Distance that the robot keeps from boxes in later checks."""
         self._padding_m = padding_m
@@ -98,7 +105,9 @@ class ArmScene:
     def _with(self, boxes: tuple[Box, ...]) -> _BuiltScene:
         """The scene with these boxes, the one built before where it is still kept."""
         key = b"".join(box.X_FG.GetAsMatrix34().tobytes() + np.array(box.size_m).tobytes() for box in boxes)
-        built = self._built.pop(key, None) or _BuiltScene(self._description, self.model, boxes, self._joints_rad)
+        fingers = () if self._gripper is None else tuple(self._gripper.finger_positions(0.0))
+        built = self._built.pop(key, None)
+        built = built or _BuiltScene(self._description, self.model, boxes, self._joints_rad, fingers)
         self._built[key] = built
         if len(self._built) > _SCENES_KEPT:
             del self._built[next(iter(self._built))]
@@ -113,6 +122,24 @@ class ArmScene:
         """Whether arm angles q_rad (J,) collide with nothing."""
         self._work.count("arm_configuration_checks")
         return bool(self._checker.CheckConfigCollisionFree(self._full(q_rad)))
+
+    def free_as_usual(self, q_rad: FloatArray) -> bool:
+        """Whether arm angles q_rad (J,) collide with nothing once a torso on a lift is at its usual height again.
+
+        True on robots without a lift.
+        """
+        lift, usual_m = self._capabilities.lift_joint, self._capabilities.standing_height_m
+        if lift is None:
+            return True
+        before = self._joints_rad
+        usual = usual_m - self._capabilities.height_range_m[0]
+        try:
+            self._now.place(RigidTransform([0.0, 0.0, before.get(lift, usual) - usual]) @ self._X_BF)
+            self._now.set_joints({**before, lift: usual})
+            return self.free(q_rad)
+        finally:
+            self._now.place(self._X_BF)
+            self._now.set_joints(before)
 
     def edge_free(self, q_from_rad: FloatArray, q_to_rad: FloatArray) -> bool:
         """Whether the straight joint motion between two configurations collides with nothing."""
@@ -146,7 +173,12 @@ class _BuiltScene:
     """
 
     def __init__(
-        self, description: str, model: ArmModel, boxes: tuple[Box, ...], joint_positions_rad: Mapping[str, float]
+        self,
+        description: str,
+        model: ArmModel,
+        boxes: tuple[Box, ...],
+        joint_positions_rad: Mapping[str, float],
+        fingers: Sequence[str] = (),
     ) -> None:
         from pydrake.geometry import Box as BoxShape
         from pydrake.multibody.parsing import Parser
@@ -173,16 +205,21 @@ class _BuiltScene:
         self._held: tuple[Box, ...] = ()
         self._q = np.array(plant.GetPositions(plant.CreateDefaultContext()))
         joints = {plant.get_joint(index).name(): plant.get_joint(index) for index in plant.GetJointIndices(robot)}
-        for name, joint in joints.items():
-            if joint.num_positions() == 1:
-                self._q[joint.position_start()] = joint_positions_rad.get(name, 0.0)
         self._arm = np.array([joints[name].position_start() for name in model.names])
         self.arm_velocities = np.array([joints[name].velocity_start() for name in model.names])
         self._positions = {name: joint.position_start() for name, joint in joints.items() if joint.num_positions() == 1}
+        self.set_joints(joint_positions_rad)
         self._around = around.floating_positions_start()
         self.place(RigidTransform([0.0, 0.0, _FAR_M]))
         self._allow_stowed_contacts()
+        for one, other in combinations([joints[name].child_body() for name in fingers], 2):  # they meet when they close
+            self._checker.SetCollisionFilteredBetween(one, other, True)
         self.place(RigidTransform())
+
+    def set_joints(self, joint_positions: Mapping[str, float]) -> None:
+        """Where all joints are that are not given with each check; 0 where nothing is said."""
+        for name, start in self._positions.items():
+            self._q[start] = joint_positions.get(name, 0.0)
 
     def place(self, X_BF: RigidTransform) -> None:
         """Put the boxes' frame F there."""

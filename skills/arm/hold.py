@@ -93,6 +93,14 @@ class HoldWatch:
         return Grip.SLIPPING
 
 
+def hold_watch(capabilities: Capabilities) -> HoldWatch:
+    """A watch with limits that suit a robot's gripper."""
+    usual, gripper = HoldWatch(), capabilities.gripper
+    if gripper is None:
+        return usual
+    return HoldWatch(slip_rad=gripper.like_turn(usual.slip_rad), released_rad=gripper.like_turn(usual.released_rad))
+
+
 def firmer_n(force_n: float, capabilities: Capabilities) -> float:
     """The force (N) to grip what slips at force_n: half as much again, within what the gripper can."""
     most_n = 0.0 if capabilities.gripper is None else _MOST_OF_FORCE * capabilities.gripper.max_force_n

@@ -8,6 +8,7 @@ kinematics.
 from __future__ import annotations
 
 import itertools
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -55,8 +56,10 @@ class RrtConnect:
     ) -> FloatArray:
         """A free path from start to goal. Raises PlanningError when an end is blocked or no path was found.
 
-        A start that is in contact by what the arm's servos are off is left by the least turn that frees it.
+        Joints that turn without end take the shorter way. A start that is in contact by what the arm's servos are off
+        is left by the least turn that frees it.
         """
+        q_goal_rad = scene.model.turned_near(q_goal_rad, q_start_rad)
         if not scene.free(q_goal_rad):
             raise PlanningError(f"the arm's way ends in contact of {_pairs(scene, q_goal_rad)}")
         if not scene.free(q_start_rad):
@@ -130,7 +133,9 @@ class RrtConnect:
         space = base.RealVectorStateSpace(len(q_start_rad))
         bounds = base.RealVectorBounds(len(q_start_rad))
         for joint, (lower, upper) in enumerate(zip(scene.model.lower_rad, scene.model.upper_rad, strict=True)):
-            ends = lower, upper, q_start_rad[joint], q_goal_rad[joint]
+            ends = [q_start_rad[joint], q_goal_rad[joint]]
+            endless = scene.model.endless[joint]
+            ends += [min(ends) - math.pi, max(ends) + math.pi] if endless else [lower, upper]
             bounds.setLow(joint, min(ends))
             bounds.setHigh(joint, max(ends))
         space.setBounds(bounds)

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from skills.api import PlanningError
 from skills.arm.collision import ArmScene
 from skills.arm.kinematics import ArmModel
-from skills.robot import FloatArray
+from skills.robot import ArmCapabilities, FloatArray
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -91,8 +91,10 @@ def _left_of(p_B: FloatArray, p_BT: FloatArray) -> FloatArray:
     return np.array([-ahead[1], ahead[0], 0.0])
 
 
-def carry_configuration(scene: ArmScene, R_BH: RotationMatrix, q_near_rad: FloatArray) -> FloatArray:
-    """Arm angles that hold the hand low over the body, the thing as upright as in R_BH, turned to the front.
+def carry_configuration(
+    scene: ArmScene, arm: ArmCapabilities, R_BH: RotationMatrix, q_near_rad: FloatArray
+) -> FloatArray:
+    """Arm angles that hold the hand low near the body, the thing as upright as in R_BH, turned to the front.
 
     Where that tilt cannot be kept, the hand points forward and a little up, so that the object lies on a finger and
     leans to the palm; else level, or down. Raises PlanningError when no pose is free.
@@ -100,22 +102,22 @@ def carry_configuration(scene: ArmScene, R_BH: RotationMatrix, q_near_rad: Float
     for rotations in (_turned(R_BH), *map(_forward, _CARRY_PITCHES_RAD)):
         candidates = [
             (cost, q)
-            for rotation, (x, z) in itertools.product(rotations, _CARRY_PLACES)
-            for q in scene.model.inverse(RigidTransform(rotation, [x, 0.0, z]), margin_rad=0.05)
-            for cost in [_carry_cost(x, z, q, q_near_rad)]
+            for rotation, x, z in itertools.product(rotations, arm.carry_x_m, arm.carry_z_m)
+            for solution in scene.model.inverse(RigidTransform(rotation, [x, 0.0, z]), margin_rad=0.05)
+            for q in [scene.model.turned_near(solution, q_near_rad)]
+            for cost in [_carry_cost(x - arm.carry_best_x_m, z, q, q_near_rad)]
         ]
         for _, q in sorted(candidates, key=lambda candidate: candidate[0]):
-            if scene.free(q):
+            if scene.free(q) and scene.free_as_usual(q):
                 return q
     raise PlanningError("no pose to carry the thing near the body is free of contact")
 
 
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
-_CARRY_PLACES = tuple(itertools.product((0.3, 0.35, 0.4, 0.45, 0.5), (0.26, 0.29, 0.32, 0.36, 0.41, 0.46, 0.54)))
 
 
-def _carry_cost(x_m: float, z_m: float, q_rad: FloatArray, q_near_rad: FloatArray) -> float:
-    return 3.0 * abs(x_m - 0.35) + z_m + 0.04 * float(np.max(np.abs(q_rad - q_near_rad))) + 0.05 * abs(float(q_rad[0]))
+def _carry_cost(off_x_m: float, z_m: float, q_rad: FloatArray, q_near_rad: FloatArray) -> float:
+    return 3.0 * abs(off_x_m) + z_m + 0.04 * float(np.max(np.abs(q_rad - q_near_rad))) + 0.05 * abs(float(q_rad[0]))
 
 
 def _turned(R_BH: RotationMatrix) -> list[RotationMatrix]:

@@ -22,8 +22,7 @@ from skills.api import (
     Thing,
 )
 from skills.arm.arm_skill import ArmSkill
-from skills.arm.collision import ArmScene
-from skills.arm.poses import close_viewpoints, look_configuration, overview_viewpoints, viewpoints_beside
+from skills.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.messages import (
     coverage_message,
@@ -50,6 +49,8 @@ _LEAST_SEEN = 0.02
 _FITS_NEAR_M = 0.4
 _LOOKED_AT_M = 0.08
 _AVOIDED_M = 0.08
+_RAISED_M = 0.15
+"""A head looks once more from a body that is higher by so much."""
 
 
 @dataclass(frozen=True)
@@ -240,14 +241,15 @@ class Detect(ArmSkill[DetectInputs]):
         while (track := self._candidate(inputs)) is not None:
             tries = self._tried[track.number] = self._tried.get(track.number, 0) + 1
             p_BO = self.X_WB().inverse() @ track.position_W
-            yield from self._look_if_possible(inputs, p_BO, self._confirming(track, tries, close=close))
+            raised_m = _RAISED_M * (tries % 3)
+            yield from self._look_if_possible(inputs, p_BO, self._confirming(track, tries, close=close), raised_m)
 
     def _look_if_possible(
-        self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray]
+        self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray], raised_m: float = 0.0
     ) -> Routine[SkillFailure | None]:
         """Look at a point, unless the arm cannot: then why."""
         try:
-            yield from self.look(inputs, p_BT, viewpoints_B)
+            yield from self.look(inputs, p_BT, viewpoints_B, raised_m)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
@@ -319,14 +321,14 @@ class Detect(ArmSkill[DetectInputs]):
         inputs: DetectInputs,
         p_BT: FloatArray,
         viewpoints_B: Sequence[FloatArray],
+        raised_m: float = 0.0,
     ) -> Routine[Look]:
-        """Point the camera at p_BT, from the first possible one of `viewpoints_B`, and take in what is seen."""
+        """Point the camera at p_BT, from the first possible one of `viewpoints_B`, and take in what is seen.
+
+        One on a head looks from a body that is raised by so much.
+        """
         message = f"looking for {wanted(inputs.classes, inputs.attributes)}"
-
-        def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            return look_configuration(scene, self.hand_camera.X_FC, viewpoints_B, p_BT, q)
-
-        yield from self.look_from(goal, message)
+        yield from self.look_at(p_BT, viewpoints_B, message, raised_m=raised_m)
         image = yield from self.picture(message)
         place, detector = self.context.localiser.estimate(), self.context.detector
 

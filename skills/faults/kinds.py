@@ -143,6 +143,15 @@ def _raises(match: re.Match[str]) -> Effect:
     return Effect(frozenset((verb_of(match["verb"]),)), act)
 
 
+def _dies(_: re.Match[str]) -> Effect:
+    """The robot's driver has stopped."""
+
+    def act(call: Call) -> Any:
+        raise InjectedFault(f"{call.verb} does not answer")
+
+    return Effect(frozenset(VERBS), act)
+
+
 def _refuses(match: re.Match[str]) -> Effect:
     return _answered(match, CommandStatus(CommandState.REFUSED, f"{match['verb']} is out of order"))
 
@@ -369,6 +378,7 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
     FaultKind(
         r"robot reports (?P<fault>\w[\w -]*?)", "robot reports motor too hot at 2 s", "`faults` holds it", _reports
     ),
+    FaultKind(r"robot dies", "robot dies at 20 s", "no verb is answered any more: each raises an exception", _dies),
     FaultKind(r"lease taken", "lease taken at 4 s", "somebody else takes the lease, once", _lease),
 )
 """All faults that come with the project."""

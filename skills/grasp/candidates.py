@@ -15,7 +15,7 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.geometry import wrap
-from skills.robot import FloatArray, GripperCapabilities
+from skills.robot import FloatArray, GripperCapabilities, GripperKind
 
 _ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M, _THIN_ABOVE_M = 0.004, 0.003, 0.001
 _LEAST_GRIP_M, THIN_M, _LEAST_OF_THIN = 0.008, 0.020, 0.35
@@ -213,7 +213,8 @@ def _candidate(
         depth, beyond = low
         height = 0.5 * target.height_m
         cost = placement.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean) + 15.0 * max(0.0, 0.008 - beyond)
-    p_HT = np.array([depth, 0.0, gripper.fixed_z_m + beside_m + 0.5 * placement.width_m])
+    across_m = gripper.fixed_z_m + beside_m + 0.5 * placement.width_m if _hinged(gripper) else 0.0
+    p_HT = np.array([depth, 0.0, across_m])
     p_BT = np.array([*placement.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
     return GraspCandidate(X_BH, placement.width_m, float(cost), tilt, placement.lever_m)
@@ -242,6 +243,8 @@ def _low_grip(
     they hold. None where that is too little.
     """
     up_H, inner_z = R_BH.matrix()[2], gripper.fixed_z_m
+    if not _hinged(gripper):  # the fingers close on both sides alike
+        inner_z, beside_m = -0.5 * width_m, 0.0
     down, outer_z = -float(up_H[0]), inner_z + beside_m + width_m
     fixed_end, moving_end = (gripper.fixed_tip_x_m, inner_z), (_closed_tip_x_m(gripper), outer_z)
     thick = gripper.tip_thickness_m
@@ -261,6 +264,10 @@ def _low_grip(
 def _closed_tip_x_m(gripper: GripperCapabilities) -> float:
     """Where the moving finger ends when it holds something narrow: it turns, and reaches farthest half open."""
     return max(gripper.fixed_tip_x_m, gripper.tip_x_m - _SHORTER_CLOSED_M)
+
+
+def _hinged(gripper: GripperCapabilities) -> bool:
+    return gripper.kind is GripperKind.HINGED
 
 
 def _above_surface(height_m: float, spare_m: float) -> float:

@@ -165,7 +165,8 @@ class GeometricGraspPlanner:
         reason = _OUT_OF_REACH
         for distance in PREGRASPS_M:
             solutions = scene.model.inverse(candidate.retreated(distance), margin_rad=0.06)
-            for q in sorted(solutions, key=lambda q: float(np.max(np.abs(q - q_near_rad)))):
+            turned = [scene.model.turned_near(q, q_near_rad) for q in solutions]
+            for q in sorted(turned, key=lambda q: float(np.max(np.abs(q - q_near_rad)))):
                 if not scene.free(q):
                     reason = "the hand would touch something before the grasp"
                     continue
@@ -196,10 +197,10 @@ def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -
 def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, margin_rad: float = 0.08) -> bool:
     """Whether the arm reaches a grasp, its pre-grasp and the end of its lift; contact is not looked at."""
     X_BH, distance = candidate.X_BH, PREGRASPS_M[-1]
-    if not (model.inverse(X_BH, margin_rad) and model.inverse(candidate.retreated(distance), margin_rad)):
+    if not (model.reaches(X_BH, margin_rad) and model.reaches(candidate.retreated(distance), margin_rad)):
         return False
     lifted = (X_BH.translation() + offset for offset in lifts(model, X_BH, up_B))
-    return any(model.inverse(RigidTransform(X_BH.rotation(), p), margin_rad) for p in lifted)
+    return any(model.reaches(RigidTransform(X_BH.rotation(), p), margin_rad) for p in lifted)
 
 
 def lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[FloatArray]:

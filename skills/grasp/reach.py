@@ -24,7 +24,7 @@ from skills.arm.solid_cells import boxes_of
 from skills.detect.viewpoints import surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.planning import PREGRASPS_M, lifts, within_reach
-from skills.robot import Capabilities, FloatArray
+from skills.robot import Capabilities, FloatArray, GripperCapabilities, GripperKind
 
 _LOW_SURFACE_M, _HIGH_SURFACE_M = 0.2, 0.72
 _BELOW_LIMIT_M = 0.005
@@ -39,6 +39,8 @@ _SURFACE_AROUND_M, _SURFACE_BAND_M, _KNOWN_ABOVE_M = 0.2, 0.06, 0.34
 WIDE: Final = 0.9
 """How far the gripper is open, as a part of all that it opens, as it reaches for an object."""
 _NARROW: Final = 0.6
+_WIDE_PARALLEL: Final = 0.98
+_LIFTS_FAR_M, _PARTS_OF_LIFT = 0.2, (0.25, 0.5, 0.75)
 """The same among neighbours."""
 
 CandidatesOf = Callable[[Target], list[GraspCandidate]]
@@ -67,6 +69,7 @@ class ReachCheck:
     candidates_of: CandidatesOf
     widest: float
     beside: Sequence[Box] = ()
+    wide: float = WIDE
 
     def best(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> Reached | None:
         """The best height, the first of which is the usual one; None where no grasp is reached from any.
@@ -108,7 +111,7 @@ class ReachCheck:
         """The best grasp that is reached from X_WB, and what it costs beyond the best there is."""
         reached, least = reached_grasps(self.scene.model, self.candidates_of, X_WB, self.seen)
         self.scene.set_padding(_PADDING_M)
-        spaces = [(self.boxes, WIDE, _BESIDE_COST if self.beside else 0.0)]
+        spaces = [(self.boxes, self.wide, _BESIDE_COST if self.beside else 0.0)]
         if self.beside:
             spaces = [((*self.boxes, *self.beside), _NARROW, 0.0), *spaces]
         for boxes, opening, extra in spaces:
@@ -156,6 +159,11 @@ def _along(points_B: FloatArray) -> FloatArray:
     return np.concatenate([a + parts * (b - a) for a, b in pairwise(points_B)])
 
 
+def wide_share(gripper: GripperCapabilities) -> float:
+    """How far a gripper is open, as a part of all that it opens, as it reaches for an object."""
+    return WIDE if gripper.kind is GripperKind.HINGED else _WIDE_PARALLEL
+
+
 def body_heights_m(base_m: float, capabilities: Capabilities) -> tuple[float, ...]:
     """Heights of the body's origin over the floor to take an object that stands base_m over the floor, the usual first.
 
@@ -165,7 +173,8 @@ def body_heights_m(base_m: float, capabilities: Capabilities) -> tuple[float, ..
     lowest, usual = min(capabilities.standing_height_m, low + _BELOW_LIMIT_M), capabilities.standing_height_m
     highest = max(usual, high - _BELOW_LIMIT_M)
     first = lowest if base_m < _LOW_SURFACE_M else usual if base_m < _HIGH_SURFACE_M else highest
-    return tuple(dict.fromkeys((first, usual, lowest, highest)))
+    between = [low + part * (high - low) for part in _PARTS_OF_LIFT] if high - low > _LIFTS_FAR_M else []
+    return tuple(dict.fromkeys((first, usual, *between, lowest, highest)))
 
 
 def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
@@ -233,10 +242,10 @@ def reach_check(
     candidates = partial(skill.context.stack.grasp_planner.candidates, p_BS=skill.model.p_BS, gripper=skill.gripper)
     cells = skill.context.solid.cells
     beside = [_less(box) for box in boxes_of(cells, X_WB, partial(_beside, seen))]
-    scene_now, widest = skill.scene_now(boxes), skill.widest
+    scene_now, widest, wide = skill.scene_now(boxes), skill.widest, wide_share(skill.gripper)
 
     def check() -> ReachCheck:
         """The check, with a collision scene of its own boxes."""
-        return ReachCheck(scene_now(), boxes, X_WB, seen, candidates, widest, beside)
+        return ReachCheck(scene_now(), boxes, X_WB, seen, candidates, widest, beside, wide)
 
     return check

@@ -13,11 +13,9 @@ from pydrake.math import RigidTransform
 from skills.api import Cause, ObjectObservation, PlanningError, Succeeded
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, box_corners
-from skills.arm.hold import HoldWatch
 from skills.arm.poses import (
     carry_configuration,
     close_viewpoints,
-    look_configuration,
     overview_viewpoints,
     sees_closely,
 )
@@ -28,7 +26,7 @@ from skills.grasp.close_view import LOOK_HALF_SIDE_M, SURFACE_AROUND_M, CloseVie
 from skills.grasp.in_hand import held_box, turned_in_hand
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import IN_THE_WAY, PREGRASPS_M, GraspPlan, Surroundings, lifts
-from skills.grasp.reach import WIDE, body_heights_m, reach_check, space_about
+from skills.grasp.reach import WIDE, body_heights_m, reach_check, space_about, wide_share
 from skills.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
 from skills.grasp.servo import seen_shift, shifted
 from skills.grasp.unseen import look_into_unseen
@@ -36,7 +34,7 @@ from skills.perception.class_forms import THING
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
 from skills.quantities import Force, Length, Margin, Turn
-from skills.robot import ArmTrajectory, FloatArray
+from skills.robot import ArmTrajectory, FloatArray, GripperKind
 
 _CLOSED_RAD = 0.06
 _PER_KG_N, _PER_LEVER_N_M, _MOST_OF_FORCE = 12.0, 400.0, 0.95
@@ -156,6 +154,8 @@ class Grasp(ArmSkill[GraspInputs]):
         Along the fingers, the guard stops the hand; along the object, a few cm do not matter.
         """
         message = f"reaching for the {thing}"
+        if not self.object_camera.on_hand:
+            return view, plan
         image = yield from self.picture(message, settle_s=0.0)
         X_BC = image.frames.pose("body").inverse() @ image.frames.pose(image.camera_frame)
         scene_now, closing_B = self.scene_now([*view.boxes, *self.seen_boxes()]), plan.candidate.X_BH.rotation().col(2)
@@ -233,7 +233,7 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def resume(self, inputs: GraspInputs) -> None:
         """Go on after a pause or a restart; what happened meanwhile is no slip."""
-        self._tried, self._watch = inputs.avoid, None if self._watch is None else HoldWatch()
+        self._tried, self._watch = inputs.avoid, None if self._watch is None else self.hold_watch()
         super().resume(inputs)
 
     def trouble(self) -> SkillFailure | None:
@@ -269,7 +269,8 @@ class Grasp(ArmSkill[GraspInputs]):
         if at_thing:
             yield from self._lift_again(f"lifting the {seen.thing}")
             yield from self.try_shift_hand(-self.options.pull_back_m * R_BH.matrix()[:, 0] * [1.0, 1.0, 0.0], message)
-        yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=0.9)
+        arm = self.arm
+        yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q), message, speed_rad_s=0.9)
         yield from self.pause(0.2, message)
         self._check_held(str(seen.thing), opening)
         yield from self.stand_at(self.context.robot.capabilities().standing_height_m, message)
@@ -287,7 +288,7 @@ class Grasp(ArmSkill[GraspInputs]):
         """
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
         best: CloseView | None = None
-        for aside_rad in _ASIDE_RAD:
+        for aside_rad in _ASIDE_RAD if self.object_camera.on_hand else _ASIDE_RAD[:1]:
             self.boxes = surface_boxes([square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
             self.known_W = space_about(seen)
             try:
@@ -309,18 +310,10 @@ class Grasp(ArmSkill[GraspInputs]):
         """What a picture from near shows of the object, the camera turned about it; None when it is not there."""
         message = f"looking closely at the {seen.thing}"
         surface = square(seen.position_W, base_m, seen.surface or "surface")
-        X_HC = self.hand_camera.X_FC
         p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
-
-        def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
+        if aside_rad != 0.0 or not self._looks_closely(p_BT):
             near = close_viewpoints(self.model.p_BS, p_BT, aside_rad)
-            viewpoints = [*near, *overview_viewpoints(self.model, p_BT, aside_rad)]
-            return look_configuration(scene, X_HC, viewpoints, p_BT, q)
-
-        X_BC = self.model.X_BH(self.q_rad()) @ X_HC
-        open_wide = self.context.robot.gripper().opening > WIDE * self.widest
-        if aside_rad != 0.0 or not (open_wide and sees_closely(X_BC, p_BT)):
-            yield from self.look_from(goal, message)
+            yield from self.look_at(p_BT, [*near, *overview_viewpoints(self.model, p_BT, aside_rad)], message)
         image = yield from self.picture(message)
         place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
 
@@ -332,6 +325,12 @@ class Grasp(ArmSkill[GraspInputs]):
             return examine(image, X_WB, surface, seen, place, placed, self.options.same_object_m)
 
         return (yield from self.compute(look, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message))
+
+    def _looks_closely(self, p_BT: FloatArray) -> bool:
+        """Whether a camera on the hand looks closely at a point already, past an open gripper."""
+        camera = self.object_camera
+        open_wide = self.context.robot.gripper().opening > WIDE * self.widest
+        return camera.on_hand and open_wide and sees_closely(self.model.X_BH(self.q_rad()) @ camera.X_FC, p_BT)
 
     def _plan(self, view: CloseView, thing: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
         self.boxes = view.boxes
@@ -372,9 +371,9 @@ class Grasp(ArmSkill[GraspInputs]):
         The opening is about proportional to the finger's angle.
         """
         gap_m = min(each.width_m for each in candidates) + _GAP_BESIDE_M
-        wide_rad = WIDE * self.widest
-        narrow_rad = self.widest * gap_m / self.gripper.max_opening_m
-        return (wide_rad, narrow_rad) if narrow_rad < wide_rad - _LESS_OPEN_RAD else (wide_rad,)
+        wide_rad = wide_share(self.gripper) * self.widest
+        narrow_rad = self.gripper.opening_for(gap_m)
+        return (wide_rad, narrow_rad) if narrow_rad < wide_rad - self.gripper.like_turn(_LESS_OPEN_RAD) else (wide_rad,)
 
     def _take(self, view: CloseView, plan: GraspPlan, seen: ObjectObservation) -> Routine[None]:
         """Go on from the pre-grasp: close as firmly as its least mass needs, lift, weigh, close as firmly as it needs.
@@ -393,11 +392,12 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.move_gripper(0.0, min(force_n + _PER_KG_N * least_kg, most_n), f"closing on the {thing}")
         yield from self.pause(0.4, f"closing on the {thing}")
         opening = self._check_held(thing, None)
-        X_BH = turned_in_hand(X_BH, self.p_HT) if view.target.upright else X_BH
+        turns = view.target.upright and self.gripper.kind is GripperKind.HINGED
+        X_BH = turned_in_hand(X_BH, self.p_HT) if turns else X_BH
         self.held = [held_box(X_BH.inverse(), view.target_box)]
         self.context.payload.corners_H = box_corners(self.held[0])
         self.context.payload.R_BH = X_BH.rotation()
-        self._watch = HoldWatch()
+        self._watch = self.hold_watch()
         yield from self._lift(plan.lift_B, f"lifting the {thing}")
         self._watch = None
         p_HO = self.held[0].X_FG.translation()
@@ -454,15 +454,16 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _check_held(self, thing: str, opening_before_rad: float | None) -> float:
         gripper = self.context.robot.gripper()
-        if gripper.opening < _CLOSED_RAD or not gripper.holding:
+        if gripper.opening < self.gripper.like_turn(_CLOSED_RAD) or not gripper.holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the gripper closed on nothing where the {thing} was seen")
-        if opening_before_rad is not None and abs(gripper.opening - opening_before_rad) > self.options.slip_rad:
+        slip = self.gripper.like_turn(self.options.slip_rad)
+        if opening_before_rad is not None and abs(gripper.opening - opening_before_rad) > slip:
             raise SkillFailure(Cause.POSTCONDITION, f"the {thing} slipped in the gripper while it was lifted")
         return gripper.opening
 
     def _carry(self, grasp: GraspCandidate, thing: str, gently: bool) -> Routine[None]:
         """Draw back from the surface, hold the object near the body, and check once more."""
-        opening, self._watch = self._check_held(thing, None), HoldWatch()
+        opening, self._watch = self._check_held(thing, None), self.hold_watch()
         message = f"carrying the {thing}"
         for up_m in _PULL_BACK_UP_M:
             way_B = self.options.pull_back_m * self._back_B(grasp) + up_m * self._up_B()
@@ -470,7 +471,8 @@ class Grasp(ArmSkill[GraspInputs]):
                 break
         R_BH = self.model.X_BH(self.q_rad()).rotation()
         speed_rad_s = _GENTLY_RAD_S if gently or grasp.lever_m > _LONG_LEVER_M else _CARRY_RAD_S
-        yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=speed_rad_s)
+        arm = self.arm
+        yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q), message, speed_rad_s)
         yield from self.pause(0.2, message)
         self._check_held(thing, opening)
 

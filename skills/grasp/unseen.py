@@ -12,9 +12,7 @@ import numpy as np
 
 from skills.api import Cause, ObjectObservation
 from skills.arm.arm_skill import ArmSkill
-from skills.arm.collision import ArmScene
 from skills.arm.kinematics import ArmModel
-from skills.arm.poses import look_configuration
 from skills.arm.routine import Routine, SkillFailure
 from skills.arm.solid_cells import never_seen
 from skills.robot import FloatArray
@@ -28,6 +26,8 @@ def look_into_unseen(skill: ArmSkill[Any], seen: ObjectObservation, arm_W: Float
 
     It is not done where the object is too far to see what is about it, and where the arm finds no way to look.
     """
+    if not skill.object_camera.on_hand:  # it sees from above what the arm would meet
+        return False
     offsets = arm_W - np.array(seen.position_W)
     near_W = arm_W[np.linalg.norm(offsets[:, :2], axis=1) < _NEAR_M]
     unseen_W = near_W[never_seen(near_W, skill.context.solid.views)]
@@ -36,13 +36,9 @@ def look_into_unseen(skill: ArmSkill[Any], seen: ObjectObservation, arm_W: Float
     p_BT = skill.X_WB().inverse() @ unseen_W.mean(axis=0)
     if np.linalg.norm(p_BT - skill.model.p_BS) > _FURTHEST_M:
         return False
-    message, X_HC = f"looking above the {seen.thing}", skill.hand_camera.X_FC
-
-    def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-        return look_configuration(scene, X_HC, level_viewpoints(skill.model, p_BT), p_BT, q)
-
+    message = f"looking above the {seen.thing}"
     try:
-        yield from skill.look_from(goal, message)
+        yield from skill.look_at(p_BT, level_viewpoints(skill.model, p_BT), message)
     except SkillFailure as failure:
         if failure.cause is not Cause.PLANNING:
             raise

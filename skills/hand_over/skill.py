@@ -15,7 +15,6 @@ from skills.api import Cause, PlanningError, Question, Running, Succeeded
 from skills.approach.standing import go_to_one
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, Box
-from skills.arm.hold import HoldWatch
 from skills.arm.pull import PullWatch
 from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
@@ -89,7 +88,7 @@ class HandOver(ArmSkill[HandOverInputs]):
 
     def resume(self, inputs: HandOverInputs) -> None:
         """Go on after a pause or a restart; what happened meanwhile is no slip."""
-        self._watch = None if self._watch is None else HoldWatch()
+        self._watch = None if self._watch is None else self.hold_watch()
         super().resume(inputs)
 
     def trouble(self) -> SkillFailure | None:
@@ -107,7 +106,7 @@ class HandOver(ArmSkill[HandOverInputs]):
         q_carrying_rad = self.q_rad()
         yield from self._hold_out(person, inputs.person)
         self._check(person, inputs.person)
-        self._watch = HoldWatch()
+        self._watch = self.hold_watch()
         if not (yield from self._taken(inputs)):
             yield from self.move_to(lambda scene, q: q_carrying_rad, f"drawing the {inputs.thing} in")
             why = f"{inputs.person} did not take the {inputs.thing} within {self.options.wait_s:g} s"
@@ -247,7 +246,8 @@ def hold_out_configuration(
     for rotation, gap, lower in itertools.product(turned, gaps_m, (0.0, 0.1, 0.2)):
         p_BT = (float(np.linalg.norm(p_BP)) - gap) * heading + np.array([0.0, 0.0, level_m - lower])
         X_BH = RigidTransform(rotation, p_BT - rotation.matrix() @ p_HT)
-        free = [q for q in scene.model.inverse(X_BH, margin_rad=0.05) if scene.free(q)]
+        found = (scene.model.turned_near(q, q_near_rad) for q in scene.model.inverse(X_BH, margin_rad=0.05))
+        free = [q for q in found if scene.free(q)]
         if free:
             return min(free, key=lambda q: float(np.max(np.abs(q - q_near_rad))))
     raise PlanningError("the arm cannot hold the object out near enough to the person from here")

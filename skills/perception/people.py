@@ -1,4 +1,7 @@
-"""People: who was seen where, by camera or LiDAR. In a scan a person is upright, wide as shoulders, and alone."""
+"""People: who was seen where, by camera or LiDAR. In a scan a person is upright, wide as shoulders, and alone.
+
+A LiDAR of one ring sees no more than a pair of legs, or a leg, that stands alone.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,7 @@ _HIGHEST_M = 1.8
 _WIDTH_M = (0.15, 0.75)
 _ALONE_M = 0.2
 _FEWEST_POINTS = 12
+_LEGS_LOWEST_M, _LEGS_CELL_M, _LEGS_WIDTH_M, _LEGS_FEWEST_POINTS = 0.1, 0.12, (0.08, 0.6), 6
 _FRONT_TO_AXIS_M = 0.1
 _AXIS_SIGMA_M = 0.08
 _OWN_M = (0.1, 0.19, 0.05)
@@ -68,12 +72,19 @@ def people_in_scan(
     height = level[:, 2] + scan.X_OB.translation()[2]
     distance = np.hypot(points_B[:, 0], points_B[:, 1])
     own = _own(points_B, np.array(footprint_m))
-    near = (height > _LOWEST_M) & (height < _HIGHEST_M) & (distance < furthest_m + 0.5) & ~own
-    clusters = _clusters(points_B[near])
+    planar = len(scan.elevations_rad) == 1
+    near = (
+        (height > (_LEGS_LOWEST_M if planar else _LOWEST_M))
+        & (height < _HIGHEST_M)
+        & (distance < furthest_m + 0.5)
+        & ~own
+    )
+    clusters = _clusters(points_B[near], _LEGS_CELL_M if planar else _CELL_M)
+    sized = _legs_sized if planar else _person_sized
     people = [
         _person(scan.stamp_s, X_WB, cluster)
         for k, cluster in enumerate(clusters)
-        if _person_sized(cluster) and _alone(cluster, [other for j, other in enumerate(clusters) if j != k])
+        if sized(cluster) and _alone(cluster, [other for j, other in enumerate(clusters) if j != k])
     ]
     return sorted((p for p in people if p.distance_m < furthest_m), key=lambda person: person.distance_m)
 
@@ -86,11 +97,11 @@ def _own(points_B: FloatArray, corners: FloatArray) -> NDArray[np.bool_]:
     return np.asarray((x > x0 - behind) & (x < x1 + ahead) & (y > y0 - aside) & (y < y1 + aside))
 
 
-def _clusters(points_B: FloatArray) -> list[FloatArray]:
+def _clusters(points_B: FloatArray, cell_m: float) -> list[FloatArray]:
     """Points (N, 3) joined where they are neighbours on a grid seen from above."""
     if len(points_B) == 0:
         return []
-    labels, count = grid_labels(points_B[:, :2], _CELL_M, dilated=True)
+    labels, count = grid_labels(points_B[:, :2], cell_m, dilated=True)
     groups = [points_B[labels == k] for k in range(1, count)]
     return [group for group in groups if len(group) >= 3]
 
@@ -100,6 +111,11 @@ def _person_sized(points_B: FloatArray) -> bool:
     width = float(np.hypot(*spans))
     tall = float(np.ptp(points_B[:, 2])) > 0.1
     return len(points_B) >= _FEWEST_POINTS and _WIDTH_M[0] < width < _WIDTH_M[1] and tall
+
+
+def _legs_sized(points_B: FloatArray) -> bool:
+    width = float(np.hypot(*np.ptp(points_B[:, :2], axis=0)))
+    return len(points_B) >= _LEGS_FEWEST_POINTS and _LEGS_WIDTH_M[0] < width < _LEGS_WIDTH_M[1]
 
 
 def _alone(points_B: FloatArray, others: list[FloatArray]) -> bool:

@@ -12,11 +12,11 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
-from skills.approach.standing import COMFORTABLE_M, DISTANCES_M, free_places, reachable
+from skills.approach.standing import free_places, reachable
 from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel
-from skills.arm.poses import carry_configuration, look_configuration, overview_viewpoints
+from skills.arm.poses import carry_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
 from skills.arm.solid_cells import CELL_M
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
@@ -44,8 +44,6 @@ _LEAST_BACK_M = 0.08
 _MARGIN_RAD = 0.05
 _MOST_SPOTS = 80
 _OTHER_HEIGHT_COST = 0.05
-_DISTANCES_M = (DISTANCES_M, (0.76, 0.72, 0.68, 0.64))
-"""How far from a spot to stand; nearer than to grasp where what is held from above is put down high."""
 _LEVEL = 0.5
 _RELAX_M = 0.003
 _FEEL_S = 0.4
@@ -165,7 +163,7 @@ class Place(ArmSkill[PlaceInputs]):
 
         Gives the joint angles that the arm is to have there.
         """
-        spot_W, gone_to = self._nearest_spot(surface), list[FloatArray]()
+        spot_W, gone_to, arm = self._nearest_spot(surface), list[FloatArray](), self.arm
         heights_m, standing = self._heights_m(surface), f"standing up to the {surface.name}"
         while True:
             yield from self.stand_at(heights_m[0], standing)
@@ -183,7 +181,9 @@ class Place(ArmSkill[PlaceInputs]):
             gone_to.append(spot_W)
             spot_W = others[0]
             message = "carrying the object on along the surface"
-            yield from self.move_to(lambda scene, q: carry_configuration(scene, carried, q), message, speed_rad_s=0.9)
+            yield from self.move_to(
+                lambda scene, q: carry_configuration(scene, arm, carried, q), message, speed_rad_s=0.9
+            )
             yield from self._stand_as_usual()
             yield from self._go_before(spot_W, surface, held)
 
@@ -226,7 +226,7 @@ class Place(ArmSkill[PlaceInputs]):
         pose = self.context.pose()
         offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
         bearing = wrap(math.atan2(offset[1], offset[0]) - pose.yaw_rad)
-        comfortable = np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6
+        comfortable = np.linalg.norm(offset) < self.arm.comfortable_m[1] and abs(bearing) < 0.6
         if comfortable and self._reach_cost(spot, surface, held)(pose) is not None:
             return
         yield from self._go_before(spot, surface, held)
@@ -235,7 +235,8 @@ class Place(ArmSkill[PlaceInputs]):
         """Drive to where a spot is within the arm's reach, or as near as may be."""
         context, pose, point_W = self.context, self.context.pose(), (float(spot[0]), float(spot[1]))
         footprint, reach_cost = ArmFootprint(context).now(), self._reach_cost(spot, surface, held)
-        free = [free_places(point_W, pose, context.costmap, footprint, each) for each in _DISTANCES_M]
+        distances, best_m = (self.arm.standing_m, self.arm.nearer_m), self.arm.standing_m[0]
+        free = [free_places(point_W, pose, context.costmap, footprint, each, best_m) for each in distances]
         places = yield from self.compute(
             lambda: next((near for each in free if (near := reachable(each, reach_cost))), free[0]),
             latency_s=0.2,
@@ -268,14 +269,9 @@ class Place(ArmSkill[PlaceInputs]):
         message = f"looking for a free spot on the {surface.name}"
         X_WB = self.X_WB()
         self.boxes = [*surface_boxes([surface], X_WB), *beside]
-        X_HC = self.hand_camera.X_FC
         p_BT = X_WB.inverse() @ np.array([spot_W[0], spot_W[1], surface.height_m])
         low_BT = self.model.p_BS + (p_BT - self.model.p_BS) * [0.8, 0.8, 1.0]
-
-        def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            return look_configuration(scene, X_HC, overview_viewpoints(self.model, low_BT), low_BT, q)
-
-        yield from self.look_from(goal, message, speed_rad_s=0.9)
+        yield from self.look_at(low_BT, overview_viewpoints(self.model, low_BT), message, speed_rad_s=0.9)
         image = yield from self.picture(message)
         X_WO = self.context.localiser.estimate().X_WO
         view = yield from self.compute(
@@ -447,7 +443,8 @@ def above_goal(
         """Arm angles above the first spot that can be reached and gone down to. Raises PlanningError."""
         for p_BT in on_top_B:
             for X_BH in held.above(p_BT, scene.model.p_BS):
-                for q_above in scene.model.inverse(X_BH, margin_rad=_MARGIN_RAD):
+                for solution in scene.model.inverse(X_BH, margin_rad=_MARGIN_RAD):
+                    q_above = scene.model.turned_near(solution, q)
                     if scene.free(q_above) and _can_put_down(scene, q_above, planner, release):
                         return q_above
         raise PlanningError("no free spot is within the arm's reach")
@@ -458,7 +455,7 @@ def above_goal(
 def _reaches(model: ArmModel, X_BH: RigidTransform) -> bool:
     """Whether the arm reaches a pose of the hand and the one below at which the object stands."""
     lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, ABOVE_M])
-    return bool(model.inverse(X_BH, margin_rad=_MARGIN_RAD) and model.inverse(lowered, margin_rad=_MARGIN_RAD))
+    return model.reaches(X_BH, _MARGIN_RAD) and model.reaches(lowered, _MARGIN_RAD)
 
 
 def _can_put_down(scene: ArmScene, q_rad: FloatArray, planner: ArmPlanner, release: Release) -> bool:

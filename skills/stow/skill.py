@@ -13,8 +13,8 @@ from skills.arm.arm_skill import ArmSkill
 from skills.arm.poses import carry_configuration
 from skills.arm.routine import Routine
 
-_NEAR_BODY_X_M = 0.55
-_NEAR_BODY_Z_M = 0.6
+_NEAR_X_M, _NEAR_Z_M = 0.05, 0.06
+"""A hand no farther than so beyond where it carries is near the body."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,11 @@ class Stow(ArmSkill[StowInputs]):
             return Succeeded("the arm is stowed")
         X_BH = self.model.X_BH(self.q_rad())
         p_BH = X_BH.translation()
-        if p_BH[0] > _NEAR_BODY_X_M or p_BH[2] > _NEAR_BODY_Z_M or np.abs(p_BH[1]) > 0.3:
+        arm = self.arm
+        far = p_BH[0] > max(arm.carry_x_m) + _NEAR_X_M or p_BH[2] > max(arm.carry_z_m) + _NEAR_Z_M
+        if far or np.abs(p_BH[1]) > 0.3:
             rotation = X_BH.rotation()
             yield from self.move_to(
-                lambda scene, q: carry_configuration(scene, rotation, q), "drawing in the arm", speed_rad_s=0.9
+                lambda scene, q: carry_configuration(scene, arm, rotation, q), "drawing in the arm", speed_rad_s=0.9
             )
         return Succeeded("the object is held near the body")

@@ -15,7 +15,7 @@ from typing import ClassVar, Self
 from executive.mission.file.model import StaleData
 from executive.tree.behaviours.context import RunContext
 from skills.api import Cause, Failed
-from skills.arm.hold import Grip, HoldWatch, grip_again
+from skills.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.robot import Pose2D
 
 CONTROL_TOPIC = "control"
@@ -110,13 +110,13 @@ class Holds(Condition):
     def for_run(self, context: RunContext) -> Self:
         """A copy with a watch of its own."""
         mine = copy.copy(self)
-        mine._watch = HoldWatch()
+        mine._watch = hold_watch(context.robot.capabilities())
         return mine
 
     def begin(self, context: RunContext) -> None:
         """The subtree starts anew: nothing has been held yet."""
         super().begin(context)
-        self._watch = HoldWatch()
+        self._watch = hold_watch(context.robot.capabilities())
 
     def judged(self, context: RunContext) -> Verdict:
         """A failure when it is lost or slips on; grips again what slips."""

@@ -13,6 +13,8 @@ from xml.etree import ElementTree
 
 import yaml
 
+from plant.models import urdf
+
 FACTS = Path(__file__).with_name("spot.yaml")
 CAMERAS = Path(__file__).with_name("cameras.yaml")
 GRIPPER_JOINT = "arm_f1x"
@@ -36,24 +38,18 @@ def spot_urdf(*, visuals: bool = False) -> str:
     """
     facts = spot_facts()
     robot = ElementTree.Element("robot", name="spot")
-    for name, rgba in facts["colours"].items():
-        material = ElementTree.SubElement(robot, "material", name=name)
-        ElementTree.SubElement(material, "color", rgba=_text(rgba))
+    urdf.add_materials(robot, facts["colours"])
     _add_link(robot, "body", facts["body"], visuals=visuals)
     for leg in LEGS:
         _add_leg(robot, leg, facts["legs"], visuals=visuals)
     parent = "body"
     for part in facts["arm"]:
         _add_link(robot, part["link"], part, visuals=visuals)
-        _add_joint(robot, part["link"], parent, part["link"], part)
+        urdf.add_joint(robot, part["link"], parent, part["link"], part)
         parent = "arm_wr1" if part["link"] == "arm_wr1" else part["link"]
     _add_lidar(robot, facts["lidar"])
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")
-
-
-def _text(values: Iterable[float]) -> str:
-    return " ".join(f"{value:.9g}" for value in values)
 
 
 def _add_leg(robot: ElementTree.Element, leg: str, facts: Mapping[str, Any], *, visuals: bool) -> None:
@@ -64,7 +60,7 @@ def _add_leg(robot: ElementTree.Element, leg: str, facts: Mapping[str, Any], *, 
             part["foot"] = facts["foot"]
         part["visuals"] = _leg_visuals(leg, link)
         _add_link(robot, f"{leg}_{name}", part, visuals=visuals)
-        _add_joint(robot, f"{leg}_{part['joint']}", parent, f"{leg}_{name}", part)
+        urdf.add_joint(robot, f"{leg}_{part['joint']}", parent, f"{leg}_{name}", part)
         parent = f"{leg}_{name}"
 
 
@@ -89,22 +85,16 @@ def _leg_visuals(leg: str, link: str) -> list[dict[str, str]]:
 
 
 def _add_link(robot: ElementTree.Element, name: str, part: Mapping[str, Any], *, visuals: bool) -> None:
-    link = ElementTree.SubElement(robot, "link", name=name)
-    inertial = ElementTree.SubElement(link, "inertial")
-    ElementTree.SubElement(inertial, "origin", xyz=_text(part["com"]))
-    ElementTree.SubElement(inertial, "mass", value=str(part["mass"]))
-    moments = {key: str(value) for key, value in part["inertia"].items()}
-    ElementTree.SubElement(inertial, "inertia", {**moments, "ixy": "0", "ixz": "0", "iyz": "0"})
+    link = urdf.add_link(robot, name, part)
     shapes = list(_shapes(part))
     for index, (shape, contact) in enumerate(shapes):
-        _add_collision(link, f"{name}_{index}", shape, contact)
+        urdf.add_collision(link, f"{name}_{index}", shape, contact)
     if visuals:
         for index, mesh in enumerate(part.get("visuals", ())):
             _add_mesh(link, f"{name}_visual_{index}", mesh)
     else:
         for index, (shape, _) in enumerate(shapes):
-            visual = _add_shape(ElementTree.SubElement(link, "visual", name=f"{name}_shape_{index}"), shape)
-            ElementTree.SubElement(visual, "material", name="grey")
+            urdf.add_look(link, f"{name}_shape_{index}", shape, "grey")
 
 
 def _shapes(part: Mapping[str, Any]) -> Iterable[tuple[Mapping[str, Any], Mapping[str, float]]]:
@@ -113,40 +103,10 @@ def _shapes(part: Mapping[str, Any]) -> Iterable[tuple[Mapping[str, Any], Mappin
         yield shape, {}
     if "foot" in part:
         foot = part["foot"]
-        yield {"sphere": foot["radius"], "xyz": foot["xyz"]}, _friction(foot["friction"])
+        yield {"sphere": foot["radius"], "xyz": foot["xyz"]}, urdf.friction(foot["friction"])
     if "pads" in part:
-        pads, facts = part["pads"], spot_facts()
-        contact = {**_friction(facts["pad_friction"]), "point_contact_stiffness": facts["pad_stiffness_n_m"]}
-        for x, z in pads["xz"]:
-            for y in pads["y"]:
-                yield {"sphere": pads["radius"], "xyz": [x, y, z]}, contact
-
-
-def _friction(coefficient: float) -> Mapping[str, float]:
-    return {"mu_dynamic": coefficient, "mu_static": coefficient}
-
-
-def _add_shape(element: ElementTree.Element, shape: Mapping[str, Any]) -> ElementTree.Element:
-    ElementTree.SubElement(element, "origin", xyz=_text(shape["xyz"]), rpy=_text(shape.get("rpy", (0, 0, 0))))
-    geometry = ElementTree.SubElement(element, "geometry")
-    if "box" in shape:
-        ElementTree.SubElement(geometry, "box", size=_text(shape["box"]))
-    elif "cylinder" in shape:
-        radius, length = shape["cylinder"]
-        ElementTree.SubElement(geometry, "cylinder", radius=str(radius), length=str(length))
-    else:
-        ElementTree.SubElement(geometry, "sphere", radius=str(shape["sphere"]))
-    return element
-
-
-def _add_collision(
-    link: ElementTree.Element, name: str, shape: Mapping[str, Any], contact: Mapping[str, float]
-) -> None:
-    collision = _add_shape(ElementTree.SubElement(link, "collision", name=name), shape)
-    if contact:
-        properties = ElementTree.SubElement(collision, "drake:proximity_properties")
-        for key, value in contact.items():
-            ElementTree.SubElement(properties, f"drake:{key}", value=str(value))
+        facts = spot_facts()
+        yield from urdf.pad_shapes(part["pads"], facts["pad_friction"], facts["pad_stiffness_n_m"])
 
 
 def _add_mesh(link: ElementTree.Element, name: str, mesh: Mapping[str, str]) -> None:
@@ -154,20 +114,6 @@ def _add_mesh(link: ElementTree.Element, name: str, mesh: Mapping[str, str]) -> 
     geometry = ElementTree.SubElement(visual, "geometry")
     ElementTree.SubElement(geometry, "mesh", filename=f"package://{VISUALS_PACKAGE}/{mesh['mesh']}")
     ElementTree.SubElement(visual, "material", name=mesh["colour"])
-
-
-def _add_joint(robot: ElementTree.Element, name: str, parent: str, child: str, part: Mapping[str, Any]) -> None:
-    joint = ElementTree.SubElement(robot, "joint", name=name, type="revolute")
-    ElementTree.SubElement(joint, "origin", xyz=_text(part["offset"]))
-    ElementTree.SubElement(joint, "parent", link=parent)
-    ElementTree.SubElement(joint, "child", link=child)
-    ElementTree.SubElement(joint, "axis", xyz=_text(part["axis"]))
-    lower, upper = part["range"]
-    ElementTree.SubElement(joint, "limit", lower=str(lower), upper=str(upper), effort=str(part["effort"]))
-    transmission = ElementTree.SubElement(robot, "transmission", name=f"{name}_transmission")
-    ElementTree.SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
-    ElementTree.SubElement(transmission, "joint", name=name)
-    ElementTree.SubElement(transmission, "actuator", name=name)
 
 
 def _add_lidar(robot: ElementTree.Element, lidar: Mapping[str, Any]) -> None:
@@ -184,10 +130,7 @@ def _add_lidar(robot: ElementTree.Element, lidar: Mapping[str, Any]) -> None:
         ],
     }
     _add_link(robot, "lidar", part, visuals=False)
-    joint = ElementTree.SubElement(robot, "joint", name="lidar_mount", type="fixed")
-    ElementTree.SubElement(joint, "origin", xyz=_text(lidar["xyz"]))
-    ElementTree.SubElement(joint, "parent", link="body")
-    ElementTree.SubElement(joint, "child", link="lidar")
+    urdf.add_fixed(robot, "lidar_mount", "body", "lidar", lidar["xyz"])
 
 
 def arm_joint_names() -> Sequence[str]:

@@ -11,11 +11,11 @@ from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture,
 from plant.models.builder.sdf import Model, model_sdf
 from plant.pictures import save_png
 from plant.worlds.builder.furniture import Piece
-from plant.worlds.builder.maps import BANDS_M, Placement, pgm_bytes, rasterise, yaml_text
+from plant.worlds.builder.maps import BANDS_M, DRAWN, Placement, pgm_bytes, rasterise, yaml_text
 from plant.worlds.builder.materials import materials, pictures
 from plant.worlds.builder.plan import PLANS, Placed, Plan, load_plan
 from plant.worlds.builder.shell import shell_collisions, shell_mesh
-from plant.worlds.world import PACKAGE_NAME, TRUTH, WORLDS_FOLDER
+from plant.worlds.world import PACKAGE_NAME, ROBOTS, TRUTH, WORLDS_FOLDER
 
 
 def build(plan: Plan, folder: Path, package: str, maps: str = TRUTH) -> None:
@@ -34,11 +34,12 @@ def build(plan: Plan, folder: Path, package: str, maps: str = TRUTH) -> None:
         meshes.append(piece.mesh)
     _write_pictures(folder / "furniture", meshes)
     write_text(folder / "world.dmd.yaml", _directives(package, plan.furniture))
-    (folder / maps).mkdir(parents=True, exist_ok=True)
     for kind, band in BANDS_M.items():
         grid = rasterise(shapes, band, plan.outline_m)
-        (folder / maps / f"{kind}.pgm").write_bytes(pgm_bytes(grid))
-        write_text(folder / maps / f"{kind}.yaml", yaml_text(grid, f"{kind}.pgm", band))
+        for name in sorted({maps, ROBOTS} if kind in DRAWN else {maps}):
+            (folder / name).mkdir(parents=True, exist_ok=True)
+            (folder / name / f"{kind}.pgm").write_bytes(pgm_bytes(grid))
+            write_text(folder / name / f"{kind}.yaml", yaml_text(grid, f"{kind}.pgm", band))
 
 
 def _write_pictures(folder: Path, meshes: Iterable[Mesh]) -> None:

@@ -13,8 +13,10 @@ from skills.robot import FloatArray
 
 Bools = NDArray[np.bool_]
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
-BANDS_M = {"scan": (0.70, 1.30), "keepout": (0.05, 1.00)}
+BANDS_M = {"scan": (0.70, 1.30), "low_scan": (0.27, 0.31), "keepout": (0.05, 1.00)}
 """The heights that each grid speaks of."""
+DRAWN = frozenset({"low_scan"})
+"""Grids that are drawn for the robots, too, where they have mapped the others themselves."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import yaml
 
-from executive.cli.sweep import seed_range
+from executive.evaluation.seeds import seed_range
 
 VERDICTS = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
 

@@ -8,7 +8,7 @@ import pytest
 
 from executive.cli import sweep as module
 from executive.cli.report import RefereeReport, RunReport
-from executive.cli.sweep import condition_rows, conditions, folders, rows, seed_range, sweep, totals
+from executive.cli.sweep import condition_rows, conditions, folders, rows, sweep, totals
 from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
@@ -17,17 +17,6 @@ from executive.mission.scenario import Scenario
 def report(seed: int, outcome: str = "success") -> RunReport:
     referee = RefereeReport(outcome == "success", "so it is", 0, 0)
     return RunReport(outcome, None, "done", referee, ("Take",), "flat", seed, 1.0, 1.0, 1.0, 20, "log")
-
-
-@pytest.mark.parametrize(("text", "seeds"), [("1-3", (1, 2, 3)), ("7", (7,)), ("1,4,7-8", (1, 4, 7, 8))])
-def test_seed_ranges(text, seeds):
-    assert seed_range(text) == seeds
-
-
-@pytest.mark.parametrize("text", ["", "a", "1-", "-", "5-3", "1..4"])
-def test_bad_seed_ranges_are_refused(text):
-    with pytest.raises(InputError, match="1-20"):
-        seed_range(text)
 
 
 def test_reports_survive_the_way_through_json():

@@ -87,6 +87,7 @@ class UseAll(Skill):
             robot.stand(0.5, 0.0, until_s=until_s, lease=lease),
             robot.move_arm(trajectory, until_s=until_s, lease=lease),
             robot.set_gripper(1.0, 10.0, until_s=until_s, lease=lease),
+            robot.point_head(0.1, 0.1, until_s=until_s, lease=lease),
         ]
 
     def drive(self):

@@ -249,28 +249,57 @@ def test_overruns_are_counted(compiled, run_tree, make, script, published):
     assert result.overruns >= 1
 
 
-def test_robots_run_side_by_side_in_the_order_of_their_names(make, knowledge, registry, clock, published):
-    steps = [MissionStep((parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"),))]
-    robots = {name: make.ScriptedRobot(clock, name) for name in ("Bob", "Alice")}
-    entries = [
-        RunEntry(
-            compile_mission(Mission("go", DEFAULT_WORLD, name, tuple(steps)), knowledge=knowledge, registry=registry),
-            robot,
-            make.StillLocaliser(),
-            make.EmptyCostmap(),
+@pytest.fixture
+def run_two(make, knowledge, registry, clock, published):
+    """Runs a mission to the bedroom by Alice and Bob; `after` says who waits for whom."""
+    steps = (MissionStep((parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"),)),)
+
+    def run_them(**after):
+        entries = [
+            RunEntry(
+                compile_mission(Mission("go", DEFAULT_WORLD, name, steps), knowledge=knowledge, registry=registry),
+                make.ScriptedRobot(clock, name),
+                make.StillLocaliser(),
+                make.EmptyCostmap(),
+                after=after.get(name, ()),
+            )
+            for name in ("Bob", "Alice")
+        ]
+        return run(
+            entries,
+            clock=clock,
+            worker=LockStepWorker(clock),
+            publish=lambda *m: published.append(m),
+            settings=RunSettings(seed=1),
         )
-        for name, robot in robots.items()
-    ]
-    result = run(
-        entries,
-        clock=clock,
-        worker=LockStepWorker(clock),
-        publish=lambda *m: published.append(m),
-        settings=RunSettings(seed=1),
-    )
+
+    return run_them
+
+
+def test_robots_run_side_by_side_in_the_order_of_their_names(run_two, published):
+    result = run_two()
     assert [robot.robot_name for robot in result.robots] == ["Alice", "Bob"]
     assert result.outcome is Outcome.SUCCESS
     assert {m["robot"] for m in transitions(published)} == {"Alice", "Bob"}
+
+
+def test_a_robot_that_waits_for_another_begins_when_that_one_is_done(run_two, published):
+    assert run_two(Alice=("Bob",)).outcome is Outcome.SUCCESS
+    order = [message["robot"] for message in transitions(published)]
+    assert order.index("Alice") > len(order) - 1 - order[::-1].index("Bob")
+
+
+def test_a_robot_that_waits_for_one_that_fails_does_not_begin(run_two, script, published):
+    script.ends["navigate"] = lambda skill: Failed(Cause.EXECUTION, "stuck")
+    alice, bob = run_two(Alice=("Bob",)).robots
+    assert (alice.outcome, alice.cause, bob.outcome) == (Outcome.FAILURE, Cause.PRECONDITION, Outcome.FAILURE)
+    assert alice.message.startswith("Bob, whose part comes first, did not do it")
+    assert {m["robot"] for m in transitions(published)} == {"Bob"}
+
+
+def test_to_wait_for_a_robot_that_is_not_there_is_refused(run_two):
+    with pytest.raises(ValueError, match="no robot Carl"):
+        run_two(Alice=("Carl",))
 
 
 def test_robots_of_one_name_are_refused(compiled, make, robot, clock):

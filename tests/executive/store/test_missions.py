@@ -13,6 +13,7 @@ from executive.mission.errors import InputError
 from executive.mission.request import Request, Start
 from executive.mission.scenario import Scenario
 from executive.run.journal import TickNote
+from executive.store.database import VERSION
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.snapshot import Change, NodeState
 from skills.api import Cause
@@ -208,7 +209,7 @@ def test_a_store_of_another_version_is_refused(path):
     with sqlite3.connect(path) as other:
         other.execute("PRAGMA user_version = 9")
     other.close()
-    with pytest.raises(InputError, match="version 9, and this errand reads 5"):
+    with pytest.raises(InputError, match=f"version 9, and this errand reads {VERSION}"):
         MissionStore(path)
 
 
@@ -216,9 +217,9 @@ def test_a_store_of_version_4_is_brought_up_to_date(path):
     with MissionStore(path) as store:
         kept = store.add(REQUEST, queued=True)
     with sqlite3.connect(path) as old:
-        for table in ("standing", "origin", "battery"):
+        for table in ("standing", "origin", "battery", "given"):
             old.execute(f"DROP TABLE {table}")
-        for column in ("scenario", "time_of_day", "time_limit_s"):
+        for column in ("scenario", "time_of_day", "time_limit_s", "variation"):
             old.execute(f"ALTER TABLE mission DROP COLUMN {column}")
         old.execute("PRAGMA user_version = 4")
     old.close()

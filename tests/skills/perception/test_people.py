@@ -1,11 +1,12 @@
 """Persons in analytic LiDAR scans."""
 
+import numpy as np
 import pytest
 from analytic_scan import scan_of
 from pydrake.math import RigidTransform
 
 from skills.perception.people import people_in_scan
-from skills.robot import Pose2D
+from skills.robot import Pose2D, Scan
 
 OUTLINE = ((0.56, 0.25), (0.56, -0.25), (-0.5, -0.25), (-0.5, 0.25))
 
@@ -53,3 +54,13 @@ def test_the_place_is_one_in_the_world():
     (person,) = people_seen(scan_of([(1.8, 0.0, 0.2)]), Pose2D(5.0, 2.0, 1.5708).transform())
     assert person.place_W == pytest.approx((5.0, 3.8), abs=0.12)
     assert person.distance_m == pytest.approx(1.8, abs=0.12)
+
+
+def test_a_pair_of_legs_that_stands_alone_is_a_person_to_a_lidar_of_one_ring():
+    angles = np.linspace(-0.5, 0.5, 200)
+    x, y = 1.5 * np.ones(200), 1.5 * np.tan(angles)
+    legs = np.abs(np.abs(y) - 0.12) < 0.06
+    ranges = np.where(legs, np.hypot(x, y), np.nan).astype(np.float32)[None, :]
+    scan = Scan(0.0, ranges, np.zeros(1), angles, RigidTransform([0.0, 0.0, 0.3]), RigidTransform())
+    (person,) = people_in_scan(scan, RigidTransform(), ((0.3, 0.3), (-0.3, -0.3)))
+    assert person.place_W == pytest.approx((1.6, 0.0), abs=0.05)

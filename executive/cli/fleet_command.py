@@ -1,0 +1,165 @@
+"""`errand fleet`: several robots do what is queued, each mission by the one that is done with it first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from executive.cli.durable import STORE
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
+from executive.cli.report import VERDICTS
+from executive.cli.run_options import FAULT, TIME_LIMIT, robots_of, time_limit_s
+from executive.cli.serve_command import AsJson
+from executive.mission.errors import InputError
+from executive.mission.robots import robot_called
+from executive.store.given import GivenMissions
+from executive.store.missions import MissionState, MissionStore, StoredMission
+
+__all__ = ["fleet"]
+
+fleet = typer.Typer(
+    name="fleet",
+    help="What is queued, given out among several robots.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+Queue = Annotated[
+    Path, typer.Argument(metavar="QUEUE", help="The store of `errand queue add`, or the folder that has it.")
+]
+
+
+@fleet.command()
+def run(
+    queue: Queue,
+    robots: Annotated[
+        str,
+        typer.Option(
+            "--robots", metavar="NAME=KIND,...", help="The robots and their kinds, as in alice=spot,bob=spot."
+        ),
+    ],
+    world: Annotated[str | None, typer.Option(help="World by name or folder; that of the first mission.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="Folder for the log; `fleet` beside the store.")] = None,
+    fault: FAULT = None,
+    time_limit: TIME_LIMIT = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No lines while it runs.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run all that is queued, in one world, with several robots.
+
+    A fault is for the robot named before it ("bob: robot dies at 20 s"), else for all.
+    """
+    console = console_for(as_json)
+    store = _store(queue)
+    with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
+        from executive.cli.fleet_missions import fleet_mission
+        from executive.cli.fleet_run import FleetDispatch, run_fleet, told
+        from executive.cli.simulated import SimulatedBackend
+        from executive.cli.starts import placed_robots
+        from executive.cli.worlds import knowledge_of, open_world
+
+        setups = robots_of(robots)
+        queued = _to_do(missions)
+        where = open_world(world or queued[0].request.world or queued[0].request.world_name)
+        knowledge = knowledge_of(where)
+        placed = placed_robots(where, knowledge, setups)
+        faults, given = _faults(fault or (), tuple(placed)), GivenMissions(missions).all()
+        wanted = {
+            each.id: fleet_mission(
+                missions,
+                replace(each, request=replace(each.request, seed=seed)),
+                world=where,
+                knowledge=knowledge,
+                robots=placed,
+                done=given[each.id].done if each.id in given else 0,
+            )
+            for each in queued
+        }
+        backend = SimulatedBackend(where, placed, seed=seed, record=False)
+        folder = out or store.parent / "fleet"
+        dispatch = FleetDispatch(missions, wanted, placed, backend, faults, None if quiet else console)
+        run_fleet(dispatch, out=folder, seed=seed, time_limit_s=time_limit_s(time_limit))
+        results = told(missions, [each.id for each in queued])
+    achieved = [_achieved(each) for each in results]
+    console.print(f"{sum(achieved)} of {len(achieved)} missions achieved")
+    if as_json:
+        print_json({"missions": results})
+    if not all(achieved):
+        raise typer.Exit(NOT_ACHIEVED)
+
+
+@fleet.command()
+def status(queue: Queue, as_json: AsJson = False) -> None:
+    """Show which robot has which mission, also while they run."""
+    with refusals(), MissionStore(_store(queue), create=False) as missions:
+        from executive.cli.fleet_run import told
+
+        results = told(missions, [each.id for each in missions.missions() if each.queued])
+        names = {each.id: each.request.name for each in missions.missions()}
+    header = ("mission", "name", "robot", "state", "referee", "reassigned", "message")
+    show_table(console_for(as_json), header, [_row(each, names) for each in results])
+    if as_json:
+        print_json({"missions": results})
+
+
+def _store(queue: Path) -> Path:
+    return queue / STORE if queue.is_dir() else queue
+
+
+def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
+    """The missions of the queue; those that a fleet's run left when it was broken off go on, or are told as failed.
+
+    Raises InputError: another command's mission was broken off, or nothing is queued.
+    """
+    given = GivenMissions(missions)
+    known = given.all()
+    for each in missions.missions(MissionState.RUNNING):
+        if each.id not in known:
+            from executive.cli.queue_run import broken_off
+
+            raise broken_off(missions, each)
+        if known[each.id].blocked is not None:
+            message = f"the run was broken off, and {known[each.id].robot} had begun it"
+            missions.finish(each.id, MissionState.FAILURE, message)
+        else:
+            missions.finish(each.id, MissionState.QUEUED, "")
+            given.hand_back(each.id)
+    queued = [each for each in missions.missions(MissionState.QUEUED) if each.queued]
+    if not queued:
+        raise InputError("nothing is queued", hint="queue a mission by `errand queue add`", file=missions.path)
+    return queued
+
+
+def _faults(words: Sequence[str], robots: Sequence[str]) -> Mapping[str, Sequence[str]]:
+    """The faults of each robot. Raises InputError: there is no such fault."""
+    from skills.faults.words import parse_fault
+
+    faults: dict[str, list[str]] = {name: [] for name in robots}
+    for each in words:
+        head, _, rest = each.partition(":")
+        named = robot_called(head, robots) if rest else None
+        said = rest.strip() if named is not None else each
+        try:
+            parse_fault(said)
+        except ValueError as error:
+            raise InputError(f"--fault {each[:60]}: {error}") from error
+        for name in robots if named is None else (named,):
+            faults[name].append(said)
+    return faults
+
+
+def _achieved(told: Mapping[str, Any]) -> bool:
+    referee = told["referee"]
+    return told["outcome"] == MissionState.SUCCESS.value and (referee is None or referee["success"] is not False)
+
+
+def _row(told: Mapping[str, Any], names: Mapping[int, str]) -> tuple[str, ...]:
+    referee = told["referee"]
+    seen = "" if referee is None else VERDICTS[referee["success"]]
+    values = (told["id"], names[told["id"]], told["robot"] or "", told["outcome"], seen, told["reassigned"])
+    return (*map(str, values), told["message"])

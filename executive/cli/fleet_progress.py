@@ -1,0 +1,79 @@
+"""How far a mission of a fleet is, so that another robot can go on with it without doing anything twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from py_trees.common import Status
+
+from executive.run.journal import TickNote
+from executive.tree.compiler import CompiledTree
+from executive.tree.node import NodeSpec
+
+__all__ = ["Progress", "ProgressJournal", "progress_of"]
+
+_TOUCHED: Final = (Status.RUNNING, Status.SUCCESS)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What of a tree is done: the first `done` commands for good, and whether what comes after has been `begun`: a
+    skill that changes the world has done its work, or does it."""
+
+    done: int
+    begun: bool
+
+
+def progress_of(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> Progress:
+    """What of a tree is done by what its nodes said, by path id.
+
+    Another robot can go on before a command that needs nothing in the gripper. A mission that has more than plain
+    commands is done as a whole.
+    """
+    plain = len(tree.parts) == len(tree.commands) and all(step.block is None for step in tree.steps)
+    plain = plain and len(tree.steps) == 1
+    done = 0
+    for number, part in enumerate(tree.parts if plain else ()):
+        if statuses(part.node or part.path_id) is not Status.SUCCESS:
+            break
+        after = number + 1
+        if after == len(tree.parts) or tree.commands[after].item is None:
+            done = after
+    over = {part.path_id for part in tree.parts[:done]}
+    begun = any(statuses(leaf.path_id) in _TOUCHED for leaf in _changing(tree.mission, over))
+    return Progress(done, begun)
+
+
+def _changing(node: NodeSpec, over: set[str]) -> list[NodeSpec]:
+    """The skills below a node that change the world, without those of commands that are done."""
+    if any(node.path_id == path or node.path_id.startswith(f"{path}/") for path in over):
+        return []
+    own = [node] if node.kind == "skill" and node.options["skill"].changes_world else []
+    return own + [leaf for child in node.children for leaf in _changing(child, over)]
+
+
+class ProgressJournal:
+    """Tells how far a mission is whenever that changes (`executive.run.journal.Journal`)."""
+
+    def __init__(self, tree: CompiledTree, tell: Callable[[Progress], None]) -> None:
+        self._tree, self._tell = tree, tell
+        self._statuses: dict[str, Status] = {}
+        self.progress = Progress(0, False)
+
+    def note(self, note: TickNote) -> None:
+        """Keep what a tick brought."""
+        if not note.changes:
+            return
+        for change in note.changes:
+            if change.after.status is not Status.INVALID:  # a node that is reset was done all the same
+                self._statuses[change.path_id] = change.after.status
+        progress = progress_of(self._tree, self._statuses.get)
+        if progress != self.progress:
+            self.progress = progress
+            self._tell(progress)
+
+    def replaced(self, tree: CompiledTree) -> ProgressJournal:
+        """Another mission has taken the place of this one."""
+        return ProgressJournal(tree, self._tell)

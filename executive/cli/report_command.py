@@ -1,0 +1,121 @@
+"""`errand report`: what a results file says, as tables, as JSON and as an HTML page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from executive.cli.evaluate_scenario import command_of
+from executive.cli.output import console_for, print_json, refusals, show_table
+from executive.evaluation.page import EvaluationPage, to_page
+from executive.evaluation.results import ResultsFile
+from executive.evaluation.summary import Case, causes_of, compared, group_rows, groups_of, time_rows, totals_of
+from executive.mission.errors import InputError
+
+__all__ = ["report"]
+
+
+def report(
+    results: Annotated[Path, typer.Argument(metavar="RESULTS", help="A file of `errand evaluate SCENARIO`.")],
+    html: Annotated[Path | None, typer.Option(help="Write a page that needs nothing else.")] = None,
+    against: Annotated[Path | None, typer.Option(metavar="RESULTS", help="Compare with another results file.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the report.")] = False,
+) -> None:
+    """Report the results of an evaluation: success with intervals, causes, where the time goes, each failure."""
+    console = console_for(as_json)
+    with refusals(), ResultsFile(results) as kept:
+        cases, about = _cases(kept), kept.about()
+        other = None if against is None else _other(against)
+        _show(console, cases, other)
+        if html is not None:
+            facts = (
+                ("scenario", about["scenario"]),
+                ("runs with a result", f"{len(cases)} of {about['runs']}" if "runs" in about else str(len(cases))),
+                ("version", about["code"]),
+                ("missions per hour", about.get("missions_per_hour", "?")),
+            )
+            title = Path(about["scenario"]).stem.replace("_", " ")
+            name = "" if against is None else str(against)
+            page = EvaluationPage(title, facts, cases, kept.evidence, lambda case: command_of(case.run), other, name)
+            _write(html, to_page(page))
+            console.print(f"Written: {html}", markup=False)
+        if as_json:
+            print_json(_json(about["scenario"], cases, other))
+
+
+def _other(path: Path) -> Sequence[Case]:
+    with ResultsFile(path) as kept:
+        return _cases(kept)
+
+
+def _cases(kept: ResultsFile) -> Sequence[Case]:
+    """All runs that have a result. Raises InputError: none has."""
+    runs = kept.runs()
+    cases = [Case(runs[number], outcome) for number, outcome in kept.outcomes()]
+    if not cases:
+        raise InputError("it holds no result yet", hint="give the command that writes it again", file=kept.path)
+    return cases
+
+
+def _show(console: Console, cases: Sequence[Case], other: Sequence[Case] | None) -> None:
+    show_table(console, ("", "runs", "success", "95 %", "referee", "false claims"), group_rows(groups_of(cases)))
+    for row in causes_of(cases, most=1):
+        console.print(f"{row.cause}: {row.runs}, as in: {row.sentences[0][0]}", markup=False)
+    rows = ((row.skill, str(row.runs), f"{row.total_s:.1f}", f"{row.share:.1%}") for row in time_rows(cases))
+    show_table(console, ("skill", "runs", "simulated s", "share"), rows)
+    for found in compared(cases, other) if other is not None else ():
+        test = "McNemar" if found.paired else "Fisher"
+        here, there = (f"{rate.successes} of {rate.total}" for rate in (found.first, found.second))
+        console.print(f"{found.dimension} {found.name}: {here} against {there}, p {found.p:.3g} ({test})", markup=False)
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=path) from error
+
+
+def _json(scenario: str, cases: Sequence[Case], other: Sequence[Case] | None) -> dict[str, Any]:
+    groups = [
+        {
+            "dimension": group.dimension,
+            "name": group.name,
+            "runs": group.runs,
+            "achieved": group.achieved,
+            "interval": group.rate.interval(),
+            **group.counts,
+        }
+        for group in groups_of(cases)
+    ]
+    comparisons = [
+        {
+            "dimension": found.dimension,
+            "name": found.name,
+            "paired": found.paired,
+            "here": [found.first.successes, found.first.total],
+            "there": [found.second.successes, found.second.total],
+            "only_here": found.only_first,
+            "only_there": found.only_second,
+            "p": found.p,
+        }
+        for found in (compared(cases, other) if other is not None else ())
+    ]
+    return {
+        "scenario": scenario,
+        "runs": len(cases),
+        **totals_of(cases),
+        "groups": groups,
+        "causes": [{"cause": row.cause, "runs": row.runs, "messages": dict(row.sentences)} for row in causes_of(cases)],
+        "skills": {row.skill: {"runs": row.runs, "sim_s": row.total_s, "share": row.share} for row in time_rows(cases)},
+        **({"against": comparisons} if other is not None else {}),
+        "failures": [
+            {"id": case.outcome.run_id, "cause": case.cause, "message": case.why, "command": command_of(case.run)}
+            for case in cases
+            if not case.outcome.achieved
+        ],
+    }

@@ -1,0 +1,218 @@
+"""What results say: success by mission, world, robot and variation, causes, where time goes; two results compared."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from executive.evaluation.outcome import RunOutcome
+from executive.evaluation.runs import RunSpec
+from executive.evaluation.statistics import Rate, fisher, mcnemar
+
+__all__ = ["Case", "Comparison", "Group", "TimeRow", "causes_of", "compared", "group_rows", "groups_of", "time_rows"]
+
+FALSE_CLAIM: Final = "FALSE CLAIM"
+PLAIN: Final = "as it is"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A run and what came of it."""
+
+    run: RunSpec
+    outcome: RunOutcome
+
+    @property
+    def false_claim(self) -> bool:
+        """The tree claims what the referee denies."""
+        return self.outcome.claimed and self.outcome.fulfilled is False
+
+    @property
+    def cause(self) -> str:
+        """Why it is no success; empty where it is one."""
+        if self.outcome.achieved:
+            return ""
+        return FALSE_CLAIM if self.false_claim else str(self.outcome.report.get("cause") or "ERROR")
+
+    @property
+    def why(self) -> str:
+        """The sentence that goes with the cause."""
+        referee = self.outcome.report.get("referee") or {}
+        return str(referee.get("why", "") if self.false_claim else self.outcome.report["message"])
+
+
+@dataclass(frozen=True)
+class Group:
+    """Runs that have something in common."""
+
+    dimension: str
+    name: str
+    runs: int
+    achieved: int
+    fulfilled: int
+    claimed: int
+    false_claims: int
+
+    @property
+    def rate(self) -> Rate:
+        """How many succeeded."""
+        return Rate(self.achieved, self.runs)
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """The counts by the keys of a sweep."""
+        return {
+            "successes": self.claimed,
+            "referee_successes": self.fulfilled,
+            "false_claims": self.false_claims,
+        }
+
+
+def groups_of(cases: Sequence[Case]) -> Sequence[Group]:
+    """All runs, then those of each mission, world, robot and value that is varied, where there are several."""
+    keyed: dict[tuple[str, str], list[Case]] = {("all", "all runs"): list(cases)}
+    for case in cases:
+        for key in _keys(case):
+            keyed.setdefault(key, []).append(case)
+    several = Counter(dimension for dimension, _ in keyed)
+    groups = (_group(*key, found) for key, found in keyed.items() if key[0] == "all" or several[key[0]] > 1)
+    order = {name: number for number, name in enumerate(dict.fromkeys(dimension for dimension, _ in keyed))}
+    return sorted(groups, key=lambda group: order[group.dimension])
+
+
+def _keys(case: Case) -> Iterator[tuple[str, str]]:
+    yield "mission", case.run.mission
+    yield "world", str(case.outcome.report.get("world") or case.run.world or "")
+    yield "robots", case.run.robot_words
+    yield from case.run.varied.items()
+    if len(case.run.varied) > 1:
+        yield "variation", case.run.variation_words
+
+
+def _group(dimension: str, name: str, cases: Iterable[Case]) -> Group:
+    found = list(cases)
+    return Group(
+        dimension,
+        name or PLAIN,
+        len(found),
+        sum(case.outcome.achieved for case in found),
+        sum(case.outcome.fulfilled is True for case in found),
+        sum(case.outcome.claimed for case in found),
+        sum(case.false_claim for case in found),
+    )
+
+
+def totals_of(cases: Sequence[Case]) -> Mapping[str, int]:
+    """The counts of all runs."""
+    return _group("all", "", cases).counts
+
+
+def group_rows(groups: Iterable[Group]) -> Iterator[tuple[str, ...]]:
+    """The table of groups as text."""
+    for group in groups:
+        low, high = group.rate.interval()
+        name = group.name if group.dimension == "all" else f"{group.dimension}: {group.name}"
+        success = f"{group.achieved} ({group.rate.value:.1%})"
+        yield name, str(group.runs), success, f"{low:.1%} to {high:.1%}", str(group.fulfilled), str(group.false_claims)
+
+
+@dataclass(frozen=True)
+class CauseRow:
+    """A cause, how often, and its most frequent sentences with their numbers."""
+
+    cause: str
+    runs: int
+    sentences: Sequence[tuple[str, int]]
+
+
+def causes_of(cases: Iterable[Case], *, most: int = 5) -> Sequence[CauseRow]:
+    """The causes of what failed, the most frequent first."""
+    why = defaultdict[str, Counter[str]](Counter)
+    for case in cases:
+        if case.cause:
+            why[case.cause][case.why] += 1
+    rows = [CauseRow(cause, found.total(), found.most_common(most)) for cause, found in why.items()]
+    return sorted(rows, key=lambda row: (-row.runs, row.cause))
+
+
+@dataclass(frozen=True)
+class TimeRow:
+    """A skill: in how many runs it ran, how long in all (s, on the robot's clock), and its share of all runs' time."""
+
+    skill: str
+    runs: int
+    total_s: float
+    share: float
+
+
+def time_rows(cases: Sequence[Case]) -> Sequence[TimeRow]:
+    """Where the time goes, the most first; the rest is what no skill took."""
+    total_s = sum(float(case.outcome.report["sim_time_s"]) for case in cases)
+    spent, runs = Counter[str](), Counter[str]()
+    for case in cases:
+        for skill, seconds in case.outcome.steps_s.items():
+            spent[skill] += seconds  # type: ignore[assignment]
+            runs[skill] += 1
+    return [
+        TimeRow(skill, runs[skill], seconds, seconds / max(total_s, 1e-9)) for skill, seconds in spent.most_common()
+    ]
+
+
+def mean_work(cases: Sequence[Case]) -> Sequence[tuple[str, float]]:
+    """The mean of each work counter, by name."""
+    work = Counter[str]()
+    for case in cases:
+        work.update(case.outcome.report.get("work", {}))
+    return [(name, count / max(1, len(cases))) for name, count in sorted(work.items())]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two results, `first` the new and `second` the other: success of each, and how likely chance alone is (p).
+
+    Of runs with one id in both, `only_first` and `only_second` succeeded in one of them alone (McNemar); where there is
+    none, all runs of each are compared (Fisher).
+    """
+
+    dimension: str
+    name: str
+    paired: bool
+    first: Rate
+    second: Rate
+    only_first: int
+    only_second: int
+    p: float
+
+
+def compared(first: Sequence[Case], second: Sequence[Case]) -> Sequence[Comparison]:
+    """Two results compared: in all, and by what the groups are by where both have it."""
+    other = {case.outcome.run_id: case for case in second}
+    pairs = [(case, other[case.outcome.run_id]) for case in first if case.outcome.run_id in other]
+    keys = [(group.dimension, group.name) for group in groups_of(first)]
+    return [found for key in keys if (found := _compared(key, first, second, pairs)) is not None]
+
+
+def _compared(
+    key: tuple[str, str], first: Sequence[Case], second: Sequence[Case], pairs: Sequence[tuple[Case, Case]]
+) -> Comparison | None:
+    if pairs:
+        mine = [(one, two) for one, two in pairs if _is_in(one, key)]
+        only_first = sum(one.outcome.achieved and not two.outcome.achieved for one, two in mine)
+        only_second = sum(two.outcome.achieved and not one.outcome.achieved for one, two in mine)
+        rates = (_rate(one for one, _ in mine), _rate(two for _, two in mine))
+        return Comparison(*key, True, *rates, only_first, only_second, mcnemar(only_first, only_second))
+    rates = (_rate(case for case in first if _is_in(case, key)), _rate(case for case in second if _is_in(case, key)))
+    if not rates[1].total:
+        return None
+    return Comparison(*key, False, *rates, 0, 0, fisher(*rates))
+
+
+def _is_in(case: Case, key: tuple[str, str]) -> bool:
+    return key[0] == "all" or key in {(dimension, name or PLAIN) for dimension, name in _keys(case)}
+
+
+def _rate(cases: Iterable[Case]) -> Rate:
+    found = [case.outcome.achieved for case in cases]
+    return Rate(sum(found), len(found))

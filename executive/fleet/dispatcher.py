@@ -1,0 +1,83 @@
+"""Which mission is whose: waiting, under way with one robot, over, or handed back for another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from executive.fleet.auction import Award, Bid, award
+
+__all__ = ["Dispatcher", "Round"]
+
+BidOf = Callable[[int, str], Bid]
+
+
+@dataclass(frozen=True)
+class Round:
+    """What one round of the auction brings: missions that begin now, and why nobody can do some others."""
+
+    begun: Sequence[Award]
+    refused: Mapping[int, str]
+
+
+class Dispatcher:
+    """Gives each mission to one robot at a time. No mission is given out again once it is over."""
+
+    def __init__(self, missions: Iterable[int], robots: Iterable[str]) -> None:
+        """`missions` are those to be done, in the order in which they came; `robots` those that are there."""
+        self._waiting: list[int] = list(dict.fromkeys(missions))
+        self._robots: list[str] = list(dict.fromkeys(robots))
+        self._under_way: dict[str, int] = {}
+
+    @property
+    def waiting(self) -> tuple[int, ...]:
+        """The missions that no robot has."""
+        return tuple(self._waiting)
+
+    @property
+    def under_way(self) -> Mapping[str, int]:
+        """The mission of each robot that has one."""
+        return dict(self._under_way)
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots that can be given work."""
+        return tuple(self._robots)
+
+    def assign(self, bid: BidOf) -> Round:
+        """One round of the auction, in which robots that are busy bid as well; `bid` is asked for each pair.
+
+        A mission that goes to a busy robot waits, and is put up again when any robot is free. Without a robot that
+        can be given work, nothing is refused.
+        """
+        if not self._waiting or all(robot in self._under_way for robot in self._robots):
+            return Round((), {})
+        bids = {mission: [bid(mission, robot) for robot in self._robots] for mission in self._waiting}
+        awards = award(one for each in bids.values() for one in each)
+        given = {each.mission for each in awards}
+        refused = {mission: _why(each) for mission, each in bids.items() if mission not in given}
+        begun = [each for each in awards if each.first and each.robot not in self._under_way]
+        for each in begun:
+            self._under_way[each.robot] = each.mission
+        gone = {each.mission for each in begun} | set(refused)
+        self._waiting = [mission for mission in self._waiting if mission not in gone]
+        return Round(begun, refused)
+
+    def over(self, robot: str) -> int:
+        """The robot's mission has come to its end; its number. Raises KeyError: it has none."""
+        return self._under_way.pop(robot)
+
+    def hand_back(self, robot: str) -> int:
+        """The robot's mission waits for another robot, before all others; its number. Raises KeyError: it has none."""
+        mission = self._under_way.pop(robot)
+        self._waiting.insert(0, mission)
+        return mission
+
+    def lose(self, robot: str) -> None:
+        """The robot can be given no work any more."""
+        self._robots = [each for each in self._robots if each != robot]
+
+
+def _why(bids: Sequence[Bid]) -> str:
+    """Why no robot can do a mission."""
+    return f"no robot can do it: {'; '.join(f'{bid.robot}: {bid.problems[0]}' for bid in bids)}"

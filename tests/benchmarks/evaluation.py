@@ -1,0 +1,129 @@
+"""Evaluation at scale, in figures. Run one of:
+
+python -m tests.benchmarks.evaluation report [--results 10000]     how long the report of so many results takes
+python -m tests.benchmarks.evaluation kill [--runs 200]            a Dask worker killed by SIGKILL: lost or doubled
+python -m tests.benchmarks.evaluation cluster [--runs 60]          2 workers against 1, and the overhead per mission
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import signal
+import tempfile
+import time
+from collections import Counter
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from executive.cli.evaluate_scenario import command_of
+from executive.cli.evaluation_run import run_one
+from executive.evaluation.cluster import local_cluster
+from executive.evaluation.outcome import Evidence, RunOutcome
+from executive.evaluation.page import EvaluationPage, to_page
+from executive.evaluation.results import ResultsFile
+from executive.evaluation.runs import Evaluation, RunSpec
+from executive.evaluation.summary import Case
+
+SHORT = "Hey Alice, go to the living room"
+
+
+def runs_of(count: int) -> tuple[RunSpec, ...]:
+    return tuple(RunSpec(SHORT, seed, sentence=SHORT, varied={"light": str(seed % 3)}) for seed in range(count))
+
+
+def made_outcome(run: RunSpec) -> RunOutcome:
+    """A made result; every tenth has failed and has a timeline and a picture."""
+    rng = random.Random(run.seed)
+    failed = run.seed % 10 == 0
+    report = {
+        **{"outcome": "failure" if failed else "success", "cause": "PLANNING" if failed else None},
+        **{"message": "no path" if failed else "done", "world": "flat", "seed": run.seed, "sim_time_s": 60.0},
+        **{"referee": {"success": not failed, "why": "so it is"}, "work": {"plant_steps": rng.randrange(9999)}},
+    }
+    picture = np.random.default_rng(run.seed).integers(0, 255, (240, 320, 3), dtype=np.uint8)
+    jpeg = cv2.imencode(".jpg", cv2.GaussianBlur(picture, (9, 9), 0), [cv2.IMWRITE_JPEG_QUALITY, 60])[1].tobytes()
+    lines = tuple((float(t), "alice/go", "RUNNING: on the way") for t in range(40))
+    evidence = Evidence(lines, (("hand camera", jpeg),)) if failed else Evidence()
+    return RunOutcome(run.id, report, {"navigate": 40.0, "detect": rng.uniform(1, 9)}, evidence, 1.0, "here:1")
+
+
+def report(count: int) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path, runs = Path(folder) / "r.sqlite", runs_of(count)
+        with ResultsFile(path, create=True) as kept:
+            kept.begin(Evaluation(Path("made.yaml"), runs), code="1")
+            for run in runs:
+                kept.add(made_outcome(run))
+        began = time.perf_counter()
+        with ResultsFile(path) as kept:
+            known = kept.runs()
+            cases = [Case(known[number], outcome) for number, outcome in kept.outcomes()]
+            page = EvaluationPage("made", (), cases, kept.evidence, lambda case: command_of(case.run), cases, "itself")
+            html = Path(folder) / "report.html"
+            html.write_text(to_page(page))
+        failed = sum(not case.outcome.achieved for case in cases)
+        print(f"{count} results ({failed} failures): {time.perf_counter() - began:.2f} s, {html.stat().st_size} bytes")
+
+
+def cheap(run: RunSpec) -> RunOutcome:
+    """A run that takes 0.05 s and tells in which process."""
+    time.sleep(0.05)
+    return replace(made_outcome(run), worker=str(os.getpid()))
+
+
+def kill(count: int) -> None:
+    """Kill two workers while they work, and count what the results file holds."""
+    found, landed, killed = Counter[str](), Counter[str](), list[str]()
+    with tempfile.TemporaryDirectory() as folder, local_cluster(2) as workers:
+        runs = runs_of(count)
+        with ResultsFile(Path(folder) / "r.sqlite", create=True) as kept:
+            kept.begin(Evaluation(Path("made.yaml"), runs), code="1")
+            for finished in workers.give_out(cheap, runs):
+                assert finished.result is not None
+                found[finished.item.id] += 1
+                landed[finished.item.id] += kept.add(finished.result)
+                if found.total() in (count // 4, count // 2):
+                    killed.append(finished.result.worker)
+                    os.kill(int(finished.result.worker), signal.SIGKILL)
+            lost, doubled = count - len(kept.done()), sum(number > 1 for number in (*found.values(), *landed.values()))
+    print(f"{count} runs, workers killed {len(killed)}: lost {lost}, doubled {doubled}")
+
+
+def cluster(count: int) -> None:
+    """The same runs by one worker and by two, each warmed by two missions."""
+    walls, digests = {}, {}
+    for number in (1, 2):
+        with local_cluster(number) as workers:
+            list(workers.give_out(run_one, runs_of(2 * number)))
+            began = time.perf_counter()
+            outcomes = [one.result for one in workers.give_out(run_one, runs_of(count)) if one.result is not None]
+            walls[number] = time.perf_counter() - began
+            digests[number] = {outcome.run_id: outcome.digest for outcome in outcomes}
+            spent = sum(outcome.spent_s for outcome in outcomes)
+            overhead = number * walls[number] / spent - 1.0
+            print(f"{number} workers: {walls[number]:.1f} s for {len(outcomes)} runs, dispatch {overhead:.2%}")
+    print(f"2 against 1: {walls[1] / walls[2]:.2f} x; equal results: {digests[1] == digests[2]}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("report", "kill", "cluster"))
+    parser.add_argument("--results", type=int, default=10_000)
+    parser.add_argument("--runs", type=int)
+    options = parser.parse_args()
+    chosen = {
+        "report": partial(report, options.results),
+        "kill": partial(kill, options.runs or 200),
+        "cluster": partial(cluster, options.runs or 60),
+    }
+    chosen[options.what]()
+
+
+if __name__ == "__main__":
+    main()

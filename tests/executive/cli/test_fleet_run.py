@@ -1,0 +1,154 @@
+"""A fleet's run with scripted robots: who does what, and what becomes of the mission of a robot that dies."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from executive.cli import fleet_missions, fleet_run
+from executive.cli.fleet_missions import FleetMission
+from executive.cli.fleet_run import FleetDispatch, run_fleet, told
+from executive.cli.requests import Prepared
+from executive.fleet.auction import Bid
+from executive.mission.command import parse_command
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
+from executive.mission.request import Request
+from executive.run.runner import RunEntry
+from executive.store.given import GivenMissions
+from executive.store.missions import MissionStore
+from executive.tree.compiler import compile_mission
+from skills.api import Running, Succeeded
+from skills.faults.faulty_robot import with_faults
+from skills.robot import Pose2D
+
+KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
+BEDROOM = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
+TAKE = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
+PUT = "Take [coke] to [bedroom] and do [Nothing] to [Nothing]"
+START = Pose2D(0.0, 0.0, 0.0)
+ROBOTS = ("Alice", "Bob")
+
+
+class Fleet:
+    """Scripted robots with a store, an auction in which Alice is a little faster, and faults by robot."""
+
+    def __init__(self, store, clock, knowledge, registry, make, script, monkeypatch, out):
+        self.script = script
+        self.store, self.clock, self.knowledge, self.registry, self.out = store, clock, knowledge, registry, out
+        self.robots = {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
+        self.faults, self.make, self.missions, self.judged = {}, make, {}, []
+        monkeypatch.setattr(fleet_run, "entry_for", lambda prepared, backend, durable, work: self._entry(prepared))
+        monkeypatch.setattr(fleet_run, "bid_for", self._bid)
+        monkeypatch.setattr(fleet_missions, "prepared_for", lambda r, mission, *_: self._prepared(r, mission))
+
+    def _entry(self, prepared):
+        name = prepared.tree.robot_name
+        robot = with_faults(self.robots[name], self.clock, self.faults.get(name, ()), since_s=0.0)
+        return RunEntry(prepared.tree, robot, self.make.StillLocaliser(), self.make.EmptyCostmap())
+
+    def _bid(self, mission, name, now):
+        return Bid(mission.stored.id, name, 0.0, 1.0 + 0.5 * ROBOTS.index(name))
+
+    def _prepared(self, request, mission):
+        tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
+        world = SimpleNamespace(name="scripted")
+        return Prepared(request, mission, world, self.knowledge, tree)
+
+    def queue(self, *lines):
+        request = Request(commands=lines, name="work", world_name="scripted")
+        stored = self.store.add(request, queued=True)
+        step = MissionStep(tuple(map(parse_command, lines)))
+        missions = {name: Mission("work", DEFAULT_WORLD, name, (step,)) for name in ROBOTS}
+        options = {name: self._prepared(request, mission) for name, mission in missions.items()}
+        self.missions[stored.id] = FleetMission(stored, options)
+
+    def judge(self, tree, result):
+        self.judged.append((tree.robot_name, result.outcome.value))
+
+    def run(self):
+        placed = {name: SimpleNamespace(start=START) for name in ROBOTS}
+        run_fleet(FleetDispatch(self.store, dict(self.missions), placed, self), out=self.out, seed=3)
+        rows = told(self.store, list(self.missions))
+        return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
+
+    def hold(self, skill):
+        self.robots[skill.context.robot.name].holding = True
+        return Succeeded("held", {"tried": (*skill.inputs.avoid, 1)})
+
+    def put_down(self, skill):
+        self.robots[skill.context.robot.name].let_go()
+        return Succeeded("placed")
+
+    def die_once_after(self, name, skill):
+        """The way to a place is the last that a robot does when one has done what `name` says."""
+        robot = self.robots[skill.context.robot.name]
+        if name in self.script.begun and not any(each.raising for each in self.robots.values()):
+            robot.raising["odometry"] = ConnectionError("no answer")
+            return Running("goes on")
+        return Succeeded("there")
+
+    def message(self, number):
+        return self.store.mission(number).message
+
+
+@pytest.fixture
+def fleet(tmp_path, clock, knowledge, registry, make, script, monkeypatch):
+    with MissionStore(tmp_path / "missions.sqlite") as store:
+        yield Fleet(store, clock, knowledge, registry, make, script, monkeypatch, tmp_path / "out")
+
+
+def test_three_missions_are_done_by_two_robots(fleet, script):
+    for line in (KITCHEN, BEDROOM, KITCHEN):
+        fleet.queue(line)
+    assert fleet.run() == [("Alice", "success", 0), ("Bob", "success", 0), ("Alice", "success", 0)]
+    assert script.begun == ["navigate"] * 3
+    assert sorted(fleet.judged) == [("Alice", "success"), ("Alice", "success"), ("Bob", "success")]
+    assert [robot.holder for robot in fleet.robots.values()] == [None, None]
+
+
+def test_the_mission_of_a_robot_that_dies_is_done_by_the_other(fleet, script):
+    fleet.queue(KITCHEN)
+    fleet.queue(BEDROOM)
+    fleet.faults["Alice"] = ["robot dies at 0.08 s"]
+    assert fleet.run() == [("Bob", "success", 1), ("Bob", "success", 0)]
+    assert script.begun == ["navigate"] * 3
+
+
+def test_commands_that_are_done_are_not_done_again_by_the_other(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT, KITCHEN)
+    script.ends["grasp"], script.ends["place"] = fleet.hold, fleet.put_down
+    script.ends["navigate"] = lambda skill: fleet.die_once_after("place", skill)
+    assert fleet.run() == [("Bob", "success", 1)]
+    assert (script.begun.count("grasp"), script.begun.count("place")) == (1, 1)
+    assert (fleet.robots["Alice"].holding, fleet.robots["Bob"].calls.count("drive")) == (False, script.steps)
+
+
+def test_what_is_in_the_gripper_of_a_robot_that_dies_is_told_and_not_fetched_again(fleet, script, registry):
+    registry["grasp"].changes_world = True
+    script.ends["grasp"] = fleet.hold
+    script.ends["navigate"] = lambda skill: fleet.die_once_after("grasp", skill)
+    fleet.queue(TAKE, PUT)
+    assert fleet.run() == [("Alice", "error", 0)]
+    assert script.begun.count("grasp") == 1
+    assert fleet.message(1).endswith("; the coke is in Alice's gripper")
+
+
+def test_without_another_robot_the_mission_is_told_as_failed_and_what_had_not_begun_stays_queued(fleet):
+    for line in (KITCHEN, BEDROOM, KITCHEN):
+        fleet.queue(line)
+    fleet.faults = {"Alice": ["robot dies at 0.08 s"], "Bob": ["robot dies at 0.08 s"]}
+    assert [outcome for _, outcome, _ in fleet.run()] == ["failure", "error", "queued"]
+
+
+def test_a_robot_whose_lease_is_anothers_is_left_out(fleet):
+    fleet.queue(KITCHEN)
+    fleet.robots["Alice"].holder = "the tablet"
+    assert fleet.run() == [("Bob", "success", 1)]
+
+
+def test_whose_each_mission_is_stands_in_the_store(fleet):
+    fleet.queue(KITCHEN)
+    fleet.run()
+    given = GivenMissions(fleet.store).all()[1]
+    assert (given.robot, given.done, given.blocked) == ("Alice", 1, None)

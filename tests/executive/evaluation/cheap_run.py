@@ -1,0 +1,31 @@
+"""A run function for tests: it takes no time, and some of them die."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+
+def square(number: int) -> int:
+    return number * number
+
+
+def slow_square(number: int) -> int:
+    time.sleep(0.05)
+    return number * number
+
+
+def square_or_die(item: tuple[int, str]) -> int:
+    """Dies by SIGKILL the first time that it has a number divisible by 10."""
+    number, folder = item
+    mark = Path(folder) / str(number)
+    if number % 10 == 0 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number * number
+
+
+def always_die(number: int) -> int:
+    if number == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number

@@ -126,6 +126,10 @@ class GivingWay:
         """Tell that the robot stays where it is for now."""
         self._traffic.announce(np.array([[pose.x_m, pose.y_m, pose.yaw_rad]]), footprint.discs)
 
+    def wish(self, pose: Pose2D, goal: Pose2D, footprint: Footprint) -> None:
+        """Reserve the goal while there is no way to it, so that one who stands on it and comes later steps aside."""
+        self._traffic.announce(pose_array([pose, goal]), footprint.discs)
+
     def others(self) -> Sequence[Neighbour]:
         """All others that were heard of lately."""
         return self._traffic.others()

@@ -321,6 +321,7 @@ class Navigate(Skill[NavigateInputs]):
         if not recently or now_s - self._neighbour_since_s >= self.options.giving_way.blocked_patience_s:
             return False
         self._obstacle = self._obstacle or (self._goal.x_m, self._goal.y_m)
+        self._giving.wish(self.context.pose(), self._goal, self._footprint)
         if isinstance(costmap, ForgettingCostmap):
             costmap.forget_seen()
         return True

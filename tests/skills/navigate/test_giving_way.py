@@ -124,3 +124,15 @@ def test_a_robot_in_a_reserved_way_finds_a_place_off_it() -> None:
     assert not giving.stands_in_way(Pose2D(0.0, 0.0, 0.0), footprint)
     place = giving.waiting_place(Open(), footprint, Pose2D(3.0, 0.0, 0.0))
     assert place is not None and not giving.stands_in_way(place, footprint)
+
+
+def test_a_goal_that_is_wished_for_is_reserved() -> None:
+    """Alice wants to (6, 0), where Bob stands: he stands in her way, and not at (9, 0)."""
+    table = TrafficTable({"alice": FOOTPRINT.discs, "bob": FOOTPRINT.discs}, lambda: 0.0)
+    table.heard("alice", Pose2D(0.0, 0.0, 0.0))
+    table.heard("bob", Pose2D(6.0, 0.0, 0.0))
+    views = [SimpleNamespace(traffic=table.view_of(name), clock=None) for name in ("alice", "bob")]
+    alice, bob = (GivingWay(cast(SkillContext, view), GivingWayOptions()) for view in views)
+    alice.wish(Pose2D(0.0, 0.0, 0.0), Pose2D(6.0, 0.0, 0.0), FOOTPRINT)
+    assert bob.stands_in_way(Pose2D(6.0, 0.0, 0.0), FOOTPRINT)
+    assert not bob.stands_in_way(Pose2D(9.0, 0.0, 0.0), FOOTPRINT)

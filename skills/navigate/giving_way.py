@@ -33,15 +33,15 @@ _BODY_M = 0.6
 class GivingWayOptions:
     """Distances are between outlines (m), times on the robot's clock (s).
 
-    A way that comes within `apart_m` of one that is reserved waits for it, `short_m` before. Who goes first stops
-    `room_m` before one who makes way, for `patience_s` at most. A waiting place lies `aside_m` off reserved ways, and
-    within `reach_m`; the way on is looked for every `again_s`.
+    A way that comes within `apart_m` of one that is reserved waits for it, `short_m` before. Who goes first waits for
+    one who stands within `room_m` of the next `room_look_m` of its way, for `patience_s` at most. A waiting place lies
+    `aside_m` off reserved ways, and within `reach_m`; the way on is looked for every `again_s`.
     """
 
     apart_m: Margin = 0.15
     short_m: Length = 0.25
     look_m: Length = 3.0
-    room_m: Margin = 0.35
+    room_m: Margin = 0.12
     room_look_m: Length = 0.9
     patience_s: Delay = 20.0
     blocked_patience_s: Delay = 60.0
@@ -125,6 +125,10 @@ class GivingWay:
     def stand(self, pose: Pose2D, footprint: Footprint) -> None:
         """Tell that the robot stays where it is for now."""
         self._traffic.announce(np.array([[pose.x_m, pose.y_m, pose.yaw_rad]]), footprint.discs)
+
+    def wish(self, pose: Pose2D, goal: Pose2D, footprint: Footprint) -> None:
+        """Reserve the goal while there is no way to it, so that one who stands on it and comes later steps aside."""
+        self._traffic.announce(pose_array([pose, goal]), footprint.discs)
 
     def others(self) -> Sequence[Neighbour]:
         """All others that were heard of lately."""

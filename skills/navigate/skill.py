@@ -275,7 +275,7 @@ class Navigate(Skill[NavigateInputs]):
             self._room_m = self.options.space.least_room_m
             self._phase = self._planning
             return None
-        self._replans += not (self._people_may_go() or self._neighbour_may_go())
+        self._replans += not (self._neighbour_may_go() or self._people_may_go())
         if self._obstacle is None or self._replans >= self.options.replans:
             who = self._giving.name_at(self._obstacle) or "something seen"
             seen = f" The way is blocked by {who} at {_xy(self._obstacle)}." if self._obstacle else ""
@@ -321,6 +321,7 @@ class Navigate(Skill[NavigateInputs]):
         if not recently or now_s - self._neighbour_since_s >= self.options.giving_way.blocked_patience_s:
             return False
         self._obstacle = self._obstacle or (self._goal.x_m, self._goal.y_m)
+        self._giving.wish(self.context.pose(), self._goal, self._footprint)
         if isinstance(costmap, ForgettingCostmap):
             costmap.forget_seen()
         return True

@@ -2,8 +2,8 @@
 
     python -m tests.benchmarks.traffic [--what door,missions] [--first 0] [--count 5] [--out FOLDER]
 
-`door`: Alice goes from the living room to the kitchen of the flat while Bob comes the other way, so that they meet in
-a door that one fits through; their starts are drawn from the case's number. `missions`: each has a mission of its own.
+`door`: Alice goes through a door of the flat that one fits through while Bob comes the other way, from living room to
+kitchen or hall to bedroom; their starts are drawn from the case's number. `missions`: each has a mission of its own.
 Reported are how many runs ended with both fulfilled by the referee, contacts between the two, all collisions, and
 deadlocks: runs that stood still for 60 s, or ran out of time.
 """
@@ -32,13 +32,20 @@ from skills.robot import Pose2D
 STILL_S, MOVED_M = 60.0, 0.1
 TIME_LIMIT_S = 240.0
 SENTENCES = {
-    "door": (("flat", "Alice, go to the kitchen, and Bob, go to the living room"),),
+    "door": (
+        ("flat", "Alice, go to the kitchen, and Bob, go to the living room"),
+        ("flat", "Alice, go to the bedroom, and Bob, go to the hall"),
+    ),
     "missions": (
         ("flat", "Alice, go to the bedroom, and Bob, go to the kitchen"),
         ("flat", "Alice, bring me a beer, and Bob, go to the bedroom"),
     ),
 }
-DOOR_STARTS = {"alice": Pose2D(9.0, 4.0, math.pi / 2.0), "bob": Pose2D(9.0, 6.8, -math.pi / 2.0)}
+DOOR_STARTS = (
+    {"alice": Pose2D(9.0, 4.0, math.pi / 2.0), "bob": Pose2D(9.0, 6.8, -math.pi / 2.0)},
+    {"alice": Pose2D(3.3, 4.5, -math.pi / 2.0), "bob": Pose2D(3.0, 2.7, math.pi / 2.0)},
+)
+JITTER = ((0.4, 0.3, 0.4), (0.3, 0.05, 0.4))
 
 
 @dataclass
@@ -113,9 +120,10 @@ def _start(what: str, name: str, number: int) -> Pose2D | None:
     if what != "door":
         return None
     rng = np.random.default_rng([number, len(name)])
-    x, y, yaw = DOOR_STARTS[name].x_m, DOOR_STARTS[name].y_m, DOOR_STARTS[name].yaw_rad
-    off = rng.uniform(-1.0, 1.0, 3) * (0.4, 0.3, 0.4)
-    return Pose2D(x + off[0], y + off[1], yaw + off[2])
+    side = number % len(DOOR_STARTS)
+    start = DOOR_STARTS[side][name]
+    off = rng.uniform(-1.0, 1.0, 3) * JITTER[side]
+    return Pose2D(start.x_m + off[0], start.y_m + off[1], start.yaw_rad + off[2])
 
 
 def summary(results: Sequence[Result]) -> dict[str, object]:

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
-from skills.api import LocalisationEstimate
-from skills.navigate.giving_way import first_that_suits, reachable, with_bodies
+from executive.run.traffic import TrafficTable
+from skills.api import LocalisationEstimate, SkillContext
+from skills.navigate.footprint import Footprint
+from skills.navigate.giving_way import GivingWay, GivingWayOptions, first_that_suits, reachable, with_bodies
 from skills.robot import FloatArray, Pose2D, Robot
+from skills.stack import LocalController
 
+FOOTPRINT = Footprint.rectangle([(-0.55, -0.25), (0.55, -0.25), (0.55, 0.25), (-0.55, 0.25)])
 DISCS = np.array([[0.2, 0.0, 0.3], [-0.2, 0.0, 0.3]])
 
 
@@ -73,3 +79,60 @@ def test_the_first_place_that_suits_is_taken() -> None:
     found = first_that_suits(cells, lambda row, column: Pose2D(column, row, 0.0) if row else None)
     assert found == Pose2D(3, 3, 0.0)
     assert first_that_suits(cells, lambda row, column: None) is None
+
+
+class StraightOn:
+    """A controller whose path leads straight on along x from a place."""
+
+    length_m = 4.0
+
+    def __init__(self, x_m: float, y_m: float) -> None:
+        self._poses = np.column_stack([np.arange(x_m, x_m + 4.0, 0.05), np.full(80, y_m), np.zeros(80)])
+
+    def ahead(self, way_m: float) -> FloatArray:
+        """The poses of the path, so far on."""
+        return self._poses[: int(min(len(self._poses), way_m / 0.05))]
+
+
+def among(name: str) -> tuple[GivingWay, Footprint]:
+    """One of two robots, alice's claim being older: she goes from (3, -2) to (3, 2), across x = 3."""
+    table = TrafficTable({"alice": FOOTPRINT.discs, "bob": FOOTPRINT.discs}, lambda: 0.0)
+    table.heard("alice", Pose2D(3.0, -2.0, np.pi / 2.0))
+    table.heard("bob", Pose2D(0.0, 0.0, 0.0))
+    table.claim("alice")
+    y = np.arange(-2.0, 2.0, 0.05)
+    table.announce("alice", np.column_stack([np.full(80, 3.0), y, np.full(80, np.pi / 2.0)]), FOOTPRINT.discs)
+    context = SimpleNamespace(traffic=table.view_of(name), clock=SimpleNamespace(now=lambda: 0.0))
+    return GivingWay(cast(SkillContext, context), GivingWayOptions()), FOOTPRINT
+
+
+def test_a_robot_stops_short_of_a_way_that_is_reserved() -> None:
+    """Bob, 0.55 m long to the front, meets a way 0.25 m to each side of x = 3 at about 2.05 m, and names who has it."""
+    giving, footprint = among("bob")
+    found = giving.conflict_m(cast(LocalController, StraightOn(0.0, 0.0)), footprint)
+    assert found is not None and found[1] == "alice"
+    assert found[0] == pytest.approx(2.05, abs=0.12)
+    assert giving.conflict_m(cast(LocalController, StraightOn(0.0, 4.0)), footprint) is None
+
+
+def test_a_robot_in_a_reserved_way_finds_a_place_off_it() -> None:
+    """| stands at | in the way | its waiting place |
+    | (3, 0) | yes | at least 0.25 m off the way |
+    | (0, 0) | no | - |"""
+    giving, footprint = among("bob")
+    assert giving.stands_in_way(Pose2D(3.0, 0.0, 0.0), footprint)
+    assert not giving.stands_in_way(Pose2D(0.0, 0.0, 0.0), footprint)
+    place = giving.waiting_place(Open(), footprint, Pose2D(3.0, 0.0, 0.0))
+    assert place is not None and not giving.stands_in_way(place, footprint)
+
+
+def test_a_goal_that_is_wished_for_is_reserved() -> None:
+    """Alice wants to (6, 0), where Bob stands: he stands in her way, and not at (9, 0)."""
+    table = TrafficTable({"alice": FOOTPRINT.discs, "bob": FOOTPRINT.discs}, lambda: 0.0)
+    table.heard("alice", Pose2D(0.0, 0.0, 0.0))
+    table.heard("bob", Pose2D(6.0, 0.0, 0.0))
+    views = [SimpleNamespace(traffic=table.view_of(name), clock=None) for name in ("alice", "bob")]
+    alice, bob = (GivingWay(cast(SkillContext, view), GivingWayOptions()) for view in views)
+    alice.wish(Pose2D(0.0, 0.0, 0.0), Pose2D(6.0, 0.0, 0.0), FOOTPRINT)
+    assert bob.stands_in_way(Pose2D(6.0, 0.0, 0.0), FOOTPRINT)
+    assert not bob.stands_in_way(Pose2D(9.0, 0.0, 0.0), FOOTPRINT)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -28,7 +28,7 @@ from executive.tree.compiler import CompiledTree, compile_mission
 from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
 from skills.robot import Pose2D
 
-__all__ = ["Prepared", "fingerprint", "prepare", "prepared_for", "replacing"]
+__all__ = ["Prepared", "filed", "fingerprint", "prepare", "prepared_for", "replacing", "world_of_file"]
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def prepare(
         return prepare_several(request, ask=ask)
     if request.file is not None:
         file = mission_file(request.file)
-        return _filed(replace(request, file=file), file, ask)
+        return filed(replace(request, file=file), file, ask)
     world, knowledge = _standing(request, open_world(request.world or request.world_name or DEFAULT_WORLD))
     if request.sentence is None:
         return prepared_for(request, _commanded(request, world), world, knowledge)
@@ -102,11 +102,20 @@ def prepare(
     return prepared_for(replace(request, sentence=meant.text, require_wake=wake), mission, world, knowledge, meant)
 
 
-def _filed(request: Request, file: Path, ask: Answerer | None) -> Prepared:
-    """That of a mission file; the request's world stands in for the file's own."""
+Standing = Callable[[Request, World], tuple[World, Knowledge]]
+"""A world and what is known of it, with the robot where a request has it."""
+
+
+def world_of_file(request: Request, file: Path) -> World:
+    """The world of a mission file; the request's stands in for the file's own. Raises InputError."""
+    return open_world(request.world) if request.world is not None else _own_world(load_mission(file, request.given))
+
+
+def filed(request: Request, file: Path, ask: Answerer | None, standing: Standing | None = None) -> Prepared:
+    """What a mission file asks of the robot that knows what `standing` gives. Raises InputError."""
     loaded = load_mission(file, request.given)
     world = open_world(request.world) if request.world is not None else _own_world(loaded)
-    world, knowledge = _standing(request, world)
+    world, knowledge = (standing or _standing)(request, world)
     knowledge = overridden(loaded, knowledge)
     answer = answerer(request.answers, request.questions or loaded.questions, ask)
     mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from executive.cli.answers import answerer
-from executive.cli.requests import Prepared, prepared_for
+from executive.cli.missions_command import mission_file
+from executive.cli.requests import Prepared, Standing, filed, prepared_for, world_of_file
 from executive.cli.starts import PlacedRobot, knowledge_for, placed_robots
 from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Status, Understanding, load_parser
@@ -29,8 +31,10 @@ def prepare_several(request: Request, *, ask: Answerer | None) -> Prepared:
     Raises:
         InputError: the sentence is not understood, the robots do not fit into the world, or none can do it.
     """
+    if request.file is not None:
+        return _filed(request, mission_file(request.file), ask)
     if request.sentence is None:
-        raise InputError("several robots are given a sentence", hint='try: --say "Hey Bob, ..."')
+        raise InputError("robots are given a mission file or --say", hint='try: --say "Hey Bob, ..."')
     world = open_world(request.world or request.world_name or DEFAULT_WORLD)
     knowledge = knowledge_of(world)
     robots = placed_robots(world, knowledge, request.robots)
@@ -77,12 +81,17 @@ def _soonest(
     meant: Understanding, request: Request, world: World, knowledge: Knowledge, robots: Mapping[str, PlacedRobot]
 ) -> str:
     """The robot that can do it and is done first, by the estimate. Raises InputError: none can."""
+    return _first_done({name: prepared_part(name, [meant], request, world, knowledge, robots) for name in robots})
+
+
+def _first_done(able: Mapping[str, Prepared]) -> str:
+    """The robot that can do its mission and is done first, by the estimate. Raises InputError: none can."""
     from executive.cli.feasibility import check_prepared
 
     bids: dict[str, float] = {}
     reasons: list[str] = []
-    for name in robots:
-        checked = check_prepared(prepared_part(name, [meant], request, world, knowledge, robots))
+    for name, prepared in able.items():
+        checked = check_prepared(prepared)
         if checked.errors:
             reasons.append(f"{name}: {checked.errors[0].message}")
         else:
@@ -90,6 +99,26 @@ def _soonest(
     if not bids:
         raise InputError(f"no robot can do it: {'; '.join(reasons)}")
     return min(bids, key=lambda name: bids[name])
+
+
+def _filed(request: Request, file: Path, ask: Answerer | None) -> Prepared:
+    """A mission file, done by the robot that can do it and is done first. Raises InputError: none can."""
+    asked = replace(request, file=file)
+    world = world_of_file(asked, file)
+    robots = placed_robots(world, knowledge_of(world), request.robots)
+
+    def standing_of(name: str) -> Standing:
+        robot = robots[name]
+        return lambda _, own: (
+            replace(own, start=robot.start, dock=robot.dock),
+            knowledge_for(name, robot, robots, knowledge_of(own)),
+        )
+
+    able = {
+        name: replace(filed(asked, file, ask, standing_of(name)), kind=robot.kind, robots=robots)
+        for name, robot in robots.items()
+    }
+    return able[next(iter(able)) if len(able) == 1 else _first_done(able)]
 
 
 def prepared_part(

@@ -67,6 +67,14 @@ def test_one_who_needs_what_another_brings_begins_when_that_one_is_done():
     assert waits == {"Alice": (), "Bob": ("Alice",)}
 
 
+def test_a_mission_file_goes_to_the_robot_that_is_done_first(tmp_path):
+    file = tmp_path / "go.yaml"
+    file.write_text("name: go\nsteps:\n  - to: office\n", encoding="utf-8")
+    robots = {**TWO, "bob": RobotSetup("fetch", start=asked_pose())}
+    prepared = prepare(Request(file=file, robots=robots), ask=None)
+    assert (prepared.mission.robot_name, prepared.kind) == ("Bob", "fetch")
+
+
 def test_a_sentence_to_a_robot_that_is_not_there_is_refused():
     with pytest.raises(InputError, match="Carl"):
         asked("Hey Carl, go to the kitchen")

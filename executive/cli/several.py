@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from executive.cli.answers import answerer
@@ -146,10 +147,12 @@ def _waits(parts: Sequence[Part], robots: Mapping[str, PlacedRobot]) -> Mapping[
         first = {str(parts[number].robot) for number in part.after if parts[number].robot in robots}
         if isinstance(part.robot, str):
             waits.setdefault(part.robot, set()).update(first - {part.robot})
-    for name, first in waits.items():
-        if mutual := [other for other in first if name in waits.get(other, ())]:
-            what = f"{name} and {mutual[0]} would wait for each other"
-            raise InputError(what, hint="give the last part when the first is done")
+    try:
+        TopologicalSorter(waits).prepare()
+    except CycleError as error:
+        ring = " and ".join(sorted(set(error.args[1])))
+        hint = "give the last part when the first is done"
+        raise InputError(f"{ring} would wait for each other", hint=hint) from error
     return {name: tuple(sorted(first)) for name, first in waits.items() if first}
 
 

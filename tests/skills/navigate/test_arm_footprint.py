@@ -25,7 +25,10 @@ PLAIN = Footprint.of(CAPABILITIES)
 LEFT_ROOM, RIGHT_ROOM = Pose2D(1.5, 2.0, 0.0), Pose2D(8.5, 2.0, -1.57)
 AHEAD = MODEL.inverse(RigidTransform(RotationMatrix(), [0.85, 0.0, 0.3]))[0]
 CARRYING = carry_configuration(
-    ArmScene(CAPABILITIES, MODEL, {}), RollPitchYaw(0.0, 0.8, 0.0).ToRotationMatrix(), MODEL.stowed_rad
+    ArmScene(CAPABILITIES, MODEL, {}),
+    CAPABILITIES.arm,
+    RollPitchYaw(0.0, 0.8, 0.0).ToRotationMatrix(),
+    MODEL.stowed_rad,
 )
 
 

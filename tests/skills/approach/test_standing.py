@@ -34,7 +34,9 @@ def _grasp_cost(X_WB, seen):
 
 
 def _poses(reach_cost=lambda pose: 0.0):
-    return reachable(free_places((2.15, 0.0), Pose2D(0.5, 0.3, 0.0), _Table(), Footprint.of(CAPABILITIES)), reach_cost)
+    distances_m, here = CAPABILITIES.arm.standing_m, Pose2D(0.5, 0.3, 0.0)
+    free = free_places((2.15, 0.0), here, _Table(), Footprint.of(CAPABILITIES), distances_m, distances_m[0])
+    return reachable(free, reach_cost)
 
 
 def test_the_body_keeps_off_the_table_and_faces_the_thing():
@@ -73,7 +75,7 @@ def test_a_can_is_within_reach_from_the_best_place_but_not_from_afar():
     ],
 )
 def test_standing_well_already(pose, comfortable):
-    assert is_comfortable(pose, (2.15, 0.0)) is comfortable
+    assert is_comfortable(pose, (2.15, 0.0), CAPABILITIES.arm) is comfortable
 
 
 def test_an_observation_keeps_its_axes_when_the_body_is_turned():

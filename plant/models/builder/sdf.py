@@ -51,7 +51,7 @@ def _inertial(mass: MassProperties | None) -> str:
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     values = mass.inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
     places = 9 if min(mass.inertia.diagonal()) >= _SMALL_KG_M2 else 14
-    moments = "".join(f"<{name}>{value:.{places}f}</{name}>" for name, value in zip(names, values, strict=True))
+    moments = "".join(f"<{name}>{value:z.{places}f}</{name}>" for name, value in zip(names, values, strict=True))
     return f"""      <inertial>
         <pose>{com} 0 0 0</pose>
         <mass>{number(mass.mass_kg)}</mass>

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from executive.cli.answers import answerer
 from executive.cli.durable import as_it_was
 from executive.cli.feasibility import check_prepared
 from executive.cli.requests import Prepared, prepare, prepared_for
-from executive.cli.several import prepared_part
+from executive.cli.several import prepared_part, understood_for_robots
 from executive.cli.starts import PlacedRobot, knowledge_for
 from executive.fleet.auction import Bid
-from executive.language import Status, load_parser
-from executive.language.robots import Part, Whom, understand_for_robots_asking
+from executive.language.robots import Part, Whom
 from executive.mission.errors import InputError
 from executive.mission.file.model import Mission
 from executive.mission.knowledge import Knowledge
@@ -75,16 +73,7 @@ def _options(
         hint = f"run those of {request.world_name} in a run of their own"
         raise InputError(f"it is for the world {request.world_name}, and this run is in {world.name}", hint=hint)
     if request.sentence is not None:
-        meant = understand_for_robots_asking(
-            request.sentence,
-            answer=answerer(request.answers, request.questions, None),
-            robots=tuple(robots),
-            parser=load_parser(),
-            knowledge=knowledge,
-            require_wake=bool(request.require_wake),
-        )
-        if meant.status is not Status.OK:
-            raise InputError(meant.reason or "the sentence was not understood")
+        meant = understood_for_robots(request, robots, knowledge, None)
         meanings = [part.meaning for part in meant.parts]
         named = _named(meant.parts, robots)
         return {name: prepared_part(name, meanings, request, world, knowledge, robots) for name in named}

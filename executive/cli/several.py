@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -14,7 +14,7 @@ from executive.cli.starts import PlacedRobot, knowledge_for, placed_robots
 from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Status, Understanding, load_parser
 from executive.language.questions import Answerer
-from executive.language.robots import Part, Whom, understand_for_robots_asking
+from executive.language.robots import Addressed, Part, Whom, understand_for_robots_asking
 from executive.mission.errors import InputError
 from executive.mission.file.model import DEFAULT_WORLD, Mission
 from executive.mission.knowledge import Knowledge
@@ -23,7 +23,7 @@ from executive.mission.request import Request
 from plant.worlds.world import World
 from skills.robot import Pose2D
 
-__all__ = ["prepare_several", "prepared_part"]
+__all__ = ["prepare_several", "prepared_part", "understood_for_robots"]
 
 
 def prepare_several(request: Request, *, ask: Answerer | None) -> Prepared:
@@ -39,16 +39,7 @@ def prepare_several(request: Request, *, ask: Answerer | None) -> Prepared:
     world = open_world(request.world or request.world_name or DEFAULT_WORLD)
     knowledge = knowledge_of(world)
     robots = placed_robots(world, knowledge, request.robots)
-    meant = understand_for_robots_asking(
-        request.sentence,
-        answer=answerer(request.answers, request.questions, ask),
-        robots=tuple(robots),
-        parser=load_parser(),
-        knowledge=knowledge,
-        require_wake=bool(request.require_wake),
-    )
-    if meant.status is not Status.OK:
-        raise InputError(meant.reason or "the sentence was not understood")
+    meant = understood_for_robots(request, robots, knowledge, ask)
     request = replace(request, sentence=meant.text)
     parts = [part for each in meant.parts for part in _expanded(each, request, world, knowledge, robots)]
     waits = _waits(meant.parts, robots)
@@ -100,6 +91,23 @@ def _first_done(able: Mapping[str, Prepared]) -> str:
     if not bids:
         raise InputError(f"no robot can do it: {'; '.join(reasons)}")
     return min(bids, key=lambda name: bids[name])
+
+
+def understood_for_robots(
+    request: Request, robots: Collection[str], knowledge: Knowledge, ask: Answerer | None
+) -> Addressed:
+    """What a request's sentence asks of each robot. Raises InputError: it is not understood."""
+    meant = understand_for_robots_asking(
+        request.sentence or "",
+        answer=answerer(request.answers, request.questions, ask),
+        robots=tuple(robots),
+        parser=load_parser(),
+        knowledge=knowledge,
+        require_wake=bool(request.require_wake),
+    )
+    if meant.status is not Status.OK:
+        raise InputError(meant.reason or "the sentence was not understood")
+    return meant
 
 
 def _filed(request: Request, file: Path, ask: Answerer | None) -> Prepared:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 from plant.control.commands import CommandTable, Part
+from plant.control.gripper import GripperGoal, GripperServo
 from plant.control.leases import LeaseManager
 from plant.sensors.suite import SensorSuite
 from skills.robot import (
@@ -14,6 +15,7 @@ from skills.robot import (
     CommandState,
     CommandStatus,
     Gripper,
+    GripperKind,
     Image,
     Imu,
     Joints,
@@ -25,6 +27,8 @@ from skills.robot import (
 
 class CommandedRobot(ABC):
     """A robot that senses, keeps the book of its commands, and obeys who holds its lease."""
+
+    _gripper: GripperServo
 
     def __init__(self, name: str, capabilities: Capabilities, sensors: SensorSuite) -> None:
         self._name, self._capabilities, self._sensors = name, capabilities, sensors
@@ -75,6 +79,22 @@ class CommandedRobot(ABC):
         return ()
 
     # -- act ------------------------------------------------------------------------------------------------------
+
+    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Move the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
+        gripper = self._capabilities.gripper
+        if gripper is None:
+            return self._commands.refuse("set_gripper: the robot has no gripper")
+        if not (0.0 <= opening <= gripper.widest and 0.0 < force_n <= gripper.max_force_n):
+            unit = "rad" if gripper.kind is GripperKind.HINGED else "m"
+            return self._commands.refuse(
+                f"set_gripper: opening {opening:.3f} {unit} must lie in [0, {gripper.widest}] "
+                f"and force {force_n:.0f} N in (0, {gripper.max_force_n}]"
+            )
+        command = self._begin(Part.GRIPPER, GripperGoal(opening, force_n), until_s, lease)
+        if self._runs(command):
+            self._gripper.begin(GripperGoal(opening, force_n))
+        return command
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stop all motion, or only the given command if it still runs."""

@@ -10,7 +10,7 @@ from pydrake.systems.framework import Context
 
 from plant.control.arm import ArmServos
 from plant.control.commands import Part
-from plant.control.gripper import Closing, GripperGoal, GripperServo, GripperTolerances, gripper_set_point
+from plant.control.gripper import Closing, GripperServo, GripperTolerances, gripper_set_point
 from plant.control.robot import CommandedRobot
 from plant.fetch.capabilities import fetch_capabilities
 from plant.fetch.model import FINGER_GAIN_N_M, FetchModel
@@ -108,20 +108,6 @@ class FetchRobot(CommandedRobot):
                 f"and tilt {tilt_rad:.2f} rad in [{up}, {down}]"
             )
         return self._begin(Part.HEAD, _HeadGoal((pan_rad, tilt_rad)), until_s, lease)
-
-    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move the fingers so far apart (m) with at most force_n each; the force stays after the command's end."""
-        gripper = self._capabilities.gripper
-        assert gripper is not None
-        if not (0.0 <= opening <= gripper.widest and 0.0 < force_n <= gripper.max_force_n):
-            return self._commands.refuse(
-                f"set_gripper: opening {opening:.3f} m must lie in [0, {gripper.widest}] "
-                f"and force {force_n:.0f} N in (0, {gripper.max_force_n}]"
-            )
-        command = self._begin(Part.GRIPPER, GripperGoal(opening, force_n), until_s, lease)
-        if self._runs(command):
-            self._gripper.begin(GripperGoal(opening, force_n))
-        return command
 
     # -- called by the simulation ---------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from pydrake.systems.framework import Context
 
 from plant.control.arm import ArmServos
 from plant.control.commands import Part
-from plant.control.gripper import Closing, GripperGoal, GripperServo, GripperTolerances, gripper_set_point
+from plant.control.gripper import Closing, GripperServo, GripperTolerances, gripper_set_point
 from plant.control.robot import CommandedRobot
 from plant.locomotion.floating_base import Velocity
 from plant.locomotion.trot import BodyMotion, Trot
@@ -81,19 +81,6 @@ class SpotRobot(CommandedRobot):
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Spot has no head."""
         return self._commands.refuse("point_head: the robot has no head")
-
-    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
-        gripper = spot_facts()["gripper"]
-        if not (0.0 <= opening <= gripper["open"] and 0.0 < force_n <= gripper["max_force"]):
-            return self._commands.refuse(
-                f"set_gripper: opening {opening:.2f} rad must lie in [0, {gripper['open']}] "
-                f"and force {force_n:.0f} N in (0, {gripper['max_force']}]"
-            )
-        command = self._begin(Part.GRIPPER, GripperGoal(opening, force_n), until_s, lease)
-        if self._runs(command):
-            self._gripper.begin(GripperGoal(opening, force_n))
-        return command
 
     # -- called by the simulation ---------------------------------------------------------------------------------
 

@@ -6,10 +6,10 @@ import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from skills.api import Costmap, LocalisationEstimate, SkillContext
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
@@ -18,6 +18,9 @@ from skills.quantities import Delay, Length, Margin
 from skills.robot import FloatArray, Pose2D, Robot
 from skills.stack import LocalController
 from skills.traffic import Neighbour
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 __all__ = ["GivingWay", "GivingWayOptions", "WithBodies", "first_that_suits", "reachable", "with_bodies"]
 
@@ -75,6 +78,8 @@ class WithBodies:
 
 def with_bodies(costmap: Costmap, swept: Sequence[tuple[FloatArray, FloatArray]]) -> Costmap:
     """The costmap with outlines (discs) at poses (N, 3)."""
+    from scipy.spatial import cKDTree
+
     for discs, poses in swept:
         radius = float(discs[:, 2].max())
         round_ones = discs[discs[:, 2] >= 0.9 * radius]

@@ -37,3 +37,7 @@ def never_end(number: int) -> None:
     sys.stdout.write("begun\n")
     sys.stdout.flush()
     threading.Event().wait()
+
+
+def divide(number: int) -> float:
+    return 1 / number

@@ -61,18 +61,22 @@ def test_what_a_run_raises_is_raised_here(address):
 
 
 def test_a_worker_with_two_threads_is_refused():
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, **QUIET) as started:  # noqa: SIM117
-        with pytest.raises(InputError, match="has 2 threads, and a mission needs a process"):
-            with scheduler_at(started.scheduler_address):
-                pass
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, **QUIET) as started,
+        pytest.raises(InputError, match="has 2 threads, and a mission needs a process"),
+        scheduler_at(started.scheduler_address),
+    ):
+        pass
 
 
 def test_a_scheduler_without_workers_is_told(monkeypatch):
     monkeypatch.setattr(cluster, "ANSWER_S", 0.3)
-    with distributed.LocalCluster(n_workers=0, processes=False, protocol="tcp", **QUIET) as started:  # noqa: SIM117
-        with pytest.raises(InputError, match=r"has no workers; start one: dask worker tcp://"):
-            with scheduler_at(started.scheduler_address):
-                pass
+    with (
+        distributed.LocalCluster(n_workers=0, processes=False, protocol="tcp", **QUIET) as started,
+        pytest.raises(InputError, match=r"has no workers; start one: dask worker tcp://"),
+        scheduler_at(started.scheduler_address),
+    ):
+        pass
 
 
 @pytest.mark.parametrize("named", ["tcp://127.0.0.1:9", "here"])
@@ -82,15 +86,17 @@ def test_a_scheduler_that_does_not_answer_is_told(named, monkeypatch):
         pass
 
 
-def test_a_scheduler_that_stops_is_told_and_what_has_landed_is_kept():
-    sys.path.insert(0, str(FOLDER))
+def test_a_scheduler_that_stops_is_told_and_what_has_landed_is_kept(monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    started = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, **QUIET)
     landed = []
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, **QUIET) as started:
-        with pytest.raises(InputError, match="the scheduler has stopped answering"):  # noqa: SIM117
-            with scheduler_at(started.scheduler_address) as workers:
-                for finished in workers.give_out(cheap_run.slow_square, range(200)):
-                    landed.append(finished.item)
-                    if len(landed) == 3:
-                        started.close()
-    sys.path.remove(str(FOLDER))
+    with (
+        started,
+        pytest.raises(InputError, match="the scheduler has stopped answering"),
+        scheduler_at(started.scheduler_address) as workers,
+    ):
+        for finished in workers.give_out(cheap_run.slow_square, range(200)):
+            landed.append(finished.item)
+            if len(landed) == 3:
+                started.close()
     assert 3 <= len(landed) < 200

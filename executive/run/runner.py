@@ -312,8 +312,8 @@ class _Run:
             publish=self._publish,
             seed=self._settings.seed,
             board=Board(slug(entry.tree.robot_name)),
-            ask=lambda question: self._control.ask(question, self._clock),
-            stop_pressed=lambda: self._control.stop_pressed,
+            ask=lambda question: self._control.ask(question, self._clock, entry.robot.name),
+            stop_pressed=lambda: self._control.stop_pressed(entry.robot.name),
             presses=lambda: self._control.presses,
             day_began_s=self._day_began_s,
             detector=entry.detector,
@@ -338,15 +338,17 @@ class _Run:
         for session in live:
             self._for(session, partial(self._sense, session), None)
         turn = [session for session in live if session.result is None and self._is_its_turn(session)]
-        moving = [session for session in turn if self._for(session, session.may_move, False) and requests.hold is None]
+        free = [session for session in turn if self._for(session, session.may_move, False)]
+        moving = [session for session in free if not requests.held(session.name)]
         self._tick(moving, requests.breakpoints)
         for session in live:
-            if session.result is not None:
-                self._end_given(session, session.result.message)  # its lease was another's for too long
+            if session.result is not None:  # it was cancelled, or its lease was another's for too long
+                cancelled = session.result.outcome is Outcome.CANCELLED
+                self._leave_way(session)
+                self._end_given(session, None if cancelled else session.result.message)
             elif session.finished:
                 session.close()
-                if self._traffic is not None:
-                    self._traffic.release(session.name)
+                self._leave_way(session)
                 self._end_given(session, None)
             elif self.dispatch is not None:
                 self._for(session, partial(self._look, session), False)
@@ -359,6 +361,10 @@ class _Run:
         session.sense()
         if self._traffic is not None:
             self._traffic.heard(session.name, session.context.known_pose())
+
+    def _leave_way(self, session: Session) -> None:
+        if self._traffic is not None:
+            self._traffic.release(session.name)
 
     def _is_its_turn(self, session: Session) -> bool:
         """Whether the robots that a mission waits for are done; it ends when one of them has failed."""
@@ -387,13 +393,16 @@ class _Run:
                 session.preempt(tree)
             for tree in _for_robot(session, requests.later):
                 session.later(tree)
-        if requests.hold is None:
+            for _, reason in (each for each in requests.cancels if each[0] == session.name):
+                session.cancel(reason, self._settings.endings_limit_s)
+        held = [session for session in live if session.result is None and requests.held(session.name)]
+        if len(held) < len(live):
             self._time.go_on()
         else:
             self._time.stop()
             self._control.held(self._settings.tick_period_s)
-            for session in live:
-                session.hold()
+        for session in held:
+            session.hold()
         if self._time.elapsed_s() >= self._settings.time_limit_s:
             raise _TimeOverError(f"the mission was not done within {self._settings.time_limit_s:g} s")
         return requests

@@ -113,7 +113,7 @@ class Control:
 
     @_locked
     def resume(self, *, robot: str | None = None) -> None:
-        """Continue after a pause, a breakpoint or steps, or after one robot's own pause; a pressed stop button stays."""
+        """Continue after a pause, a breakpoint or steps, or after one robot's own pause; the stop button stays."""
         if robot is not None:
             self._let_go(robot, Mode.PAUSED, "resume", "the mission goes on")
         elif self._paused is not None:

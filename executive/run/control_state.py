@@ -35,9 +35,9 @@ class RobotMode:
 class ControlState:
     """What can be seen of a run's control at one moment.
 
-    `version` grows with every change. `mode` is that of the whole run, `robots` has that of each robot. `missions` gives
-    for each robot the missions begun and not ended, the one under way last. `at` is the path id of the breakpoint that
-    the run waits at; `buttons` are those that missions wait for or decide by.
+    `version` grows with every change. `mode` is that of the whole run, `robots` has that of each robot. `missions`
+    gives for each robot the missions begun and not ended, the one under way last. `at` is the path id of the breakpoint
+    that the run waits at; `buttons` are those that missions wait for or decide by.
     """
 
     version: int = 0

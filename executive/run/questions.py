@@ -43,7 +43,7 @@ class QuestionManager:
     def ask(
         self, question: Question, clock: Clock, lock: Condition, over: Callable[[str], None], robot: str = ""
     ) -> PendingAnswer:
-        """Open a robot's question; `over` is told when nobody answers. Raises ValueError when its id is open already."""
+        """Open a robot's question; `over` is told when nobody answers. Raises ValueError: its id is open already."""
         if question.id in self._open:
             raise ValueError(f"the question '{question.id}' is open already")
         opened = OpenQuestion(question, clock.now() + question.limit_s, robot)

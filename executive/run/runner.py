@@ -11,7 +11,7 @@ from typing import Any, TypeVar, cast
 
 from executive.mission.errors import disk_is_full
 from executive.record.profile import Profile
-from executive.record.schemas import CONTROL
+from executive.record.schemas import CONTROL, WAY
 from executive.record.ticks import TickMeter
 from executive.record.work import Work
 from executive.run.control import Control, ControlRequests, Event
@@ -38,6 +38,7 @@ from skills.stack import RobotStack, default_stack
 from skills.traffic import NO_TRAFFIC
 
 HOLDER = "errand"
+_WAYS_PERIOD_S = 0.5
 ResultT = TypeVar("ResultT")
 
 
@@ -169,6 +170,7 @@ class _Run:
         self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
         self._traffic: TrafficTable | None = None
+        self._ways_due_s = clock.now()
         self._after: dict[str, tuple[str, ...]] = {}
         self._ticks = 0
         self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
@@ -309,7 +311,7 @@ class _Run:
             worker=self._worker,
             localiser=entry.localiser,
             costmap=entry.costmap,
-            publish=self._publish,
+            publish=_named(self._publish, entry.robot.name),
             seed=self._settings.seed,
             board=Board(slug(entry.tree.robot_name)),
             ask=lambda question: self._control.ask(question, self._clock, entry.robot.name),
@@ -337,6 +339,10 @@ class _Run:
         self._clock.advance(self._settings.tick_period_s)
         for session in live:
             self._for(session, partial(self._sense, session), None)
+        if self._traffic is not None and self._clock.now() >= self._ways_due_s:
+            self._ways_due_s = self._clock.now() + _WAYS_PERIOD_S
+            for way in self._traffic.news():
+                self._publish(WAY, way)
         turn = [session for session in live if session.result is None and self._is_its_turn(session)]
         free = [session for session in turn if self._for(session, session.may_move, False)]
         moving = [session for session in free if not requests.held(session.name)]
@@ -463,6 +469,11 @@ class _Run:
         trees = {result.robot_name: tree for result, tree in self._over}
         overruns, work = self._meter.overruns, self.work.totals()
         return RunResult(robots + absent, self._ticks, overruns, sim_time_s, wall_time_s, trees, work)
+
+
+def _named(publish: Publish, robot_name: str) -> Publish:
+    """Every message of a robot carries its name."""
+    return lambda topic, message: publish(topic, {"robot": robot_name, **message})
 
 
 def _time_of_day_s() -> float:

@@ -39,7 +39,7 @@ def control():
 
 @pytest.fixture
 def run_pair(clock, knowledge, registry, make, control):
-    def runner(observe=None, *, after=(), settings=RunSettings(seed=3)):
+    def runner(observe=None, *, after=(), time_limit_s=1200.0):
         log, robots = [], {name: make.ScriptedRobot(clock, name) for name in ("Alice", "Bob")}
         missions = {name: Mission("go", DEFAULT_WORLD, name, (MissionStep((parse_command(GO),)),)) for name in robots}
         trees = {n: compile_mission(m, knowledge=knowledge, registry=registry) for n, m in missions.items()}
@@ -54,7 +54,7 @@ def run_pair(clock, knowledge, registry, make, control):
             clock=clock,
             worker=LockStepWorker(clock),
             publish=lambda topic, message: log.append((topic, message)),
-            settings=settings,
+            settings=RunSettings(seed=3, time_limit_s=time_limit_s),
             control=control,
             observer=observe,
         )
@@ -124,7 +124,7 @@ def test_one_that_waits_for_a_robot_that_was_cancelled_does_not_begin(run_pair, 
 def test_while_every_robot_is_held_no_time_counts_against_the_run(run_pair, control):
     actions = {1: lambda: [control.pause(robot=name) for name in ("Alice", "Bob")]}
     actions[400] = lambda: [control.resume(robot=name) for name in ("Alice", "Bob")]
-    pair = run_pair(at(actions), settings=RunSettings(seed=3, time_limit_s=10.0))
+    pair = run_pair(at(actions), time_limit_s=10.0)
     assert set(pair.outcomes().values()) == {Outcome.SUCCESS}
 
 

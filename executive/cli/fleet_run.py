@@ -204,7 +204,7 @@ class FleetDispatch:
 def run_fleet(dispatch: FleetDispatch, *, out: Path, seed: int, time_limit_s: float | None = None) -> None:
     """Run until no mission can be given out any more; the log is written into a folder. Raises InputError."""
     clock = dispatch.backend.clock
-    dispatch.log = EventLog(out / "log.mcap", clock)
+    dispatch.log = EventLog(out / "log.mcap", clock, apart=True)
     limit_s = TIME_LIMIT_S * max(1, len(dispatch.missions)) if time_limit_s is None else time_limit_s
     try:
         with cancelled_by_signals(Control(pace=None)) as control, LockStepWorker(clock) as worker:

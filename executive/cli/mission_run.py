@@ -70,7 +70,7 @@ def run_request(
     out, clock, work = prepared.request.out, backend.clock, Work()
     scenario = prepared.request.scenario
     entries = [entry_for(each, backend, durable, work) for each in prepared.all]
-    log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
+    log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock, apart=len(prepared.robots) > 1)
     if listener is not None:
         log.listen(listener)
     artifacts = Artifacts(log)

@@ -10,7 +10,7 @@ from executive.conversation.parts import OVER, Reply, Speech, answer, done, refu
 from executive.conversation.status_words import doing_in_words, place_in_words
 from executive.language.grounding import known_line
 from executive.language.remarks import Remark
-from executive.run.control import Control, Mode
+from executive.run.control import Control, Mode, RobotMode
 from executive.run.runner import Progress
 
 __all__ = ["RemarkAnswers"]
@@ -19,7 +19,10 @@ _TOLD_TO_STOP: Final = "told to stop"
 
 
 class RemarkAnswers:
-    """Stops, holds, goes on, cancels, and tells where the robot is and what it does. `progress` is the latest."""
+    """Stops, holds, goes on, cancels, and tells where the robot is and what it does. `progress` is the latest.
+
+    In a run with several robots, only the one that is spoken to.
+    """
 
     def __init__(self, speech: Speech, control: Control) -> None:
         self._speech, self._control = speech, control
@@ -45,25 +48,31 @@ class RemarkAnswers:
         return self._answers[remark]()
 
     def _stop(self) -> Reply:
-        self._control.stop_button(_TOLD_TO_STOP)
+        self._control.stop_button(_TOLD_TO_STOP, robot=self._one)
         return done("I stand still; say 'go on' when I may move again")
 
     def _wait(self) -> Reply:
-        self._control.pause("told to wait")
+        self._control.pause("told to wait", robot=self._one)
         return done("I wait; say 'go on' when I may go on")
 
     def _go_on(self) -> Reply:
-        state = self._control.state
-        if state.mode is Mode.STOPPED and state.reason != _TOLD_TO_STOP:
-            return refused(f"{state.reason}; release it where it was pressed")
-        held = state.mode in (Mode.STOPPED, Mode.PAUSED)
-        self._control.release_stop_button()
-        self._control.resume()
+        state, one = self._control.state, self._one
+        now = RobotMode(state.mode, state.reason) if one is None else state.robots[one]
+        if now.mode is Mode.STOPPED and now.reason != _TOLD_TO_STOP:
+            return refused(f"{now.reason}; release it where it was pressed")
+        held = now.mode in (Mode.STOPPED, Mode.PAUSED)
+        self._control.release_stop_button(robot=one)
+        self._control.resume(robot=one)
         return done("I go on" if held else "I am under way")
 
     def _cancel(self) -> Reply:
-        self._control.cancel("told to cancel")
+        self._control.cancel("told to cancel", robot=self._one)
         return done("I give it up and stop")
+
+    @property
+    def _one(self) -> str | None:
+        """The robot, where there are several; None: all that there are."""
+        return self._speech.robot_name if len(self._control.state.missions) > 1 else None
 
     def _where(self) -> Reply:
         status = None if self.progress is None else self.progress.robots.get(self._speech.robot_name)

@@ -18,7 +18,8 @@ import numpy as np
 from mcap.writer import Writer
 
 from executive.record.drawable import drawable
-from executive.record.schemas import WALL, Schema, schema_of
+from executive.record.schemas import TOPIC, WALL, Schema, schema_of
+from executive.tree.compiling.builder import slug
 from skills.robot import Clock
 
 FLUSH_EVERY_S = 1.0
@@ -32,16 +33,19 @@ class EventLog:
     Whatever is older than a second of the robot's clock has reached the file, so that a killed process leaves a log
     that can be read. When the disk is full, nothing more is written, and what was written can be read. `bytes` counts
     those of all messages but the wall's times, which differ from run to run.
+
+    With `apart` each robot's messages go to channels of its own, such as `bob/pose`, so that log viewers do not mix
+    several robots up; the channel's metadata names the topic.
     """
 
-    def __init__(self, path: Path, clock: Clock) -> None:
+    def __init__(self, path: Path, clock: Clock, *, apart: bool = False) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self.path = path
-        self._clock = clock
+        self._clock, self._apart = clock, apart
         self._file: BinaryIO = path.open("wb")
         self._writer: Any = Writer(self._file)
         self._writer.start(profile="", library="errand")
-        self._channels: dict[tuple[str, str], int] = {}
+        self._channels: dict[tuple[str, str, str], int] = {}
         self._schemas: dict[str, int] = {}
         self._flushed_s = -math.inf
         self._sequence = 0
@@ -68,16 +72,17 @@ class EventLog:
 
     def _log(self, topic: str, message: Mapping[str, Any]) -> None:
         now_s = self._clock.now()
+        robot = str(message.get("robot") or message.get("robot_name") or "") if self._apart else ""
         for shown_under, shown in drawable(topic, message, now_s):
-            self._write(shown_under, plain_values(shown), now_s)
+            self._write(shown_under, plain_values(shown), now_s, robot)
         if now_s - self._flushed_s >= FLUSH_EVERY_S:
             self.flush()
 
-    def _write(self, topic: str, plain: dict[str, Any], now_s: float) -> None:
+    def _write(self, topic: str, plain: dict[str, Any], now_s: float, robot: str) -> None:
         stamp_ns, self._sequence = round(now_s * 1e9), self._sequence + 1
         data = json.dumps(plain, allow_nan=False, separators=(",", ":")).encode()
         self.bytes += len(data) if topic != WALL else 0
-        channel = self._channel(topic, schema_of(topic, plain))
+        channel = self._channel(topic, schema_of(topic, plain), robot)
         self._writer.add_message(channel, stamp_ns, data, stamp_ns, self._sequence)
         for listener in self._listeners:
             listener(topic, now_s, plain)
@@ -96,13 +101,14 @@ class EventLog:
             if not broken:
                 self._writer.finish()
 
-    def _channel(self, topic: str, schema: Schema) -> int:
-        key = (topic, schema.name)
+    def _channel(self, topic: str, schema: Schema, robot: str) -> int:
+        key = (topic, schema.name, robot)
         if key not in self._channels:
             if schema.name not in self._schemas:
                 data = json.dumps(schema.json()).encode()
                 self._schemas[schema.name] = self._writer.register_schema(schema.name, "jsonschema", data)
-            self._channels[key] = self._writer.register_channel(topic, "json", self._schemas[schema.name])
+            name, metadata = (f"{slug(robot)}/{topic}", {TOPIC: topic}) if robot else (topic, {})
+            self._channels[key] = self._writer.register_channel(name, "json", self._schemas[schema.name], metadata)
         return self._channels[key]
 
 

@@ -14,6 +14,7 @@ from mcap.reader import NonSeekingReader
 from zstandard import ZstdError
 
 from executive.mission.errors import InputError
+from executive.record.schemas import TOPIC
 
 _DAMAGE = (McapError, struct.error, ZstdError, ValueError)
 
@@ -46,7 +47,8 @@ def _events(reader: NonSeekingReader) -> Iterator[Event]:
     try:
         for _, channel, message in reader.iter_messages(log_time_order=False):
             count += 1
-            yield Event(channel.topic, message.log_time / 1e9, json.loads(message.data))
+            topic = channel.metadata.get(TOPIC, channel.topic)
+            yield Event(topic, message.log_time / 1e9, json.loads(message.data))
     except _DAMAGE:
         if count == 0:
             raise

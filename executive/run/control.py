@@ -9,6 +9,7 @@ From Python, with the run in one thread and its control in another:
     control.resume()
     control.preempt(tree_of_another_mission)  # the present one is taken up again afterwards
     control.cancel("enough for today")
+    control.pause("let me look at it", robot="Bob")  # one of several robots; the others go on
 
 All methods may be called from any thread and from signal handlers. They return at once; the run polls at each tick.
 """
@@ -16,84 +17,23 @@ All methods may be called from any thread and from signal handlers. They return 
 from __future__ import annotations
 
 import difflib
-import enum
 import functools
 import threading
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from executive.run.questions import OpenQuestion, QuestionManager
+from executive.run.control_state import ControlRequests, ControlState, Event, Mode, Replacement, RobotMode
+from executive.run.questions import QuestionManager
 from executive.tree.compiler import CompiledTree
 from skills.api import Asked, Question
 from skills.robot import Clock
 
+__all__ = ["Control", "ControlRequests", "ControlState", "Event", "Mode", "Replacement", "RobotMode"]
+
 P = ParamSpec("P")
 ResultT = TypeVar("ResultT")
-
-
-class Mode(enum.Enum):
-    """What a run does just now; the strongest reason not to move counts."""
-
-    READY = "ready"  # it has not begun
-    RUNNING = "running"  # trees are ticked
-    PAUSED = "paused"  # by the operator or at a breakpoint
-    LEASE_LOST = "lease lost"  # another moves the robot
-    STOPPED = "stopped"  # the stop button is pressed
-    ENDED = "ended"  # it is over
-
-
-@dataclass(frozen=True)
-class ControlState:
-    """What can be seen of a run's control at one moment.
-
-    `version` grows with every change. `missions` gives for each robot the missions begun and not ended, the one under
-    way last. `at` is the path id of the breakpoint that the run waits at; `buttons` are those that missions wait for
-    or decide by.
-    """
-
-    version: int = 0
-    mode: Mode = Mode.READY
-    reason: str = ""
-    at: str | None = None
-    questions: tuple[OpenQuestion, ...] = ()
-    breakpoints: frozenset[str] = frozenset()
-    missions: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    buttons: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something done through or told by the control, for the log."""
-
-    what: str
-    message: str
-
-
-@dataclass(frozen=True)
-class Replacement:
-    """A mission, and the name of the one whose place it takes; None is the one under way."""
-
-    tree: CompiledTree
-    instead_of: str | None = None
-
-
-@dataclass(frozen=True)
-class ControlRequests:
-    """What is asked of the run now; `preempts` are missions to do first, `instead` and `later` as they say.
-
-    `insists` says that a run that is cancelled already was cancelled once more.
-    """
-
-    cancel: str | None = None
-    insists: bool = False
-    hold: str | None = None
-    breakpoints: frozenset[str] = frozenset()
-    events: tuple[Event, ...] = ()
-    preempts: tuple[CompiledTree, ...] = ()
-    instead: tuple[Replacement, ...] = ()
-    later: tuple[CompiledTree, ...] = ()
 
 
 def _locked(method: Callable[Concatenate[Control, P], ResultT]) -> Callable[Concatenate[Control, P], ResultT]:
@@ -124,6 +64,7 @@ class Control:
         self._begun = self._ended = False
         self._requests = ControlRequests()
         self._pressed: str | None = None
+        self._holds: Mapping[tuple[str, Mode], str] = MappingProxyType({})  # of single robots
         self._paused: str | None = None
         self._stride: int | None = None  # ticks to go while paused; 0: until a node changes; None: none
         self._at: str | None = None
@@ -147,6 +88,7 @@ class Control:
             asked.breakpoints,
             self._missions,
             self._buttons,
+            MappingProxyType({robot: self._robot_mode(robot) for robot in self._missions}),
         )
 
     @_locked
@@ -156,17 +98,25 @@ class Control:
         return self.state
 
     @_locked
-    def pause(self, reason: str = "paused by the operator") -> None:
-        """Hold the robot still; the tree keeps its state. Idempotent."""
+    def pause(self, reason: str = "paused by the operator", *, robot: str | None = None) -> None:
+        """Hold all robots still, or one of them; the trees keep their state. Idempotent.
+
+        Raises ValueError: no such robot in the run.
+        """
+        if robot is not None:
+            self._hold(robot, Mode.PAUSED, "pause", reason)
+            return
         self._stride = None
         if self._paused is None:
             self._paused = reason
             self._note("pause", reason)
 
     @_locked
-    def resume(self) -> None:
-        """Continue after a pause, a breakpoint or steps; a pressed stop button stays pressed."""
-        if self._paused is not None:
+    def resume(self, *, robot: str | None = None) -> None:
+        """Continue after a pause, a breakpoint or steps, or after one robot's own pause; the stop button stays."""
+        if robot is not None:
+            self._let_go(robot, Mode.PAUSED, "resume", "the mission goes on")
+        elif self._paused is not None:
             self._paused = self._at = self._stride = None
             self._note("resume", "the mission goes on")
 
@@ -192,9 +142,15 @@ class Control:
         self._note("step", "until a node changes" if ticks is None else f"for {ticks} ticks")
 
     @_locked
-    def cancel(self, reason: str = "cancelled by the operator") -> None:
-        """End the run; the first reason stays. Once more: at once, without what missions always do in the end."""
-        if self._requests.cancel is None and not self._ended:
+    def cancel(self, reason: str = "cancelled by the operator", *, robot: str | None = None) -> None:
+        """End the run, or one robot's mission; the first reason stays. Once more: at once, without what missions always
+        do in the end. Raises ValueError: no such robot in the run.
+        """
+        if robot is not None:
+            self._refuse_stranger(robot)
+            self._ask_for(cancels=(*self._requests.cancels, (robot, reason)))
+            self._note("cancel", f"{robot}: {reason}")
+        elif self._requests.cancel is None and not self._ended:
             self._ask_for(cancel=reason)
             self._note("cancel", reason)
         elif not self._requests.insists and not self._ended:
@@ -217,24 +173,30 @@ class Control:
         return self._presses
 
     @_locked
-    def stop_button(self, reason: str = "the stop button is pressed") -> None:
-        """Stop all robots until `release_stop_button`, whatever else is asked for."""
-        if self._pressed is None:
+    def stop_button(self, reason: str = "the stop button is pressed", *, robot: str | None = None) -> None:
+        """Stop all robots, or one, until `release_stop_button`, whatever else is asked for.
+
+        Raises ValueError: no such robot in the run.
+        """
+        if robot is not None:
+            self._hold(robot, Mode.STOPPED, "stop button", reason)
+        elif self._pressed is None:
             self._pressed = reason
             self._note("stop button", reason)
 
     @_locked
-    def release_stop_button(self) -> None:
-        """Continue as it was when the button was pressed."""
-        if self._pressed is not None:
+    def release_stop_button(self, *, robot: str | None = None) -> None:
+        """Continue as it was when the button was pressed, for all robots or for one."""
+        if robot is not None:
+            self._let_go(robot, Mode.STOPPED, "stop button released", "the stop button is released")
+        elif self._pressed is not None:
             self._pressed = None
             self._note("stop button released", "the stop button is released")
 
-    @property
     @_locked
-    def stop_pressed(self) -> str | None:
-        """Why the stop button is pressed; None when it is not."""
-        return self._pressed
+    def stop_pressed(self, robot: str) -> str | None:
+        """Why the stop button is pressed for a robot; None when it is not."""
+        return self._pressed or self._holds.get((robot, Mode.STOPPED))
 
     @_locked
     def set_breakpoint(self, path_id: str) -> None:
@@ -274,7 +236,7 @@ class Control:
         With `instead_of` it takes the place of the mission of that name: one that waits is not begun, and one that is
         not under way just now is left alone, as by `preempt`. Raises ValueError: no such robot in the run.
         """
-        self._refuse_robot(tree)
+        self._refuse_stranger(tree.robot_name)
         self._ask_for(instead=(*self._requests.instead, Replacement(tree, instead_of)))
         self._note("replace", f"instead '{tree.mission_name}'")
 
@@ -315,7 +277,8 @@ class Control:
         """What is asked for now; new missions and events are handed out once."""
         mode, reason = self._mode()
         held = mode is Mode.STOPPED or (mode is Mode.PAUSED and self._stride is None)
-        requests = replace(self._requests, hold=reason if held else None)
+        holds = {robot: why for (robot, _), why in self._holds.items()}
+        requests = replace(self._requests, hold=reason if held else None, holds=holds)
         self._requests = ControlRequests(requests.cancel, requests.insists, breakpoints=requests.breakpoints)
         return requests
 
@@ -342,9 +305,10 @@ class Control:
         self._note("lease lost" if why else "lease back", why or f"{robot_name} has its lease again")
 
     @_locked
-    def ask(self, question: Question, clock: Clock) -> Asked:
-        """Put a question to the operator. Raises ValueError when one of that id is open already."""
-        asked = self._questions.ask(question, clock, self._changed, lambda said: self._note("question over", said))
+    def ask(self, question: Question, clock: Clock, robot: str = "") -> Asked:
+        """Put a robot's question to the operator. Raises ValueError when one of that id is open already."""
+        over = functools.partial(self._note, "question over")
+        asked = self._questions.ask(question, clock, self._changed, over, robot)
         self._note("question", f"{question.id}: {question.text}")
         return asked
 
@@ -363,7 +327,8 @@ class Control:
     @_locked
     def slow(self) -> bool:
         """True while simulated time should not run ahead of the people who watch."""
-        return self._mode()[0] is not Mode.RUNNING or (self.attended and bool(self._questions.open))
+        held = self._mode()[0] is not Mode.RUNNING or bool(self._holds)
+        return held or (self.attended and bool(self._questions.open))
 
     @_locked
     def end(self) -> tuple[Event, ...]:
@@ -386,12 +351,36 @@ class Control:
         )
         return next(((mode, reason or "") for holds, mode, reason in order if holds), (Mode.RUNNING, ""))
 
-    def _refuse_robot(self, tree: CompiledTree) -> None:
-        if self._begun and tree.robot_name not in self._missions:
-            raise ValueError(f"robot '{tree.robot_name}' is not in this run; there are: {', '.join(self._missions)}")
+    def _robot_mode(self, robot: str) -> RobotMode:
+        """What one robot does: the strongest reason not to move counts, its own or that of all."""
+        run, reason = self._mode()
+        order: Collection[tuple[bool, Mode, str | None]] = (
+            (run in (Mode.ENDED, Mode.STOPPED), run, reason),
+            ((robot, Mode.STOPPED) in self._holds, Mode.STOPPED, self._holds.get((robot, Mode.STOPPED))),
+            (robot in self._lost, Mode.LEASE_LOST, self._lost.get(robot)),
+            (self._paused is not None, Mode.PAUSED, self._paused),
+            ((robot, Mode.PAUSED) in self._holds, Mode.PAUSED, self._holds.get((robot, Mode.PAUSED))),
+            (not self._begun or not self._missions[robot], Mode.READY, ""),
+        )
+        return next((RobotMode(mode, why or "") for holds, mode, why in order if holds), RobotMode(Mode.RUNNING))
+
+    def _hold(self, robot: str, mode: Mode, what: str, reason: str) -> None:
+        self._refuse_stranger(robot)
+        if (robot, mode) not in self._holds:
+            self._holds = MappingProxyType({**self._holds, (robot, mode): reason})
+            self._note(what, f"{robot}: {reason}")
+
+    def _let_go(self, robot: str, mode: Mode, what: str, message: str) -> None:
+        if (robot, mode) in self._holds:
+            self._holds = MappingProxyType({key: why for key, why in self._holds.items() if key != (robot, mode)})
+            self._note(what, f"{robot}: {message}")
+
+    def _refuse_stranger(self, robot: str) -> None:
+        if self._begun and robot not in self._missions:
+            raise ValueError(f"robot '{robot}' is not in this run; there are: {', '.join(self._missions)}")
 
     def _refuse_mission(self, tree: CompiledTree) -> None:
-        self._refuse_robot(tree)
+        self._refuse_stranger(tree.robot_name)
         waiting = [other.mission_name for other in (*self._requests.preempts, *self._requests.later)]
         if tree.mission_name in (*self._missions.get(tree.robot_name, ()), *waiting):
             raise ValueError(f"the mission '{tree.mission_name}' is under way already")

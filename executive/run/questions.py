@@ -12,10 +12,11 @@ from skills.robot import Clock
 
 @dataclass(frozen=True)
 class OpenQuestion:
-    """A question and until when it may be answered, on the robot's clock."""
+    """A robot's question and until when it may be answered, on the robot's clock."""
 
     question: Question
     until_s: float
+    robot: str = ""
 
     @property
     def id(self) -> str:
@@ -39,11 +40,14 @@ class QuestionManager:
         """What waits for an answer, the oldest first."""
         return tuple(pending.open for pending in self._open.values())
 
-    def ask(self, question: Question, clock: Clock, lock: Condition, over: Callable[[str], None]) -> PendingAnswer:
-        """Open a question; `over` is told when nobody answers. Raises ValueError when its id is open already."""
+    def ask(
+        self, question: Question, clock: Clock, lock: Condition, over: Callable[[str], None], robot: str = ""
+    ) -> PendingAnswer:
+        """Open a robot's question; `over` is told when nobody answers. Raises ValueError: its id is open already."""
         if question.id in self._open:
             raise ValueError(f"the question '{question.id}' is open already")
-        pending = PendingAnswer(OpenQuestion(question, clock.now() + question.limit_s), clock, lock, self._leave, over)
+        opened = OpenQuestion(question, clock.now() + question.limit_s, robot)
+        pending = PendingAnswer(opened, clock, lock, self._leave, over)
         self._open[question.id] = pending
         return pending
 

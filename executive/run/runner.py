@@ -11,7 +11,7 @@ from typing import TypeVar, cast
 
 from executive.mission.errors import disk_is_full
 from executive.record.profile import Profile
-from executive.record.schemas import CONTROL
+from executive.record.schemas import CONTROL, WAY
 from executive.record.ticks import TickMeter
 from executive.record.work import Work
 from executive.run.control import Control, ControlRequests, Event
@@ -39,6 +39,7 @@ from skills.stack import RobotStack, default_stack
 from skills.traffic import NO_TRAFFIC
 
 HOLDER = "errand"
+_WAYS_PERIOD_S = 0.5
 ResultT = TypeVar("ResultT")
 
 
@@ -146,6 +147,7 @@ class _Run:
         self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
         self._traffic: TrafficTable | None = None
+        self._ways_due_s = clock.now()
         self._after: dict[str, tuple[str, ...]] = {}
         self._ticks = 0
         self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
@@ -240,11 +242,11 @@ class _Run:
             worker=self._worker,
             localiser=entry.localiser,
             costmap=entry.costmap,
-            publish=self._publish,
+            publish=_named(self._publish, entry.robot.name),
             seed=self._settings.seed,
             board=Board(slug(entry.tree.robot_name)),
-            ask=lambda question: self._control.ask(question, self._clock),
-            stop_pressed=lambda: self._control.stop_pressed,
+            ask=lambda question: self._control.ask(question, self._clock, entry.robot.name),
+            stop_pressed=lambda: self._control.stop_pressed(entry.robot.name),
             presses=lambda: self._control.presses,
             day_began_s=self._day_began_s,
             detector=entry.detector,
@@ -268,16 +270,22 @@ class _Run:
         self._clock.advance(self._settings.tick_period_s)
         for session in live:
             self._for(session, partial(self._sense, session), None)
+        if self._traffic is not None and self._clock.now() >= self._ways_due_s:
+            self._ways_due_s = self._clock.now() + _WAYS_PERIOD_S
+            for way in self._traffic.news():
+                self._publish(WAY, way)
         turn = [session for session in live if session.result is None and self._is_its_turn(session)]
-        moving = [session for session in turn if self._for(session, session.may_move, False) and requests.hold is None]
+        free = [session for session in turn if self._for(session, session.may_move, False)]
+        moving = [session for session in free if not requests.held(session.name)]
         self._tick(moving, requests.breakpoints)
         for session in live:
-            if session.result is not None:
-                self._end_given(session, session.result.message)  # its lease was another's for too long
+            if session.result is not None:  # it was cancelled, or its lease was another's for too long
+                cancelled = session.result.outcome is Outcome.CANCELLED
+                self._leave_way(session)
+                self._end_given(session, None if cancelled else session.result.message)
             elif session.finished:
                 session.close()
-                if self._traffic is not None:
-                    self._traffic.release(session.name)
+                self._leave_way(session)
                 self._end_given(session, None)
             elif self._given is not None:
                 self._for(session, partial(self._given.look, session), None)
@@ -295,6 +303,10 @@ class _Run:
         session.sense()
         if self._traffic is not None:
             self._traffic.heard(session.name, session.context.known_pose())
+
+    def _leave_way(self, session: Session) -> None:
+        if self._traffic is not None:
+            self._traffic.release(session.name)
 
     def _is_its_turn(self, session: Session) -> bool:
         """Whether the robots that a mission waits for are done; it ends when one of them has failed."""
@@ -323,13 +335,16 @@ class _Run:
                 session.preempt(tree)
             for tree in _for_robot(session, requests.later):
                 session.later(tree)
-        if requests.hold is None:
+            for _, reason in (each for each in requests.cancels if each[0] == session.name):
+                session.cancel(reason, self._settings.endings_limit_s)
+        held = [session for session in live if session.result is None and requests.held(session.name)]
+        if len(held) < len(live):
             self._time.go_on()
         else:
             self._time.stop()
             self._control.held(self._settings.tick_period_s)
-            for session in live:
-                session.hold()
+        for session in held:
+            session.hold()
         if self._time.elapsed_s() >= self._settings.time_limit_s:
             raise TimeOverError(f"the mission was not done within {self._settings.time_limit_s:g} s")
         return requests
@@ -383,6 +398,11 @@ class _Run:
         trees = {result.robot_name: tree for result, tree in over}
         overruns, work = self._meter.overruns, self.work.totals()
         return RunResult(robots + absent, self._ticks, overruns, sim_time_s, wall_time_s, trees, work)
+
+
+def _named(publish: Publish, robot_name: str) -> Publish:
+    """Every message of a robot carries its name."""
+    return lambda topic, message: publish(topic, {"robot": robot_name, **message})
 
 
 def _time_of_day_s() -> float:

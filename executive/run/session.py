@@ -60,6 +60,7 @@ class Session:
         self._lost_since_s: float | None = None
         self._preempting: tuple[RobotResult, ...] = ()
         self._later: tuple[CompiledTree, ...] = ()
+        self._cancelled: tuple[Ending, float] | None = None  # and when it is over at the latest
         self.result: RobotResult | None = None
         self._pose_due_s = context.clock.now()
         self._asked_at: Pose2D | None = None
@@ -151,6 +152,8 @@ class Session:
         What a mission that was given up always does in the end comes first.
         """
         self._held = False
+        if self._cancelled is not None:
+            return self._tick_cancelled(*self._cancelled)
         if self._given_up:
             return self._tick_given_up(self._given_up[0])
         changed = self._top.tick(breakpoints)
@@ -183,6 +186,25 @@ class Session:
         run = next((run for run in (*self._given_up, *reversed(self._stack)) if run.ends), None)
         if run is not None:
             run.tick(frozenset())
+
+    def cancel(self, reason: str, limit_s: float) -> None:
+        """End all missions of this robot; what they always do in the end is done by `tick`, for so long (s) at most.
+
+        Once more: at once.
+        """
+        ending = Ending(Outcome.CANCELLED, Cause.CANCELLED, reason)
+        if self._cancelled is None:
+            self._cancelled = ending, self.context.clock.now() + limit_s
+            self._attempt("stop the trees", self.end_early)
+            if self.ends:
+                return
+        self.close(self._cancelled[0])
+
+    def _tick_cancelled(self, ending: Ending, until_s: float) -> bool:
+        self.tick_end()
+        if not self.ends or self.context.clock.now() >= until_s:
+            self.close(ending)
+        return True
 
     def _tick_given_up(self, run: TreeRun) -> bool:
         changed = run.tick(frozenset())

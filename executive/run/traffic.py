@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,8 @@ __all__ = ["SILENT_S", "TrafficTable"]
 SILENT_S = 2.0
 """Who was not heard of for so long (s of the run's clock) has no claim and no way any more."""
 
+_TOLD_EVERY_M = 0.25
+
 
 @dataclass
 class _Robot:
@@ -25,6 +28,7 @@ class _Robot:
     stamp_s: float = -np.inf
     way: FloatArray | None = None
     turn: int | None = None
+    told: Mapping[str, Any] | None = None
 
 
 class TrafficTable:
@@ -79,6 +83,18 @@ class TrafficTable:
             if other != name and robot.pose is not None and not self._silent(robot)
         )
 
+    def news(self) -> Iterator[Mapping[str, Any]]:
+        """For each robot whose way is another than was told before: its name, its turn (None: nothing is reserved), and
+        the way that lies ahead as points x, y (m in the world), for the log.
+        """
+        for name, robot in self._robots.items():
+            way = np.empty((0, 2)) if robot.way is None or self._silent(robot) else _thinned(robot.way[:, :2])
+            x, y = np.round(way, 2).T.tolist()
+            message = {"robot": name, "turn": robot.turn if x else None, "x": x, "y": y}
+            if message != (robot.told or {**message, "turn": None, "x": [], "y": []}):
+                robot.told = message
+                yield message
+
     def goes_before(self, one: str, other: str) -> bool:
         """Whether one has the right of way: it claimed first, and still answers."""
         turn, against = self._robots[one].turn, self._robots[other].turn
@@ -94,6 +110,18 @@ class TrafficTable:
 
     def _silent(self, robot: _Robot) -> bool:
         return self._now() - robot.stamp_s > SILENT_S
+
+
+def _thinned(points: FloatArray) -> FloatArray:
+    """Points (N, 2) of a way without those that are nearer than a quarter of a metre to the one before; its end stays.
+
+    Counted from the end, so that a way that grows shorter keeps its points.
+    """
+    back = points[::-1]
+    along_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(back, axis=0), axis=1))])
+    cells = (along_m / _TOLD_EVERY_M).astype(int)
+    kept: FloatArray = back[np.concatenate([[True], np.diff(cells) > 0])]
+    return kept[::-1]
 
 
 @dataclass(frozen=True)

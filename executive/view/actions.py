@@ -27,7 +27,8 @@ def control_actions(control: Control) -> Mapping[str, Action]:
                 call(control, values)
             except ValueError as error:
                 raise RefusedError(str(error)) from error
-            return said
+            robot = robot_of(values)
+            return said if robot is None else f"{robot}: {said}"
 
         return action
 
@@ -40,6 +41,12 @@ def text_of(values: Mapping[str, Any], key: str) -> str:
     if not isinstance(text, str) or not text.strip():
         raise RefusedError(f"the action needs a text under '{key}'")
     return text.strip()
+
+
+def robot_of(values: Mapping[str, Any]) -> str | None:
+    """The robot that an action is for; None: all of them."""
+    robot = values.get("robot")
+    return robot if isinstance(robot, str) and robot else None
 
 
 def control_json(state: ControlState) -> dict[str, Any]:
@@ -58,27 +65,36 @@ def control_json(state: ControlState) -> dict[str, Any]:
                 "options": list(each.options),
                 "default": each.question.default,
                 "until_s": each.until_s,
+                "robot": each.robot,
             }
             for each in state.questions
         ],
+        "robots": {name: {"mode": each.mode.value, "reason": each.reason} for name, each in state.robots.items()},
     }
 
 
-def asked_json(waiting: Waiting | None) -> dict[str, Any]:
-    """What the page shows of the question that the robot asks back; nothing of it where none waits."""
+def asked_json(waiting: Waiting | None, robot: str = "") -> dict[str, Any]:
+    """What the page shows of the question that a robot asks back; nothing of it where none waits."""
     if waiting is None:
         return {"question": None}
     question = waiting.question
-    return {"question": {"text": question.text, "options": list(question.candidates), "until_s": waiting.until_s}}
+    asked = {"text": question.text, "options": list(question.candidates), "until_s": waiting.until_s}
+    return {"question": {**asked, "robot": robot}}
 
 
 _CALLS: Final[Mapping[str, tuple[Callable[[Control, Mapping[str, Any]], None], str]]] = {
-    "pause": (lambda control, _: control.pause("paused from the page"), "pausing"),
-    "resume": (lambda control, _: control.resume(), "going on"),
+    "pause": (lambda control, values: control.pause("paused from the page", robot=robot_of(values)), "pausing"),
+    "resume": (lambda control, values: control.resume(robot=robot_of(values)), "going on"),
     "step": (lambda control, _: control.step(), "one step"),
-    "cancel": (lambda control, _: control.cancel("cancelled from the page"), "cancelling"),
-    "stop": (lambda control, _: control.stop_button("the stop button on the page is pressed"), "stopped"),
-    "release": (lambda control, _: control.release_stop_button(), "stop button released"),
+    "cancel": (
+        lambda control, values: control.cancel("cancelled from the page", robot=robot_of(values)),
+        "cancelling",
+    ),
+    "stop": (
+        lambda control, values: control.stop_button("the stop button on the page is pressed", robot=robot_of(values)),
+        "stopped",
+    ),
+    "release": (lambda control, values: control.release_stop_button(robot=robot_of(values)), "stop button released"),
     "break": (lambda control, values: control.set_breakpoint(text_of(values, "node")), "breakpoint set"),
     "unbreak": (lambda control, values: control.clear_breakpoint(text_of(values, "node")), "breakpoint cleared"),
     "press": (lambda control, values: control.press(text_of(values, "name")), "pressed"),

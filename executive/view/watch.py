@@ -11,6 +11,7 @@ from py_trees.common import Status
 
 from executive.run.control import Control, Mode
 from executive.run.runner import Progress
+from executive.tree.snapshot import NodeState, Snapshot
 from executive.view.actions import control_json
 from executive.view.feed import Feed
 
@@ -36,18 +37,16 @@ class ProgressWatch:
 
 
 def progress_word(progress: Progress) -> Mapping[str, Any]:
-    """What runs: the deepest running node of the last robot, its sentence, and how far it is (0 to 1) where known."""
-    running = [
-        (path_id, state)
-        for states in progress.states.values()
-        for path_id, state in states.items()
-        if state.status is Status.RUNNING
-    ]
-    word: dict[str, Any] = {"now_s": round(progress.now_s, 3), "ticks": progress.ticks, "overruns": progress.overruns}
-    if not running:
-        return {**word, "node": None, "message": "", "progress": None}
-    path_id, state = running[-1]
-    return {**word, "node": path_id, "message": state.message, "progress": state.progress}
+    """For each robot what runs: its deepest running node, the sentence, and how far it is (0 to 1) where known."""
+    robots = {name: _doing(states) for name, states in progress.states.items()}
+    word = {"now_s": round(progress.now_s, 3), "ticks": progress.ticks, "overruns": progress.overruns}
+    return {**word, "robots": robots}
+
+
+def _doing(states: Snapshot) -> Mapping[str, Any]:
+    running = [(path_id, state) for path_id, state in states.items() if state.status is Status.RUNNING]
+    path_id, state = running[-1] if running else (None, NodeState())
+    return {"node": path_id, "message": state.message, "progress": state.progress}
 
 
 class ControlWatch:

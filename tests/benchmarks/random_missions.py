@@ -353,8 +353,8 @@ class Operator:
         self.asked: list[Any] = []
         asking = control.ask
 
-        def ask(question: Any, clock: Any) -> Any:
-            self.asked.append(asking(question, clock))
+        def ask(question: Any, clock: Any, robot: str) -> Any:
+            self.asked.append(asking(question, clock, robot))
             return self.asked[-1]
 
         control.ask = ask  # type: ignore[method-assign]

@@ -178,3 +178,29 @@ def test_a_whole_mission_is_logged(tmp_path, compiled, run_tree, make, clock):
     assert topics[-2:] == ["outcome", "wall"]
     assert {"transitions", "pose"} <= set(topics)
     assert events[-2].data["outcome"] == "success"
+
+
+def test_each_robot_has_channels_of_its_own_that_read_back_under_their_topic(tmp_path, clock):
+    # robot said        channel        topic when read
+    # Bob               bob/pose       pose
+    # nobody            control        control
+    log = EventLog(tmp_path / "log.mcap", clock, apart=True)
+    picture = {"image": np.zeros((4, 4, 3), np.uint8), "detections": []}
+    messages = [("pose", {"robot": "Bob"}), ("object_to_detect", {"robot_name": "Al B"}), ("control", {"what": "x"})]
+    for topic, message in [*messages, ("detections", {"robot": "Bob", **picture})]:
+        log(topic, message)
+    log.close()
+    with log.path.open("rb") as file:
+        channels = {channel.topic for channel in make_reader(file).get_summary().channels.values()}
+    boxes = {"bob/detections", "bob/detections/boxes"}
+    assert channels == {"bob/pose", "al-b/object_to_detect", "control", *boxes}
+    topics = [event.topic for event in read_events(log.path)]
+    assert topics == ["pose", "object_to_detect", "control", "detections", "detections/boxes"]
+
+
+def test_the_channels_of_a_run_with_one_robot_are_the_topics(tmp_path, clock):
+    log = EventLog(tmp_path / "log.mcap", clock)
+    log("pose", {"robot": "Alice"})
+    log.close()
+    with log.path.open("rb") as file:
+        assert [channel.topic for channel in make_reader(file).get_summary().channels.values()] == ["pose"]

@@ -283,6 +283,21 @@ def test_robots_run_side_by_side_in_the_order_of_their_names(run_two, published)
     assert {m["robot"] for m in transitions(published)} == {"Alice", "Bob"}
 
 
+def test_every_message_of_a_robot_names_it(run_two, published, script):
+    def tell(skill):
+        skill.context.publish("mine", {"x": 1})
+        return Succeeded("told")
+
+    script.ends["navigate"] = tell
+    run_two()
+    assert [message for topic, message in published if topic == "mine"] == [
+        {"robot": "Alice", "x": 1},
+        {"robot": "Bob", "x": 1},
+    ]
+    unnamed = {topic for topic, message in published if "robot" not in message and "robot_name" not in message}
+    assert unnamed <= {"control", "wall"}
+
+
 def test_a_robot_that_waits_for_another_begins_when_that_one_is_done(run_two, published):
     assert run_two(Alice=("Bob",)).outcome is Outcome.SUCCESS
     order = [message["robot"] for message in transitions(published)]

@@ -121,3 +121,31 @@ def test_the_right_of_way_is_a_strict_order(actions: list[tuple[str, str]]) -> N
         a, b, c = NAMES
         assert not {(a, b), (b, c), (c, a)} <= before
         assert not {(b, a), (c, b), (a, c)} <= before
+
+
+def test_a_reserved_way_is_told_once_and_told_again_when_it_is_given_back() -> None:
+    """| what happened | news |
+    | nothing | none |
+    | claimed and announced | turn 1 and the way in steps of a quarter of a metre |
+    | nothing since | none |
+    | released | no way |"""
+    made = table(Time(), "alice", "bob")
+    assert list(made.news()) == []
+    made.claim("alice")
+    made.announce("alice", np.column_stack([np.linspace(0.0, 1.0, 101), np.zeros(101), np.zeros(101)]), DISCS)
+    (told,) = made.news()
+    assert (told["robot"], told["turn"], told["y"]) == ("alice", 1, [0.0] * 5)
+    assert np.allclose(told["x"], [0.0, 0.25, 0.5, 0.75, 1.0], atol=0.011)
+    assert list(made.news()) == []
+    made.release("alice")
+    assert list(made.news()) == [{"robot": "alice", "turn": None, "x": [], "y": []}]
+
+
+def test_the_way_of_a_robot_that_does_not_answer_is_told_no_more() -> None:
+    """What is silent reserves nothing."""
+    time = Time()
+    made = table(time, "alice", "bob")
+    made.claim("alice")
+    assert len(list(made.news())) == 1
+    time.now_s = SILENT_S + 0.1
+    assert list(made.news()) == [{"robot": "alice", "turn": None, "x": [], "y": []}]

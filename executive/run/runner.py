@@ -19,6 +19,7 @@ from executive.run.dispatch import Dispatch, MissionEnd
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
 from executive.run.outcome import Outcome, RobotResult, RobotStatus, RunResult
+from executive.run.resting import Resting
 from executive.run.session import Session
 from executive.run.traffic import TrafficTable
 from executive.run.tree_run import Ending
@@ -30,7 +31,7 @@ from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
 from executive.tree.compiling.builder import slug
 from executive.tree.snapshot import Snapshot
-from skills.api import Cause, Costmap, Detector, Localiser, Publish, Worker
+from skills.api import Cause, Costmap, Detector, Localiser, Publish, SharedCostmap, Worker
 from skills.detection import NO_DETECTOR
 from skills.navigate.footprint import Footprint
 from skills.robot import Clock, LeaseError, Pose2D, Robot
@@ -169,6 +170,7 @@ class _Run:
         self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
         self._traffic: TrafficTable | None = None
+        self._resting: Resting | None = None
         self._after: dict[str, tuple[str, ...]] = {}
         self._ticks = 0
         self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
@@ -188,6 +190,8 @@ class _Run:
         try:
             if len(entries) > 1 or self.dispatch is not None:
                 self._traffic = TrafficTable({}, self._clock.now)
+                tick_limit_s = self._settings.tick_limit_s
+                self._resting = Resting(self._traffic, self._watchdog, tick_limit_s, self._sense)
             for entry in sorted(entries, key=lambda entry: entry.robot.name):
                 self._sessions.append(self._open(entry))
                 self._after[entry.robot.name] = entry.after
@@ -201,6 +205,8 @@ class _Run:
             full = stop if disk_is_full(stop) else None
         finally:
             self._publish.ending = True
+            if self._resting is not None:
+                self._resting.close()
             for session in self._sessions:
                 session.close(ending)
                 self._dispatched(session, None)
@@ -218,6 +224,8 @@ class _Run:
 
     def _begin_given(self, entry: RunEntry, dispatch: Dispatch) -> None:
         """Begin a mission that was given out; a robot that cannot be had is told of."""
+        if self._resting is not None:
+            self._resting.leave(entry.robot.name)
         try:
             session = self._open(entry)
         except (Exception, VerbHung) as stop:
@@ -231,8 +239,9 @@ class _Run:
         self._control.mission_begun(session.name, entry.tree)
 
     def _for(self, session: Session, call: Callable[[], ResultT], otherwise: ResultT) -> ResultT:
-        """What a call for one robot gives. Where missions are given out, one that fails ends only that robot's."""
-        if self.dispatch is None:
+        """What a call for one robot gives. With several robots, or missions given out, one that fails ends only its own
+        robot's, and the robot is no more than an obstacle to the others."""
+        if self._traffic is None:
             return call()
         try:
             return call()
@@ -241,6 +250,7 @@ class _Run:
                 raise
             ending = self._ending(stop)
             session.close(ending)
+            self._traffic.release(session.name)
             self._end_given(session, ending.message)
             return otherwise
 
@@ -339,6 +349,7 @@ class _Run:
             self._for(session, partial(self._sense, session), None)
         turn = [session for session in live if session.result is None and self._is_its_turn(session)]
         moving = [session for session in turn if self._for(session, session.may_move, False) and requests.hold is None]
+        self._rest(live, turn, hold=requests.hold is not None)
         self._tick(moving, requests.breakpoints)
         for session in live:
             if session.result is not None:
@@ -348,14 +359,34 @@ class _Run:
                 if self._traffic is not None:
                     self._traffic.release(session.name)
                 self._end_given(session, None)
+                if self._resting is not None and self._others_go_on(session):
+                    self._resting.rest(session)
             elif self.dispatch is not None:
                 self._for(session, partial(self._look, session), False)
         if self.observer is not None:
             self.observer(self._progress())
         self._keep_pace(begun_wall_s)
 
+    def _others_go_on(self, session: Session) -> bool:
+        """Whether a robot whose mission is over may still be in somebody's way."""
+        return self.dispatch is not None or any(not one.finished for one in self._sessions if one is not session)
+
+    def _rest(self, live: Sequence[Session], turn: Sequence[Session], *, hold: bool) -> None:
+        """Let the robots that wait for others, and those whose missions are over, clear ways that are reserved."""
+        if self._resting is None:
+            return
+        for session in live:
+            if session in turn:
+                self._resting.leave(session.name)
+            elif session.result is None:
+                self._resting.wait(session)
+        self._resting.tick(hold=hold)
+
     def _sense(self, session: Session) -> None:
         """Bring a robot's estimators up to date, and tell the others where it believes to be."""
+        costmap = session.context.costmap
+        if self._traffic is not None and isinstance(costmap, SharedCostmap):
+            costmap.leave_out(self._traffic.covered_W(session.name))
         session.sense()
         if self._traffic is not None:
             self._traffic.heard(session.name, session.context.known_pose())
@@ -445,7 +476,8 @@ class _Run:
             for session in self._sessions:
                 session.log_end(self._ticks)
                 self._over.append((session.close(ending), session.main_tree))
-        robots = tuple(result for result, _ in self._over)
+        stepped_aside = frozenset[str]() if self._resting is None else self._resting.stepped_aside
+        robots = tuple(replace(one, stepped_aside=one.robot_name in stepped_aside) for one, _ in self._over)
         wall_time_s = time.perf_counter() - self._begun_wall_s
         self._meter.close(wall_time_s)
         began = {session.name for session in self._sessions}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from py_trees.common import Status
 
 from executive.mission.errors import listing
-from executive.mission.goal import Area, GoalCondition
+from executive.mission.goal import Area, GoalCondition, GoalKind
 from executive.run.outcome import Outcome, RobotResult
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.tree.node import NodeSpec
@@ -59,7 +59,8 @@ def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.Goal
     """The goal conditions of a tree that has run: of all its parts that were done.
 
     A count is one condition, however many trips it takes; an answer belongs to the check that gave it; what comes
-    before a step without condition needs to have been so at some time only.
+    before a step without condition needs to have been so at some time only, and so does where a robot went that stepped
+    aside for another afterwards.
     """
     return _of_parts(tree, result, _done(tree, result))
 
@@ -78,7 +79,8 @@ def _of_parts(tree: CompiledTree, result: RobotResult, parts: Sequence[StepPart]
         times_s = [finding.t_s for finding in result.findings if finding.path_id == path]
         condition = condition_of(part.goal, robot=tree.robot_name, answer=result.answers.get(path))
         condition = replace(condition, answered_s=times_s[-1] if times_s else None)
-        found.append(replace(condition, passing=any(later.goal is None for later in parts[n + 1 :])))
+        was = result.stepped_aside and part.goal.kind is GoalKind.WENT
+        found.append(replace(condition, passing=was or any(later.goal is None for later in parts[n + 1 :])))
     return tuple(found)
 
 

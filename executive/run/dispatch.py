@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol
 
-from executive.mission.errors import disk_is_full
 from executive.run.control import Control
 from executive.run.endings import ending_of
 from executive.run.outcome import RobotResult, RobotStatus
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from executive.run.runner import RunEntry
 
 __all__ = ["Dispatch", "DispatchedSessions", "MissionEnd", "never_began"]
-
-ResultT = TypeVar("ResultT")
 
 
 @dataclass(frozen=True)
@@ -83,18 +80,6 @@ class DispatchedSessions:
             return
         self._sessions.append(session)
         self._control.mission_begun(session.name, entry.tree)
-
-    def guard(self, session: Session, call: Callable[[], ResultT], otherwise: ResultT) -> ResultT:
-        """What a call for one robot gives. One that fails ends only that robot's mission. Raises OSError: disk full."""
-        try:
-            return call()
-        except (Exception, VerbHung) as stop:
-            if disk_is_full(stop):
-                raise
-            ending = ending_of(stop, self._publish)
-            session.close(ending)
-            self.end(session, ending.message)
-            return otherwise
 
     def look(self, session: Session) -> None:
         """See how a robot is."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TypeVar, cast
 
@@ -20,6 +20,7 @@ from executive.run.endings import CancelledError, LastingLog, TimeOverError, end
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
 from executive.run.outcome import Outcome, RobotStatus, RunResult
+from executive.run.resting import Resting
 from executive.run.session import Session
 from executive.run.traffic import TrafficTable
 from executive.run.tree_run import Ending
@@ -31,7 +32,7 @@ from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
 from executive.tree.compiling.builder import slug
 from executive.tree.snapshot import Snapshot
-from skills.api import Cause, Costmap, Detector, Localiser, Publish, Worker
+from skills.api import Cause, Costmap, Detector, Localiser, Publish, SharedCostmap, Worker
 from skills.detection import NO_DETECTOR
 from skills.navigate.footprint import Footprint
 from skills.robot import Clock, Pose2D, Robot
@@ -148,6 +149,7 @@ class _Run:
         self._sessions: list[Session] = []
         self._traffic: TrafficTable | None = None
         self._ways_due_s = clock.now()
+        self._resting: Resting | None = None
         self._after: dict[str, tuple[str, ...]] = {}
         self._ticks = 0
         self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
@@ -171,6 +173,8 @@ class _Run:
         try:
             if len(entries) > 1 or self._given is not None:
                 self._traffic = TrafficTable({}, self._clock.now)
+                tick_limit_s = self._settings.tick_limit_s
+                self._resting = Resting(self._traffic, self._watchdog, tick_limit_s, self._sense)
             for entry in sorted(entries, key=lambda entry: entry.robot.name):
                 self._sessions.append(self._open(entry))
                 self._after[entry.robot.name] = entry.after
@@ -184,6 +188,8 @@ class _Run:
             full = stop if disk_is_full(stop) else None
         finally:
             self._publish.ending = True
+            if self._resting is not None:
+                self._resting.close()
             for session in self._sessions:
                 session.close(ending)
                 if self._given is not None:
@@ -196,12 +202,32 @@ class _Run:
     def _has_work(self) -> bool:
         """Whether a mission is under way, after those were begun that are given out now."""
         if self._given is not None:
-            self._given.begin(self._open)
+            self._given.begin(self._begin_given)
         return not all(session.finished for session in self._sessions)
 
+    def _begin_given(self, entry: RunEntry) -> Session:
+        """Begin a mission that was given out, of a robot that may be resting. Raises what its verbs raise."""
+        if self._resting is not None:
+            self._resting.leave(entry.robot.name)
+        return self._open(entry)
+
     def _for(self, session: Session, call: Callable[[], ResultT], otherwise: ResultT) -> ResultT:
-        """What a call for one robot gives. Where missions are given out, one that fails ends only that robot's."""
-        return call() if self._given is None else self._given.guard(session, call, otherwise)
+        """What a call for one robot gives. With several robots, one that fails ends only its own mission.
+
+        It is no more than an obstacle to the others then. Raises OSError: the disk is full.
+        """
+        if self._traffic is None:
+            return call()
+        try:
+            return call()
+        except (Exception, VerbHung) as stop:
+            if disk_is_full(stop):
+                raise
+            ending = ending_of(stop, self._publish)
+            session.close(ending)
+            self._leave_way(session)
+            self._end_given(session, ending.message)
+            return otherwise
 
     def _end_early(self) -> None:
         """Do what missions always do in the end, for `endings_limit_s` at most; a second cancel ends that as well."""
@@ -277,6 +303,7 @@ class _Run:
         turn = [session for session in live if session.result is None and self._is_its_turn(session)]
         free = [session for session in turn if self._for(session, session.may_move, False)]
         moving = [session for session in free if not requests.held(session.name)]
+        self._rest(live, turn, requests.held)
         self._tick(moving, requests.breakpoints)
         for session in live:
             if session.result is not None:  # it was cancelled, or its lease was another's for too long
@@ -287,6 +314,8 @@ class _Run:
                 session.close()
                 self._leave_way(session)
                 self._end_given(session, None)
+                if self._resting is not None and self._others_go_on(session):
+                    self._resting.rest(session)
             elif self._given is not None:
                 self._for(session, partial(self._given.look, session), None)
         if self.observer is not None:
@@ -298,8 +327,26 @@ class _Run:
         if self._given is not None:
             self._given.end(session, gone)
 
+    def _others_go_on(self, session: Session) -> bool:
+        """Whether a robot whose mission is over may still be in somebody's way."""
+        return self._given is not None or any(not one.finished for one in self._sessions if one is not session)
+
+    def _rest(self, live: Sequence[Session], turn: Sequence[Session], held: Callable[[str], bool]) -> None:
+        """Let the robots that wait for others, and those whose missions are over, clear ways that are reserved."""
+        if self._resting is None:
+            return
+        for session in live:
+            if session in turn:
+                self._resting.leave(session.name)
+            elif session.result is None:
+                self._resting.wait(session)
+        self._resting.tick(held)
+
     def _sense(self, session: Session) -> None:
         """Bring a robot's estimators up to date, and tell the others where it believes to be."""
+        costmap = session.context.costmap
+        if self._traffic is not None and isinstance(costmap, SharedCostmap):
+            costmap.leave_out(self._traffic.covered_W(session.name))
         session.sense()
         if self._traffic is not None:
             self._traffic.heard(session.name, session.context.known_pose())
@@ -389,7 +436,8 @@ class _Run:
             over = [(session.close(ending), session.main_tree) for session in self._sessions]
         else:
             over = self._given.over
-        robots = tuple(result for result, _ in over)
+        stepped_aside = frozenset[str]() if self._resting is None else self._resting.stepped_aside
+        robots = tuple(replace(result, stepped_aside=result.robot_name in stepped_aside) for result, _ in over)
         wall_time_s = time.perf_counter() - self._begun_wall_s
         self._meter.close(wall_time_s)
         began = {session.name for session in self._sessions}

@@ -80,8 +80,8 @@ class Verdict:
     """What the referee saw: whether all goal conditions hold (None: that was not judged), a sentence on each, and the
     counts of the whole run, or since the conditions count.
 
-    `collisions` are the robots' own, `people_hit` those of them with people; `hit_by_people` counts who walked into a
-    robot that stood.
+    `collisions` are the robots' own, `people_hit` those of them with people, `robots_hit` those between two robots;
+    `hit_by_people` counts who walked into a robot that stood.
     """
 
     success: bool | None
@@ -90,3 +90,4 @@ class Verdict:
     drops: int
     people_hit: int = 0
     hit_by_people: int = 0
+    robots_hit: int = 0

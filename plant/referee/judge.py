@@ -61,6 +61,7 @@ def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[
         drops=drops,
         people_hit=sum(bump.person is not None for bump in own),
         hit_by_people=len(bumps) - len(own),
+        robots_hit=sum(bump.other_robot is not None for bump in own),
     )
 
 

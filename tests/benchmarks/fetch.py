@@ -70,10 +70,10 @@ def sentence_of(number: int, things: Sequence[str], goals: Sequence[str]) -> str
     """What is asked for in a mission: a person is the goal as often as all surfaces among `goals` together."""
     rng = np.random.default_rng([number, 8])
     surfaces = [goal for goal in goals if goal != PERSON]
-    thing, to_person = things[rng.integers(len(things))], bool(rng.random() < 0.5)
+    thing, to_person = things[int(rng.integers(len(things)))], bool(rng.random() < 0.5)
     if PERSON in goals and (to_person or not surfaces):
         return f"bring me the {thing}"
-    return f"bring the {thing} to the {surfaces[rng.integers(len(surfaces))]}"
+    return f"bring the {thing} to the {surfaces[int(rng.integers(len(surfaces)))]}"
 
 
 def run_mission(number: int, sentence: str, out: Path) -> Result:

@@ -1,4 +1,4 @@
-"""A scripted robot whose camera is on its head: Fetch's arm, gripper and head before things in the air or on a table."""
+"""A scripted robot with its camera on its head: Fetch's arm, gripper and head before things on a table or in the air."""
 
 from __future__ import annotations
 

@@ -54,6 +54,20 @@ def test_what_is_seen_where_it_was_let_go_of_is_given():
     assert outcome(HandOver(context_of(_robot(_at_release(RED)))), COKE) == Succeeded("gave the coke to Robin")
 
 
+def test_two_fingers_are_drawn_straight_back_from_what_they_let_go_of():
+    robot = _robot(_at_release(RED))
+    skill = HandOver(context_of(robot))
+    skill.begin(COKE)
+    while "holding the coke out" not in skill.step().message:
+        robot.advance(0.1)
+    X_BH = HEAD_MODEL.X_BH(robot.q)
+    moved = len(robot.arm_commands)
+    while not hasattr(skill.step(), "outputs"):
+        robot.advance(0.1)
+    way_H = X_BH.inverse() @ HEAD_MODEL.X_BH(robot.arm_commands[moved].positions_rad[-1]).translation()
+    assert way_H == pytest.approx([-0.16, 0.0, 0.0], abs=0.003)  # not aside first: both fingers are off it
+
+
 def test_what_is_seen_nowhere_is_not_given():
     failed(HandOver(context_of(_robot())), COKE, Cause.POSTCONDITION, "not seen where it was let go of before Robin")
 

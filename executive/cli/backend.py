@@ -62,7 +62,7 @@ class Backend(Protocol):
     def judge(
         self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
     ) -> RefereeReport | None:
-        """What a referee saw of a mission since it began, of which other robots did some `before`; None: there is none."""
+        """What a referee saw of a mission since it began, of which others did some `before`; None: there is none."""
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Write what was recorded into a folder; the recording's path, None where there is none."""

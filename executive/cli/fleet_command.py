@@ -57,7 +57,7 @@ def run(
     console = console_for(as_json)
     store = _store(queue)
     with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
-        from executive.cli.fleet_missions import fleet_mission
+        from executive.cli.fleet_missions import charging_missions, fleet_mission
         from executive.cli.fleet_run import FleetDispatch, run_fleet, told
         from executive.cli.simulated import SimulatedBackend
         from executive.cli.starts import placed_robots
@@ -82,7 +82,16 @@ def run(
         }
         backend = SimulatedBackend(where, placed, seed=seed, record=False)
         folder = out or store.parent / "fleet"
-        dispatch = FleetDispatch(missions, wanted, placed, backend, faults, None if quiet else console)
+        dispatch = FleetDispatch(
+            missions,
+            wanted,
+            placed,
+            backend,
+            faults,
+            charging_missions(where, knowledge, placed),
+            knowledge.battery,
+            None if quiet else console,
+        )
         run_fleet(dispatch, out=folder, seed=seed, time_limit_s=time_limit_s(time_limit))
         results = told(missions, [each.id for each in queued])
     achieved = [_achieved(each) for each in results]

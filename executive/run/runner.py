@@ -276,11 +276,12 @@ class _Run:
                 self._end_given(session, session.result.message)  # its lease was another's for too long
             elif session.finished:
                 session.close()
-                if self._traffic is not None:
-                    self._traffic.release(session.name)
+                session.context.traffic.release()
                 self._end_given(session, None)
             elif self._given is not None:
                 self._for(session, partial(self._given.look, session), None)
+        if self._given is not None:
+            self._given.recall()
         if self.observer is not None:
             self.observer(self._progress())
         self._keep_pace(begun_wall_s)

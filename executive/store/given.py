@@ -18,8 +18,9 @@ _PUT: Final = "INSERT INTO given (mission) VALUES (?) ON CONFLICT (mission) DO N
 class GivenMission:
     """What is known of a mission that was given out.
 
-    `robot` has it, or had it last. The first `done` of its commands are done and not done again; `blocked` is why it
-    cannot begin again where it is broken off now. `referee` is what a referee said in the end, as JSON values.
+    `robot` has it, or had it last; it was given to another `reassigned` times. The first `done` of its commands are
+    done and not done again; `blocked` is why it cannot begin again where it is broken off now. `referee` is what a
+    referee said in the end, as JSON values.
     """
 
     robot: str | None = None
@@ -51,7 +52,8 @@ class GivenMissions:
 
     def give(self, mission: int, robot: str) -> None:
         """A robot has the mission from now on."""
-        self._set(mission, "robot = ?, blocked = NULL", robot)
+        again = "reassigned = reassigned + (robot IS NOT NULL AND robot <> ?)"
+        self._set(mission, f"{again}, robot = ?, blocked = NULL", robot, robot)
 
     def progress(self, mission: int, done: int, blocked: str | None) -> None:
         """How many commands are done, and why what is under way cannot begin again (None: it can)."""
@@ -59,7 +61,7 @@ class GivenMissions:
 
     def hand_back(self, mission: int) -> None:
         """The mission waits for another robot."""
-        self._set(mission, "reassigned = reassigned + 1, blocked = NULL")
+        self._set(mission, "blocked = NULL")
 
     def judge(self, mission: int, referee: Mapping[str, Any] | None) -> None:
         """What a referee saw."""

@@ -9,14 +9,14 @@ from executive.cli.fleet_missions import FleetMission
 from executive.cli.fleet_run import FleetDispatch, run_fleet, told
 from executive.cli.requests import Prepared
 from executive.fleet.auction import Bid
-from executive.mission.command import parse_command
+from executive.mission.command import Command, Task, parse_command
 from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.mission.request import Request
 from executive.run.runner import RunEntry
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
-from skills.api import Running, Succeeded
+from skills.api import Cause, Failed, Running, Succeeded
 from skills.faults.faulty_robot import with_faults
 from skills.robot import Pose2D
 
@@ -33,9 +33,13 @@ class Fleet:
 
     def __init__(self, store, clock, knowledge, registry, make, script, monkeypatch, out):
         self.script = script
-        self.store, self.clock, self.knowledge, self.registry, self.out = store, clock, knowledge, registry, out
+        self.store, self.clock, self.registry, self.out = store, clock, registry, out
+        battery = knowledge.battery.model_copy(update={"low": 0.05})
+        self.knowledge = knowledge.model_copy(update={"battery": battery})
+        self.unable = set()
         self.robots = {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
         self.faults, self.make, self.missions, self.judged = {}, make, {}, []
+        self.shares, self.since_s = [], []
         monkeypatch.setattr(fleet_run, "entry_for", lambda prepared, backend, durable, work: self._entry(prepared))
         monkeypatch.setattr(fleet_run, "bid_for", self._bid)
         monkeypatch.setattr(fleet_missions, "prepared_for", lambda r, mission, *_: self._prepared(r, mission))
@@ -46,11 +50,12 @@ class Fleet:
         return RunEntry(prepared.tree, robot, self.make.StillLocaliser(), self.make.EmptyCostmap())
 
     def _bid(self, mission, name, now):
-        return Bid(mission.stored.id, name, 0.0, 1.0 + 0.5 * ROBOTS.index(name))
+        problems = ("out of reach",) if name in self.unable else ()
+        return Bid(mission.stored.id, name, 0.0, 1.0 + 0.5 * ROBOTS.index(name), problems=problems)
 
     def _prepared(self, request, mission):
         tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
-        world = SimpleNamespace(name="scripted")
+        world = SimpleNamespace(name="scripted", dock=START)
         return Prepared(request, mission, world, self.knowledge, tree)
 
     def queue(self, *lines):
@@ -61,14 +66,22 @@ class Fleet:
         options = {name: self._prepared(request, mission) for name, mission in missions.items()}
         self.missions[stored.id] = FleetMission(stored, options)
 
-    def judge(self, tree, result):
+    def judge(self, tree, result, *, before, since_s):
         self.judged.append((tree.robot_name, result.outcome.value))
+        self.shares += [(share.tree.robot_name, share.done) for share in before]
+        self.since_s.append(since_s)
 
     def run(self):
         placed = {name: SimpleNamespace(start=START) for name in ROBOTS}
-        run_fleet(FleetDispatch(self.store, dict(self.missions), placed, self), out=self.out, seed=3)
+        docks = {name: self._docking(name) for name in ROBOTS}
+        dispatch = FleetDispatch(self.store, dict(self.missions), placed, self, docks=docks)
+        run_fleet(dispatch, out=self.out, seed=3)
         rows = told(self.store, list(self.missions))
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
+
+    def _docking(self, name):
+        step = MissionStep((Command(task=Task.CHARGE),))
+        return self._prepared(Request(), Mission("charge", DEFAULT_WORLD, name, (step,)))
 
     def hold(self, skill):
         self.robots[skill.context.robot.name].holding = True
@@ -77,6 +90,10 @@ class Fleet:
     def put_down(self, skill):
         self.robots[skill.context.robot.name].let_go()
         return Succeeded("placed")
+
+    def charge(self, skill):
+        self.robots[skill.context.robot.name].charge = 0.9
+        return Succeeded("charged")
 
     def die_once_after(self, name, skill):
         """The way to a place is the last that a robot does when one has done what `name` says."""
@@ -122,6 +139,7 @@ def test_commands_that_are_done_are_not_done_again_by_the_other(fleet, script, r
     assert fleet.run() == [("Bob", "success", 1)]
     assert (script.begun.count("grasp"), script.begun.count("place")) == (1, 1)
     assert (fleet.robots["Alice"].holding, fleet.robots["Bob"].calls.count("drive")) == (False, script.steps)
+    assert (fleet.judged, fleet.shares, fleet.since_s) == ([("Bob", "success")], [("Alice", 2)], [0.0])
 
 
 def test_what_is_in_the_gripper_of_a_robot_that_dies_is_told_and_not_fetched_again(fleet, script, registry):
@@ -152,3 +170,66 @@ def test_whose_each_mission_is_stands_in_the_store(fleet):
     fleet.run()
     given = GivenMissions(fleet.store).all()[1]
     assert (given.robot, given.done, given.blocked) == ("Alice", 1, None)
+
+
+def test_each_mission_is_judged_from_its_own_beginning(fleet):
+    fleet.queue(KITCHEN)
+    fleet.queue(KITCHEN)
+    fleet.unable = {"Bob"}
+    fleet.run()
+    first_s, second_s = fleet.since_s
+    assert first_s == 0.0 < second_s
+
+
+def test_a_robot_that_is_low_gives_its_mission_back_and_charges(fleet, script):
+    fleet.queue(KITCHEN)
+    fleet.queue(BEDROOM)
+    fleet.robots["Alice"].charge, script.ends["charge"] = 0.1, fleet.charge
+    assert fleet.run() == [("Bob", "success", 1), ("Bob", "success", 0)]
+    assert script.begun.count("charge") == 1
+    assert [robot.holder for robot in fleet.robots.values()] == [None, None]
+
+
+def test_a_robot_that_is_low_puts_down_what_it_holds_before_it_gives_the_rest_back(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT, KITCHEN)
+
+    def hold(skill):
+        fleet.robots["Alice"].charge = 0.1
+        return fleet.hold(skill)
+
+    script.ends.update(grasp=hold, place=fleet.put_down, charge=fleet.charge)
+    assert fleet.run() == [("Bob", "success", 1)]
+    assert (script.begun.count("grasp"), script.begun.count("place")) == (1, 1)
+    assert fleet.shares == [("Alice", 2)]
+
+
+def test_a_mission_that_only_the_low_robot_can_do_goes_on_when_it_has_charged(fleet, script):
+    fleet.queue(KITCHEN)
+    fleet.unable = {"Bob"}
+    fleet.robots["Alice"].charge, script.ends["charge"] = 0.1, fleet.charge
+    assert fleet.run() == [("Alice", "success", 0)]
+    assert script.begun == ["navigate", "navigate", "charge", "navigate"]
+
+
+def test_a_robot_that_gets_no_current_at_its_dock_leaves_its_mission_to_the_other(fleet, script):
+    fleet.queue(KITCHEN)
+    fleet.robots["Alice"].charge = 0.1
+    script.ends["charge"] = lambda skill: Failed(Cause.EXECUTION, "no current")
+    assert fleet.run() == [("Bob", "success", 1)]
+
+
+def test_a_robot_that_is_lost_is_left_out_and_its_mission_done_by_the_other(fleet, script):
+    fleet.queue(KITCHEN)
+    lost = [True]
+
+    def lose(skill):
+        if skill.context.robot.name == "Alice" and lost:
+            skill.context.localiser.localised = False
+            return Failed(Cause.EXECUTION, "lost")
+        return Succeeded("there")
+
+    script.ends["navigate"] = lose
+    script.ends["relocalise"] = lambda skill: Failed(Cause.EXECUTION, "no match")
+    assert fleet.run() == [("Bob", "success", 1)]

@@ -26,7 +26,16 @@ from executive.tree.estimate import load_estimates
 from plant.worlds.world import World
 from skills.robot import Pose2D
 
-__all__ = ["FleetMission", "RobotNow", "bid_for", "charging_missions", "charging_time_s", "fleet_mission", "rest_of"]
+__all__ = [
+    "FleetMission",
+    "RobotNow",
+    "bid_for",
+    "charging_missions",
+    "charging_time_s",
+    "fleet_mission",
+    "rest_of",
+    "with_commands",
+]
 
 URGENT: Final = 0.5
 """At this share of the charge that counts as low, a robot that has something in hand goes to its dock all the same."""
@@ -116,12 +125,15 @@ def _for_robot(name: str, filed: Prepared, world: World, robots: Mapping[str, Pl
 
 def rest_of(prepared: Prepared, done: int) -> Prepared:
     """What is left of a mission of plain commands of which the first `done` are done."""
-    if not done:
-        return prepared
+    return with_commands(prepared, prepared.tree.commands[done:]) if done else prepared
+
+
+def with_commands(prepared: Prepared, commands: Sequence[Command]) -> Prepared:
+    """A mission of plain commands with others in their place. Raises InputError: they cannot be carried out."""
     (step,) = prepared.mission.steps
-    mission: Mission = replace(prepared.mission, steps=(replace(step, commands=step.commands[done:]),))
-    rest = prepared_for(prepared.request, mission, prepared.world, prepared.knowledge)
-    return replace(rest, kind=prepared.kind, robots=prepared.robots)
+    mission: Mission = replace(prepared.mission, steps=(replace(step, commands=tuple(commands)),))
+    other = prepared_for(prepared.request, mission, prepared.world, prepared.knowledge)
+    return replace(other, kind=prepared.kind, robots=prepared.robots)
 
 
 def _patient(knowledge: Knowledge) -> Knowledge:

@@ -10,6 +10,7 @@ from typing import Any, Final
 from rich.console import Console
 
 from executive.cli.backend import Backend
+from executive.cli.fleet_chain import chained
 from executive.cli.fleet_missions import FleetMission, RobotNow, bid_for, charging_time_s, rest_of
 from executive.cli.fleet_progress import Progress, ProgressJournal
 from executive.cli.goal_conditions import Share
@@ -30,8 +31,8 @@ from executive.run.dispatch import MissionEnd
 from executive.run.outcome import Outcome, RobotResult, RobotStatus
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
-from executive.store.given import GivenMissions
-from executive.store.missions import MissionState, MissionStore
+from executive.store.given import GivenMission, GivenMissions
+from executive.store.missions import MissionState, MissionStore, StoredMission
 from skills.robot import Pose2D
 
 __all__ = ["FleetDispatch", "run_fleet"]
@@ -78,12 +79,16 @@ class FleetDispatch:
 
     def __post_init__(self) -> None:
         self._given = GivenMissions(self.store)
-        self._dispatcher = Dispatcher(self.missions, self.robots)
+        self._dispatcher = Dispatcher((), self.robots)
+        self._parts = {number: each for number, each in self._given.all().items() if each.part_of is not None}
+        for number in self.missions:
+            follows = self._parts[number].follows if number in self._parts else None
+            self._dispatcher.add(number, after=follows if follows in self.missions else None)
         self._robots = {
             name: _Robot(placed, placed.start, dock=self.docks.get(name), faults=tuple(self.faults.get(name, ())))
             for name, placed in self.robots.items()
         }
-        self._bids: dict[tuple[int, str, int, Pose2D, float], Bid] = {}
+        self._bids: dict[tuple[int, str, int, Pose2D, float, bool], Bid] = {}
         self._gone: dict[str, str] = {}
         self._recalled: set[str] = set()
         self._to_dock: list[str] = []
@@ -98,7 +103,8 @@ class FleetDispatch:
         """The missions that begin now."""
         entries: list[RunEntry] = []
         given = self._dispatcher.assign(self._bid)
-        for number, why in given.refused.items():
+        refused = {number: why for number, why in given.refused.items() if not self._split(number)}
+        for number, why in refused.items():
             self._finish(number, MissionState.FAILURE, why)
         for award in given.begun:
             robot, mission = self._robots[award.robot], self.missions[award.mission]
@@ -113,7 +119,29 @@ class FleetDispatch:
         if self._dispatcher.waiting or self._dispatcher.under_way:
             entries += [self._dock_entry(name) for name in self._to_dock if name in self._dispatcher.resting]
             self._to_dock = []
-        return entries
+        return entries if len(refused) == len(given.refused) else [*entries, *self.begin()]
+
+    def _split(self, number: int) -> bool:
+        """Have a mission done in two parts, as no robot can do it alone; whether two can."""
+        mission = self.missions[number]
+        chain = None if number in self._parts else chained(mission, self._offer)
+        if chain is None:
+            return False
+        names = [f"{mission.stored.request.name}, part {part} of 2" for part in (1, 2)]
+        added: list[int] = []
+        for name, options in zip(names, (chain.first, chain.second), strict=True):
+            request = next(iter(options.values())).request
+            request = replace(request, sentence=None, file=None, text=None, name=name)
+            stored = self.store.add(request, queued=True)
+            self.missions[stored.id] = FleetMission(stored, options)
+            self._dispatcher.add(stored.id, after=added[0] if added else None)
+            added.append(stored.id)
+        self._given.split(number, added)
+        self._parts = {part: each for part, each in self._given.all().items() if each.part_of is not None}
+        self.store.begin(number)
+        by = "" if chain.table is None else f", by the {chain.table}"
+        self._tell(f"No robot can do mission {number} alone: missions {added[0]} and then {added[1]} do it{by}")
+        return True
 
     def recalled(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
         """The robots that are low and have nothing in hand; and those that charge when nothing is left to do."""
@@ -192,15 +220,22 @@ class FleetDispatch:
 
     def _bid(self, mission: int, name: str) -> Bid:
         """What a robot offers; the route is planned once for each place that it offers it from."""
-        robot, wanted = self._robots[name], self.missions[mission]
+        wanted, robot = self.missions[mission], self._robots[name]
+        key = (mission, name, wanted.done, robot.pose, robot.charge, name in self._dispatcher.resting)
+        if key not in self._bids:
+            self._bids[key] = self._offer(wanted, name)
+        return replace(self._bids[key], ready_s=self._ready_s(robot))
+
+    def _ready_s(self, robot: _Robot) -> float:
+        return max(0.0, robot.free_at_s - self._now_s)
+
+    def _offer(self, wanted: FleetMission, name: str) -> Bid:
+        """What a robot offers from where it is free next."""
+        robot = self._robots[name]
         now = RobotNow(robot.pose, robot.charge, self.battery.low, robot.dock)
         if name in self._dispatcher.resting and robot.dock is not None:
             now = replace(now, pose=robot.dock.world.dock or robot.pose, charge=self.battery.charged)
-        key = (mission, name, wanted.done, now.pose, now.charge)
-        ready_s = max(0.0, robot.free_at_s - self._now_s)
-        if key not in self._bids:
-            self._bids[key] = bid_for(wanted, name, now)
-        return replace(self._bids[key], ready_s=ready_s)
+        return replace(bid_for(wanted, name, now), ready_s=self._ready_s(robot))
 
     def _dock_entry(self, name: str) -> RunEntry:
         """A robot goes to its dock and charges."""
@@ -267,11 +302,28 @@ class FleetDispatch:
         report = self.backend.judge(tree, result, before=mission.shares, since_s=since_s)
         seen = None if report is None else {key: value for key, value in vars(report).items() if key != "events"}
         self._given.judge(number, seen)
+        if number in self._parts:
+            self._part_over(number, Share(tree, result, len(tree.parts)), seen)
         self._finish(number, MissionState(result.outcome.value), result.message)
+
+    def _part_over(self, number: int, share: Share, seen: Mapping[str, Any] | None) -> None:
+        """The next part goes on from what this one did; after the last, all are judged together."""
+        mission, whole = self.missions[number], self._parts[number].part_of
+        following = [part for part, each in self._parts.items() if each.follows == number]
+        for part in following:
+            shares = (*mission.shares, share)
+            self.missions[part] = replace(self.missions[part], since_s=mission.since_s, shares=shares)
+        if whole is not None and not following:
+            self._given.judge(whole, seen)
 
     def _finish(self, number: int, state: MissionState, message: str) -> None:
         self.store.finish(number, state, message)
         self._tell(f"Mission {number}: {state.value}: {message}")
+        if state is MissionState.SUCCESS:
+            self._dispatcher.done(number)
+        else:
+            self._dispatcher.drop(number)
+        self._given.settle()
 
     def _tell(self, line: str) -> None:
         if self.console is not None:
@@ -304,17 +356,24 @@ def run_fleet(dispatch: FleetDispatch, *, out: Path, seed: int, time_limit_s: fl
 
 
 def told(store: MissionStore, numbers: Sequence[int]) -> list[dict[str, Any]]:
-    """Missions as JSON values: whose each is or was, and how it ended."""
+    """Missions as JSON values, with their parts and what they are part of: whose each is or was, and how it ended."""
     given = GivenMissions(store).all()
     missions = {mission.id: mission for mission in store.missions()}
-    return [
-        {
-            "id": number,
-            "robot": given[number].robot if number in given else None,
-            "outcome": missions[number].state.value,
-            "referee": given[number].referee if number in given else None,
-            "reassigned": given[number].reassigned if number in given else 0,
-            "message": missions[number].message,
-        }
-        for number in numbers
-    ]
+    wanted = {*numbers, *(whole for number in numbers if (whole := given.get(number, GivenMission()).part_of))}
+    wanted |= {number for number, each in given.items() if each.part_of in wanted}
+    return [_told(missions[number], given) for number in sorted(wanted)]
+
+
+def _told(mission: StoredMission, given: Mapping[int, GivenMission]) -> dict[str, Any]:
+    known = given.get(mission.id, GivenMission())
+    parts = [each.robot for each in given.values() if each.part_of == mission.id and each.robot is not None]
+    return {
+        "id": mission.id,
+        "robot": parts[-1] if parts else known.robot,
+        "outcome": mission.state.value,
+        "referee": known.referee,
+        "reassigned": known.reassigned,
+        "message": mission.message,
+        "part_of": known.part_of,
+        "after": known.follows,
+    }

@@ -31,6 +31,7 @@ class Dispatcher:
         self._robots: list[str] = list(dict.fromkeys(robots))
         self._under_way: dict[str, int] = {}
         self._resting: set[str] = set()
+        self._after: dict[int, int] = {}
 
     @property
     def waiting(self) -> tuple[int, ...]:
@@ -59,9 +60,10 @@ class Dispatcher:
         robot is free. Without a robot that can be given work, nothing is refused.
         """
         free = [robot for robot in self._robots if robot not in self._under_way and robot not in self._resting]
-        if not self._waiting or not free:
+        up = [mission for mission in self._waiting if mission not in self._after]
+        if not up or not free:
             return Round((), {})
-        bids = {mission: [bid(mission, robot) for robot in self._robots] for mission in self._waiting}
+        bids = {mission: [bid(mission, robot) for robot in self._robots] for mission in up}
         awards = award(one for each in bids.values() for one in each)
         given = {each.mission for each in awards}
         refused = {mission: _why(each) for mission, each in bids.items() if mission not in given}
@@ -74,6 +76,22 @@ class Dispatcher:
         gone = {each.mission for each in begun} | set(refused)
         self._waiting = [mission for mission in self._waiting if mission not in gone]
         return Round(begun, refused, charging)
+
+    def add(self, mission: int, *, after: int | None = None) -> None:
+        """One more mission, which is put up when the one that it comes `after` has been done."""
+        self._waiting.append(mission)
+        if after is not None:
+            self._after[mission] = after
+
+    def done(self, mission: int) -> None:
+        """A mission has been done: those that come after it are put up."""
+        self._after = {each: before for each, before in self._after.items() if before != mission}
+
+    def drop(self, mission: int) -> Sequence[int]:
+        """A mission was not done: those that come after it are not waiting any more; their numbers."""
+        dropped = [each for each, before in self._after.items() if before == mission]
+        self._waiting = [each for each in self._waiting if each not in dropped]
+        return [*dropped, *(later for each in dropped for later in self.drop(each))]
 
     def over(self, robot: str) -> int:
         """The robot's mission has come to its end; its number. Raises KeyError: it has none."""

@@ -1,5 +1,6 @@
 """A fleet's run with scripted robots: who does what, and what becomes of the mission of a robot that dies."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -11,6 +12,7 @@ from executive.cli.requests import Prepared
 from executive.fleet.auction import Bid
 from executive.mission.command import Command, Task, parse_command
 from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
+from executive.mission.mission import lines_of
 from executive.mission.request import Request
 from executive.run.runner import RunEntry
 from executive.store.given import GivenMissions
@@ -36,7 +38,7 @@ class Fleet:
         self.store, self.clock, self.registry, self.out = store, clock, registry, out
         battery = knowledge.battery.model_copy(update={"low": 0.05})
         self.knowledge = knowledge.model_copy(update={"battery": battery})
-        self.unable = set()
+        self.unable, self.cannot = set(), lambda name, command: False
         self.robots = {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
         self.faults, self.make, self.missions, self.judged = {}, make, {}, []
         self.shares, self.since_s = [], []
@@ -50,13 +52,16 @@ class Fleet:
         return RunEntry(prepared.tree, robot, self.make.StillLocaliser(), self.make.EmptyCostmap())
 
     def _bid(self, mission, name, now):
-        problems = ("out of reach",) if name in self.unable else ()
+        prepared = mission.options.get(name)
+        commands = () if prepared is None else prepared.tree.commands
+        unable = name in self.unable or any(self.cannot(name, command) for command in commands)
+        problems = ("out of reach",) if unable else ()
         return Bid(mission.stored.id, name, 0.0, 1.0 + 0.5 * ROBOTS.index(name), problems=problems)
 
     def _prepared(self, request, mission):
         tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
         world = SimpleNamespace(name="scripted", dock=START)
-        return Prepared(request, mission, world, self.knowledge, tree)
+        return Prepared(replace(request, commands=lines_of(tree.steps)), mission, world, self.knowledge, tree)
 
     def queue(self, *lines):
         request = Request(commands=lines, name="work", world_name="scripted")
@@ -76,7 +81,7 @@ class Fleet:
         docks = {name: self._docking(name) for name in ROBOTS}
         dispatch = FleetDispatch(self.store, dict(self.missions), placed, self, docks=docks)
         run_fleet(dispatch, out=self.out, seed=3)
-        rows = told(self.store, list(self.missions))
+        self.rows = rows = told(self.store, list(self.missions))
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
 
     def _docking(self, name):
@@ -233,3 +238,55 @@ def test_a_robot_that_is_lost_is_left_out_and_its_mission_done_by_the_other(flee
     script.ends["navigate"] = lose
     script.ends["relocalise"] = lambda skill: Failed(Cause.EXECUTION, "no match")
     assert fleet.run() == [("Bob", "success", 1)]
+
+
+def only_alice_takes_and_only_bob_goes_to_the_bedroom(name, command):
+    takes_in_kitchen = command.task is Task.GRASP and command.goal == "kitchen"
+    return (name == "Bob" and takes_in_kitchen) or (name == "Alice" and command.goal == "bedroom")
+
+
+@pytest.fixture
+def chain(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    script.ends.update(grasp=fleet.hold, place=fleet.put_down)
+    fleet.cannot = only_alice_takes_and_only_bob_goes_to_the_bedroom
+    fleet.queue(TAKE, PUT)
+    return fleet
+
+
+def test_what_no_robot_can_do_alone_is_handed_over_by_a_table(chain, script):
+    assert chain.run() == [("Bob", "success", 0), ("Alice", "success", 0), ("Bob", "success", 0)]
+    assert [(row["id"], row["part_of"], row["after"]) for row in chain.rows] == [
+        (1, None, None),
+        (2, 1, None),
+        (3, 1, 2),
+    ]
+    first, second = (chain.store.mission(number).request.commands for number in (2, 3))
+    take = first[1].replace("[coke] to", "[Nothing] to").replace("do [Nothing] to [Nothing]", "do [grasp] to [coke]")
+    assert (first[0], second) == (TAKE, (take, PUT))
+    assert (script.begun.count("grasp"), script.begun.count("place")) == (2, 2)
+
+
+def test_a_chain_is_judged_as_a_whole_from_the_beginning_of_its_first_part(chain):
+    chain.run()
+    assert chain.judged == [("Alice", "success"), ("Bob", "success")]
+    assert (chain.shares, chain.since_s) == ([("Alice", 2)], [0.0, 0.0])
+
+
+def test_when_the_first_part_fails_the_second_is_not_begun(chain, script):
+    script.ends["place"] = lambda skill: Failed(Cause.EXECUTION, "slipped")
+    assert [outcome for _, outcome, _ in chain.run()] == ["failure"] * 3
+    assert chain.message(3) == "mission 2, which comes before it, was not done"
+    assert chain.message(1).startswith("mission 2: ")
+
+
+def test_what_no_two_robots_can_do_either_ends_with_the_reason_of_each(chain):
+    chain.cannot = lambda name, command: command.goal == "bedroom"
+    assert chain.run() == [(None, "failure", 0)]
+    assert chain.message(1) == "no robot can do it: Alice: out of reach; Bob: out of reach"
+
+
+def test_what_one_robot_can_do_alone_is_not_split(chain):
+    chain.cannot = lambda name, command: name == "Alice" and command.goal == "bedroom"
+    assert chain.run() == [("Bob", "success", 0)]

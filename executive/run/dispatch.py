@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
 from executive.run.control import Control
 from executive.run.endings import ending_of
-from executive.run.outcome import RobotResult, RobotStatus
+from executive.run.outcome import Outcome, RobotResult, RobotStatus
 from executive.run.session import Session
 from executive.run.tree_run import Ending
 from executive.run.watchdog import VerbHung
 from executive.tree.compiler import CompiledTree
-from skills.api import Publish
+from skills.api import Cause, Publish
 
 if TYPE_CHECKING:
     from executive.run.runner import RunEntry
@@ -39,6 +39,9 @@ class Dispatch(Protocol):
     def begin(self) -> Sequence[RunEntry]:
         """The missions that begin now, each for a robot that has none. The run ends when there is none, and none is
         under way."""
+
+    def recalled(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
+        """The robots whose missions end now, and why, by how all were last seen."""
 
     def ended(self, end: MissionEnd) -> None:
         """A robot's mission has come to an end."""
@@ -85,6 +88,14 @@ class DispatchedSessions:
         """See how a robot is."""
         charge = session.context.robot.battery().charge
         self.seen[session.name] = replace(session.status, charge=charge)
+
+    def recall(self) -> None:
+        """End the missions that are recalled now."""
+        why = self._dispatch.recalled(self.seen)
+        for session in [each for each in self._sessions if each.name in why and each.result is None]:
+            session.close(Ending(Outcome.CANCELLED, Cause.CANCELLED, why[session.name]))
+            session.context.traffic.release()
+            self.end(session, None)
 
     def end(self, session: Session, gone: str | None) -> None:
         """A robot's mission is over, and it is free again unless it is `gone`."""

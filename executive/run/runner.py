@@ -318,6 +318,8 @@ class _Run:
                     self._resting.rest(session)
             elif self._given is not None:
                 self._for(session, partial(self._given.look, session), None)
+        if self._given is not None:
+            self._given.recall()
         if self.observer is not None:
             self.observer(self._progress())
         self._keep_pace(begun_wall_s)

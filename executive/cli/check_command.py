@@ -14,7 +14,7 @@ from rich.markup import escape
 from executive.cli.feasibility import check_prepared, route_planner_of
 from executive.cli.output import BAD_INPUT, console_for, print_json, refusals
 from executive.cli.requests import prepare
-from executive.cli.run_options import SET, START
+from executive.cli.run_options import ROBOTS, SET, START, robots_of
 from executive.cli.stack_command import STACK
 from executive.mission.errors import InputError
 from executive.mission.file.parameters import given_values
@@ -48,24 +48,25 @@ class CheckedFile:
 
 
 class Checker:
-    """Checks files; the routes planned in each world are shared among them.
+    """Checks files; the routes planned in each world for each kind of robot are shared among them.
 
-    `like` has what the requests share: the world in place of the files' own, stack, start and values of parameters.
+    `like` has what the requests share: the world in place of the files' own, stack, start, robots and values of
+    parameters.
     """
 
     def __init__(self, like: Request | None = None) -> None:
         self._like = like or Request()
-        self._routes: dict[Path, RoutePlanner] = {}
+        self._routes: dict[tuple[Path, str], RoutePlanner] = {}
 
     def check(self, file: Path) -> CheckedFile:
         """Check one file; raises nothing for what stands in it."""
         tree: CompiledTree | None = None
         try:
             prepared = prepare(replace(self._like, file=file), ask=None)
-            tree, world = prepared.tree, prepared.world
-            if world.folder not in self._routes:
-                self._routes[world.folder] = route_planner_of(world, self._like.stack)
-            checked = check_prepared(prepared, self._routes[world.folder])
+            tree, world, kind = prepared.tree, prepared.world, prepared.kind
+            if (world.folder, kind) not in self._routes:
+                self._routes[world.folder, kind] = route_planner_of(world, self._like.stack, kind)
+            checked = check_prepared(prepared, self._routes[world.folder, kind])
         except InputError as error:
             return CheckedFile(file, _placed(file, (error, *error.others)), tree)
         except Exception as defect:  # the other files are still to be checked
@@ -83,13 +84,15 @@ def check(
     given: SET = None,
     stack: STACK = None,
     start: START = None,
+    robots: ROBOTS = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object for all files on standard output.")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Show commands and trees, too.")] = False,
 ) -> None:
     """Check mission files without running them: commands, tree, paths on the map, time and battery."""
     with refusals():
         at = None if start is None else Start.of(start)
-        checker = Checker(Request(world=world, stack=stack, start=at, given=given_values(given or ())))
+        like = Request(world=world, stack=stack, start=at, given=given_values(given or ()))
+        checker = Checker(replace(like, robots=robots_of(robots)))
     checked = [checker.check(file) for file in files]
     if as_json:
         print_json(to_json(checked))

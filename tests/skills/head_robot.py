@@ -1,4 +1,4 @@
-"""A scripted robot with its camera on its head: Fetch's arm, gripper and head before things on a table or in the air."""
+"""A scripted robot with its camera on its head: Fetch's arm, gripper and head before a table with things on it."""
 
 from __future__ import annotations
 

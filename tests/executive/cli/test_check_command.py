@@ -160,3 +160,10 @@ def test_each_file_is_checked_on_its_own(write, monkeypatch):
     told = json.loads(result.stdout.splitlines()[-1])
     assert [(error["file"], "RecursionError" in error["message"]) for error in told["errors"]] == [(str(poison), True)]
     assert told["commands"]
+
+
+def test_a_file_is_checked_for_the_robots_that_are_given(write):
+    heavy = write("name: x\nsteps:\n  - {to: workshop, do: grasp, object: extinguisher}\n")
+    assert invoke(heavy, "--robots", "bob=fetch").exit_code == 0
+    unknown = invoke(heavy, "--robots", "bob=fatch")
+    assert (unknown.exit_code, "unknown kind of robot 'fatch'" in unknown.stderr) == (2, True)

@@ -7,44 +7,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from planar_robot import OUTLINE, NamingWorker, PlanarClock, PlanarRobot
-from pydrake.math import RigidTransform
 
 from executive.run.resting import SteppingAside
 from executive.run.traffic import TrafficTable
+from executive.run.worker import LockStepWorker
 from skills.api import Failed, LocalisationEstimate, SkillContext, Step, Succeeded
 from skills.estimate.grid_map import GridMap
 from skills.navigate.footprint import Footprint, disc_centres, pose_array
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.robot import BaseKind, Capabilities, FloatArray, Pose2D, Robot, Scan
+from skills.robot import BaseKind, Capabilities, FloatArray, Pose2D, Robot
+from skills.testing.clock import VirtualClock
+from skills.testing.estimators import KnownPlace
+from skills.testing.robot import BASE_ONLY, ScriptedRobot, Start
 
 ROUND = tuple((0.28 * math.cos(a), 0.28 * math.sin(a)) for a in np.arange(12) * math.tau / 12)
 TICK_S = 0.05
 ATTEMPTS = 3
 
 
-class FloorRobot(PlanarRobot):
-    """A robot that is where it believes to be, and has no sensors."""
-
-    def __init__(self, name: str, clock: PlanarClock, pose: Pose2D, base_kind: BaseKind) -> None:
-        self.name = name
-        super().__init__(clock, (), pose, cameras=False, base_kind=base_kind)
-        self.odometry_pose, self.scale_drift, self.yaw_drift_rad_per_m = pose, 1.0, 0.0
-
-    def capabilities(self) -> Capabilities:
-        """An oblong that can go sideways, or a round one that cannot."""
-        outline = ROUND if self.base_kind is BaseKind.DIFFERENTIAL else OUTLINE
-        return Capabilities(outline, 1.6, 2.0, 0.5, (0.4, 0.6), (-0.3, 0.3), None, None, (), "", self.base_kind)
-
-    def true_clearance_m(self) -> float:
-        """Nothing to touch is simulated."""
-        return math.inf
-
-    def _sweep(self) -> Scan | None:
-        return None
+def capabilities_of(base_kind: BaseKind) -> Capabilities:
+    """An oblong that can go sideways, or a round one that cannot; no arm, no camera."""
+    outline = ROUND if base_kind is BaseKind.DIFFERENTIAL else BASE_ONLY.footprint_m
+    return replace(BASE_ONLY, footprint_m=outline, base_kind=base_kind, cameras=())
 
 
 @dataclass(frozen=True)
@@ -62,20 +49,6 @@ class Surveyed:
 
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
         """Nothing is seen."""
-
-
-@dataclass(frozen=True)
-class Sure:
-    """A localiser of a robot whose odometry is its place."""
-
-    clock: PlanarClock
-
-    def estimate(self) -> LocalisationEstimate:
-        """No correction."""
-        return LocalisationEstimate(self.clock.now(), RigidTransform(), np.zeros((3, 3)), True)
-
-    def update(self, robot: Robot) -> None:
-        """Nothing."""
 
 
 @dataclass
@@ -117,27 +90,27 @@ class Floor:
     """Robots on a surveyed floor. `apart_m` is the least distance between two outlines so far."""
 
     grid: GridMap
-    clock: PlanarClock = field(default_factory=PlanarClock)
-    robots: dict[str, FloorRobot] = field(default_factory=dict)
+    clock: VirtualClock = field(default_factory=VirtualClock)
+    robots: dict[str, ScriptedRobot] = field(default_factory=dict)
     trips: dict[str, Trip] = field(default_factory=dict)
     apart_m: float = math.inf
 
     def __post_init__(self) -> None:
         self.table = TrafficTable({}, self.clock.now)
-        self.worker = NamingWorker(self.clock)
+        self.worker = LockStepWorker(self.clock)
 
     def add(self, name: str, start: Pose2D, base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL) -> SkillContext:
         """One more robot; what its skills may use."""
-        robot = self.robots[name] = FloorRobot(name, self.clock, start, base_kind)
+        robot = ScriptedRobot(self.clock, name=name, capabilities=capabilities_of(base_kind), start=Start(start))
+        self.robots[name] = robot
         self.table.join(name, Footprint.of(robot.capabilities()).discs)
         self.table.heard(name, start)
-        lease = robot.take_lease("test")
         return SkillContext(
             robot,
-            lease,
+            robot.acquire_lease("test"),
             self.clock,
             self.worker,
-            Sure(self.clock),
+            KnownPlace(start),
             Surveyed(self.grid),
             lambda topic, message: None,
             seed=0,
@@ -172,7 +145,7 @@ class Floor:
         return all(isinstance(trip.ended, Succeeded) for trip in self.trips.values())
 
 
-def least_apart_m(robots: Mapping[str, FloorRobot]) -> float:
+def least_apart_m(robots: Mapping[str, ScriptedRobot]) -> float:
     """The least distance between the outlines of two robots; negative where they overlap."""
     placed = []
     for robot in robots.values():

@@ -80,7 +80,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
         knowledge=prepared.knowledge,
         start=world.start,
         abilities=abilities_in(world, prepared.kind),
-        planner=planner or route_planner_of(world, prepared.request.stack, prepared.kind),
+        planner=planner or route_planner_of(world, prepared.stack_file, prepared.kind),
         estimates=load_estimates(),
     )
 

@@ -9,7 +9,7 @@ from typing import Final
 from executive.cli.durable import as_it_was
 from executive.cli.feasibility import check_prepared
 from executive.cli.goal_conditions import Share
-from executive.cli.requests import Prepared, prepare, prepared_for
+from executive.cli.requests import Prepared, prepare_alone, prepared_for
 from executive.cli.several import prepared_part, understood_for_robots
 from executive.cli.starts import PlacedRobot, knowledge_for
 from executive.fleet.auction import Bid
@@ -101,7 +101,7 @@ def _options(
         named = _named(meant.parts, robots)
         patient = _patient(knowledge)
         return {name: prepared_part(name, meanings, request, world, patient, robots) for name in named}
-    filed = prepare(as_it_was(stored, store.path), ask=None)
+    filed = prepare_alone(as_it_was(stored, store.path))
     if filed.world.seed_rules != world.seed_rules:
         raise InputError("its file brings objects into the world", hint="run it by `errand run`")
     return {name: _for_robot(name, filed, world, robots) for name in robots}

@@ -293,7 +293,7 @@ def _run_kept(
             control = control_for(console, quiet=quiet) if shown is None else shown.control
             durable = None if prepared.robots else new_run(missions, mission)
             start = partial(run_simulated, prepared, page=shown, durable=durable, profile=profile)
-            talk = None if shown is None else shown.conversation
+            talk = None if shown is None else shown.talk
             finished = show_run(
                 start,
                 prepared,
@@ -301,7 +301,7 @@ def _run_kept(
                 control=control,
                 quiet=quiet,
                 whole_tree=whole_tree,
-                conversation=talk,
+                talk=talk,
                 voice=voice,
             )
             ended(finished.report)

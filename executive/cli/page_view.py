@@ -1,4 +1,4 @@
-"""`errand run --view`: the live page of one run, which stays as a replay when the run has ended."""
+"""`--view`: the live page of one run, which stays as a replay when the run has ended."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from executive.cli.feasibility import refuse_impossible
 from executive.cli.missions_command import shipped_missions
 from executive.cli.replay_command import served, wait
 from executive.cli.requests import Prepared, prepare
-from executive.cli.talk import conversation_of, load_ahead
+from executive.cli.talk import Talk, load_ahead
 from executive.conversation import ReplyKind
 from executive.mission.errors import InputError
 from executive.mission.file.parameters import given_values
@@ -25,7 +25,7 @@ from executive.record.surroundings import map_message
 from executive.run.control import Control
 from executive.run.runner import Progress
 from executive.store.missions import MissionStore
-from executive.view.actions import Action, RefusedError, asked_json, control_actions, text_of
+from executive.view.actions import Action, RefusedError, asked_json, control_actions, robot_of, text_of
 from executive.view.feed import Feed
 from executive.view.server import PageContent, PageServer
 from executive.view.watch import ControlWatch, ProgressWatch
@@ -36,23 +36,31 @@ class PageView:
     """The page of one run: `begin` before it, called as an observer while it runs, `end` and `stay` after it."""
 
     def __init__(
-        self, prepared: Prepared, console: Console, *, port: int = 0, later: Callable[[str], str] | None = None
+        self, prepared: Prepared | None, console: Console, *, port: int = 0, later: Callable[[str], str] | None = None
     ) -> None:
-        """`later` queues a sentence and says so; without it the page offers no queue."""
+        """`prepared` is what robots are asked for who can be spoken to; without it the page hears no sentences.
+
+        `later` queues a sentence and says so; without it the page offers no queue.
+        """
         self._console, self._port, self._later = console, port, later
         self.control = Control(attended=True)
         self._feed = Feed()
         self._progress = ProgressWatch(self._feed)
-        self.conversation = conversation_of(prepared, self.control)
-        self.conversation.listen(lambda waiting: self._feed.tell("asked", asked_json(waiting)))
+        self.talk = None if prepared is None else Talk(prepared, self.control)
+        if self.talk is not None:
+            self.talk.listen(lambda name, waiting: self._feed.tell(f"asked/{name}", asked_json(waiting, name)))
         self._server: PageServer | None = None
         self._watch: ControlWatch | None = None
 
     def begin(self, log: EventLog, scene: Scene | None) -> None:
         """Serve the page and print its address. Raises InputError when the port is taken."""
         log.listen(self._feed)
-        load_ahead()
-        sentences = {"say": said(self._hear), **({} if self._later is None else {"queue": said(self._later)})}
+        sentences: dict[str, Action] = {}
+        if self.talk is not None:
+            load_ahead()
+            sentences["say"] = said(self._hear)
+        if (later := self._later) is not None:
+            sentences["queue"] = said(lambda sentence, _: later(sentence))
         actions = {**control_actions(self.control), **sentences, **({} if scene is None else scene_actions(scene))}
         content = PageContent(self._feed, actions, scene_url=None if scene is None else scene.url)
         self._server = served(content, self._port)
@@ -86,21 +94,22 @@ class PageView:
         if self._server is not None:
             self._server.close()
 
-    def _hear(self, sentence: str) -> str:
+    def _hear(self, sentence: str, robot: str | None) -> str:
         """Have what was typed done, or answered; raises InputError with the reason where it cannot be."""
-        reply = self.conversation.hear(sentence)
+        assert self.talk is not None
+        reply = self.talk.hear(sentence, robot)
         if reply.kind in (ReplyKind.REFUSED, ReplyKind.IGNORED):
             raise InputError(reply.text)
         return reply.text
 
 
-def said(do: Callable[[str], str]) -> Action:
-    """An action that does something with the sentence that was typed."""
+def said(do: Callable[[str, str | None], str]) -> Action:
+    """An action that does something with the sentence that was typed, for the robot that it is meant for."""
 
     def say(values: Mapping[str, Any]) -> str:
         sentence = text_of(values, "text")
         try:
-            return do(sentence)
+            return do(sentence, robot_of(values))
         except (InputError, ValueError) as error:
             raise RefusedError(str(error)) from error
 

@@ -15,8 +15,7 @@ from executive.cli.durable import STORE
 from executive.cli.live import live_view
 from executive.cli.mission_run import Finished, both
 from executive.cli.requests import Prepared
-from executive.cli.talk import conversation_of, load_ahead
-from executive.conversation import Conversation
+from executive.cli.talk import Talk, load_ahead
 from executive.language import load_parser
 from executive.record.event_log import Listener
 from executive.record.schemas import SPEECH
@@ -77,10 +76,10 @@ def show_run(
     control: Control,
     quiet: bool,
     whole_tree: bool = False,
-    conversation: Conversation | None = None,
+    talk: Talk | None = None,
     voice: Voice = SILENCE,
 ) -> Finished:
-    """Run it, shown on the console and controlled from there; `conversation` is one that goes on elsewhere, too.
+    """Run it, shown on the console and controlled from there; `talk` is one that goes on elsewhere, too.
 
     What the robot says is written there, and said by the `voice`.
     With `whole_tree` all its nodes are shown in the end.
@@ -89,18 +88,20 @@ def show_run(
         console.print(f"{told}.", markup=False)
     for line in (*prepared.request.scenario.lines(), *prepared.request.variation.lines()):
         console.print(f"Scenario: {line}", markup=False)
-    for command in prepared.mission.commands:
-        console.print(str(command), markup=False)
-    talk = conversation or conversation_of(prepared, control)
-    talk.begun(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
+    for each in prepared.all:
+        to = f"{each.mission.robot_name}: " if prepared.robots else ""
+        for command in each.mission.commands:
+            console.print(f"{to}{command}", markup=False)
+    elsewhere, talk = talk is not None, talk or Talk(prepared, control)
+    talk.begun()
     listener = speech_heard(console, voice, quiet=quiet)
     if quiet:
-        if conversation is None:
+        if not elsewhere:
             load_parser().release()  # nobody speaks to the run
-        finished = start(control=control, observer=None if conversation is None else talk.observe, listener=listener)
+        finished = start(control=control, observer=talk.observe if elsewhere else None, listener=listener)
     else:
         with live_view(console, control, say=lambda text: talk.hear(text).text) as observer:
-            if control.attended and conversation is None:
+            if control.attended and not elsewhere:
                 load_ahead()
             finished = start(control=control, observer=both(observer, talk.observe), listener=listener)
     if whole_tree:

@@ -63,6 +63,8 @@ class RemarkAnswers:
         held = now.mode in (Mode.STOPPED, Mode.PAUSED)
         self._control.release_stop_button(robot=one)
         self._control.resume(robot=one)
+        if one is not None and (still := self._control.state.robots[one]).mode in (Mode.STOPPED, Mode.PAUSED):
+            return refused(f"{still.reason}, as all robots are; say so to all of them")
         return done("I go on" if held else "I am under way")
 
     def _cancel(self) -> Reply:

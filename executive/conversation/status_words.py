@@ -47,8 +47,9 @@ def doing_in_words(progress: Progress | None, state: ControlState, robot_name: s
     states = progress.states[robot_name]
     own = {path_id: states[path_id] for path_id in tree.path_ids if path_id in states}
     said = f"I am busy with '{tree.mission_name}'{_step(own)}"
-    if state.mode in _HELD:
-        said = f"I stand still ({state.reason}); then I go on with '{tree.mission_name}'{_step(own)}"
+    own_mode = state.robots.get(robot_name, state)
+    if own_mode.mode in _HELD:
+        said = f"I stand still ({own_mode.reason}); then I go on with '{tree.mission_name}'{_step(own)}"
     asked = "".join(f"; I have asked: {each.question.text}" for each in state.questions)
     trouble = _last_failure(own)
     return f"{said}{f'; before, {trouble}' if trouble else ''}{asked}"

@@ -309,7 +309,8 @@ class Conversation:
         except InputError as error:
             return refused(str(error))
         give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, self._replace)
-        still = "; I stand still until you say 'go on'" if state.mode in (Mode.PAUSED, Mode.STOPPED) else ""
+        mode = state.robots.get(self._speech.robot_name, state).mode
+        still = "; I stand still until you say 'go on'" if mode in (Mode.PAUSED, Mode.STOPPED) else ""
         text = "; ".join((*notes, f"{when.value}: {'; '.join(written(steps) or map(str, todo))}{still}"))
         reply = self._tried(partial(give, tree), text, todo)
         if reply.kind is ReplyKind.DONE:

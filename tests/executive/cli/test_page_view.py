@@ -31,7 +31,7 @@ def prepared():
 def page(prepared):
     page = PageView(prepared, Console(file=io.StringIO()))
     page.control.begin({"Alice": prepared.tree})
-    page.conversation.begun(prepared.tree, memory=prepared.meant.memory)
+    page.talk.begun()
     yield page
     page.close()
 

@@ -6,14 +6,18 @@ import threading
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
+from py_trees.common import Status
 from websockets.exceptions import InvalidStatus, WebSocketException
 from websockets.sync.client import connect
 
 from executive.run.control import Control, Mode
-from executive.view.actions import RefusedError, control_actions, text_of
+from executive.run.runner import Progress
+from executive.tree.snapshot import NodeState
+from executive.view.actions import RefusedError, control_actions, control_json, text_of
 from executive.view.feed import Feed
 from executive.view.server import PageContent, PageServer
-from executive.view.watch import ControlWatch
+from executive.view.watch import ControlWatch, progress_word
+from skills.api import Question
 
 
 @pytest.fixture
@@ -143,6 +147,44 @@ def test_actions_reach_the_control(server, control):
     act(server, "release")
     act(server, "cancel")
     assert control.poll().cancel == "cancelled from the page"
+
+
+def test_a_panels_buttons_are_for_its_robot_alone(feed, clock, compiled, make):
+    control = Control(attended=True)
+    control.begin({name: compiled(*make.FETCH) for name in ("Alice", "Bob")})
+    with PageServer(PageContent(feed, control_actions(control))) as server:
+        assert act(server, "pause", {"robot": "Bob"}) == (200, {"said": "Bob: pausing"})
+        act(server, "stop", {"robot": "Alice"})
+        act(server, "cancel", {"robot": "Bob"})
+        assert act(server, "pause", {"robot": "Carl"})[0] == 409
+        modes = {name: each.mode for name, each in control.state.robots.items()}
+        assert modes == {"Alice": Mode.STOPPED, "Bob": Mode.PAUSED}
+        assert (control.poll().cancel, control.state.mode) == (None, Mode.RUNNING)
+        act(server, "release", {"robot": "Alice"})
+        act(server, "resume", {"robot": "Bob"})
+    assert {each.mode for each in control.state.robots.values()} == {Mode.RUNNING}
+
+
+def test_the_page_is_told_what_each_robot_does_and_asks(clock, compiled, make):
+    control = Control(attended=True)
+    control.begin({name: compiled(*make.FETCH) for name in ("Alice", "Bob")})
+    control.pause("let me look", robot="Bob")
+    control.ask(Question("q", "Is it open?", ("yes", "no"), "no", 60.0), clock, "Alice")
+    told = control_json(control.state)
+    assert told["robots"] == {
+        "Alice": {"mode": "running", "reason": ""},
+        "Bob": {"mode": "paused", "reason": "let me look"},
+    }
+    assert [each["robot"] for each in told["questions"]] == ["Alice"]
+
+
+def test_the_page_is_told_what_each_robot_is_at():
+    running = {"a/go": NodeState(Status.RUNNING, None, "half way", progress=0.5), "a": NodeState(Status.SUCCESS)}
+    word = progress_word(Progress(2.0, 40, 0, {"Alice": running, "Bob": {"b": NodeState()}}))
+    assert word["robots"] == {
+        "Alice": {"node": "a/go", "message": "half way", "progress": 0.5},
+        "Bob": {"node": None, "message": "", "progress": None},
+    }
 
 
 @pytest.mark.parametrize(

@@ -167,7 +167,8 @@ class Place(ArmSkill[PlaceInputs]):
         heights_m, standing = self._heights_m(surface), f"standing up to the {surface.name}"
         while True:
             yield from self.stand_at(heights_m[0], standing)
-            on_floor, standing_W = surface.height_m < _FLOOR_M, self._standing_W(surface)
+            on_floor = surface.height_m < _FLOOR_M and self.object_camera.on_hand
+            standing_W = self._standing_W(surface)
             view = yield from self._look_at_floor(surface) if on_floor else self._look(surface, spot_W)
             if view is None or (on_floor and len(free_spots(view, self._spots(surface))) == 0):
                 view = unseen_view(surface, standing_W)
@@ -284,7 +285,7 @@ class Place(ArmSkill[PlaceInputs]):
         return None if view is None or (hidden and len(free_spots(view, self._spots(surface))) == 0) else view
 
     def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView | None]:
-        """What the cameras at the body's front see of the floor: the object hides it from the hand camera."""
+        """What the cameras at the body's front see of the floor: the object hides it from one on the hand."""
         message, robot = f"looking for a free spot on the {surface.name}", self.context.robot
         X_WO, views = self.context.localiser.estimate().X_WO, list[SurfaceView]()
         for camera in robot.capabilities().body_cameras:

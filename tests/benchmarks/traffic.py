@@ -3,8 +3,8 @@
     python -m tests.benchmarks.traffic [--what door,missions] [--first 0] [--count 5] [--out FOLDER]
 
 `door`: the two meet at a door or passage that one fits through, each on its way to the place where the other begins;
-world, door, kinds of robots, starts and delays are drawn from the case's number. `missions`: each has a mission of its
-own. Reported are how many runs ended with both fulfilled (`resolved`: by the tree, and not denied by the referee),
+world, door, kinds of robots, starts and delays are drawn from the case's number, and nobody else is about. `missions`:
+each has a mission of its own. Reported are how many runs ended with both fulfilled (`resolved`: by the tree, and not denied by the referee),
 contacts between the two and all collisions by the referee, and deadlocks: runs that stood still for 60 s, or ran out of
 time.
 """
@@ -16,7 +16,7 @@ import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from executive.cli.mission_run import run_request
@@ -25,6 +25,7 @@ from executive.cli.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.mission.robots import RobotSetup
 from executive.run.runner import Progress
+from plant.worlds.world import World
 from skills.robot import Pose2D
 from tests.benchmarks.traffic_cases import meeting, missions
 
@@ -89,7 +90,8 @@ def run_case(what: str, number: int, out: Path) -> Result:
     )
     request.out.mkdir(parents=True, exist_ok=True)
     prepared = prepare_several(request, ask=None)
-    backend = SimulatedBackend(prepared.world, prepared.robots, seed=number, record=False)
+    here = prepared.world if what == "missions" else _without_people(prepared.world)
+    backend = SimulatedBackend(here, prepared.robots, seed=number, record=False)
     standing = Standing()
     report = run_request(prepared, backend, observer=standing).report
     seen = [each.referee for each in report.robots.values() if each.referee is not None]
@@ -107,6 +109,11 @@ def run_case(what: str, number: int, out: Path) -> Result:
         sim_time_s=report.sim_time_s,
         messages=tuple(each.message for each in report.robots.values()),
     )
+
+
+def _without_people(world: World) -> World:
+    """The world with nobody in it, who would stand between a robot and its door."""
+    return replace(world, seed_rules=replace(world.seed_rules, people=()))
 
 
 def summary(results: Sequence[Result]) -> dict[str, object]:

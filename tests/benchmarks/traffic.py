@@ -4,9 +4,9 @@
 
 `door`: the two meet at a door or passage that one fits through, each on its way to the place where the other begins;
 world, door, kinds of robots, starts and delays are drawn from the case's number, and nobody else is about. `missions`:
-each has a mission of its own. Reported are how many runs ended with both fulfilled (`resolved`: by the tree, and not denied by the referee),
-contacts between the two and all collisions by the referee, and deadlocks: runs that stood still for 60 s, or ran out of
-time.
+each has a mission of its own. Reported are how many runs ended with both fulfilled (`resolved`: by the tree, and not
+denied by the referee), contacts between the two and all collisions by the referee, and deadlocks: runs that stood
+still for 60 s, or ran out of time.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from executive.cli.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.mission.robots import RobotSetup
 from executive.run.runner import Progress
-from plant.worlds.world import World
 from skills.robot import Pose2D
 from tests.benchmarks.traffic_cases import meeting, missions
 
@@ -90,7 +89,7 @@ def run_case(what: str, number: int, out: Path) -> Result:
     )
     request.out.mkdir(parents=True, exist_ok=True)
     prepared = prepare_several(request, ask=None)
-    here = prepared.world if what == "missions" else _without_people(prepared.world)
+    here = prepared.world if what == "missions" else prepared.world.without_people()
     backend = SimulatedBackend(here, prepared.robots, seed=number, record=False)
     standing = Standing()
     report = run_request(prepared, backend, observer=standing).report
@@ -109,11 +108,6 @@ def run_case(what: str, number: int, out: Path) -> Result:
         sim_time_s=report.sim_time_s,
         messages=tuple(each.message for each in report.robots.values()),
     )
-
-
-def _without_people(world: World) -> World:
-    """The world with nobody in it, who would stand between a robot and its door."""
-    return replace(world, seed_rules=replace(world.seed_rules, people=()))
 
 
 def summary(results: Sequence[Result]) -> dict[str, object]:

@@ -86,9 +86,7 @@ def meeting(number: int) -> Meeting:
     delays = (0, int(rng.choice(DELAYS_S)))
     late = dict(zip(NAMES, delays if rng.integers(2) else delays[::-1], strict=True))
     robots = {name: RobotSetup(kind, start) for name, kind, start in zip(NAMES, kinds, starts, strict=True)}
-    return Meeting(
-        world.name, seed, " and ".join(door.between), robots, dict(zip(NAMES, reversed(sides), strict=True)), late
-    )
+    return Meeting(world.name, " and ".join(door.between), robots, dict(zip(NAMES, reversed(sides), strict=True)), late)
 
 
 def doors_for_one(knowledge: Knowledge) -> Sequence[Door]:

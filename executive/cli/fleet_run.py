@@ -146,13 +146,24 @@ class FleetDispatch:
 
     def _entry(self, name: str, mission: FleetMission) -> RunEntry:
         robot, prepared = self._robots[name], mission.options[name]
-        if robot.entry is None:
-            disturbed = replace(prepared.request, scenario=Scenario(robot.faults))
-            robot.entry = entry_for(replace(prepared, request=disturbed), self.backend, None, self._work)
+        entry = self._with_estimators(name, prepared)
         robot.journal = ProgressJournal(prepared.tree, lambda progress: self._progress(mission, progress))
         self._announce(prepared)
         speaker_W = next(iter(self.robots.values())).start
-        return replace(robot.entry, tree=prepared.tree, journal=robot.journal, speaker_W=speaker_W)
+        return replace(entry, tree=prepared.tree, journal=robot.journal, speaker_W=speaker_W)
+
+    def spare(self) -> Sequence[RunEntry]:
+        """The robots before they have a mission."""
+        options = next((mission.options for mission in self.missions.values()), {})
+        return [self._with_estimators(name, options[name]) for name in self.robots if name in options]
+
+    def _with_estimators(self, name: str, prepared: Prepared) -> RunEntry:
+        """The robot with its faults and estimators, which stay the same from mission to mission."""
+        robot = self._robots[name]
+        if robot.entry is None:
+            disturbed = replace(prepared.request, scenario=Scenario(robot.faults))
+            robot.entry = entry_for(replace(prepared, request=disturbed), self.backend, None, self._work)
+        return robot.entry
 
     def _progress(self, mission: FleetMission, progress: Progress) -> None:
         done = mission.done + progress.done
@@ -216,6 +227,7 @@ def run_fleet(dispatch: FleetDispatch, *, out: Path, seed: int, time_limit_s: fl
                 settings=RunSettings(seed=seed, time_limit_s=limit_s),
                 control=control,
                 dispatch=dispatch,
+                spare=dispatch.spare(),
             )
     finally:
         dispatch.log.close()

@@ -244,6 +244,7 @@ class FleetDispatch:
         robot.free_at_s = self._now_s + charging_time_s(robot.charge, self.battery.charged)
         robot.journal = None
         self._tell(f"{name} goes to its dock: its battery is at {robot.charge:.0%}")
+        self._announce(robot.dock)
         return replace(self._robot_entry(name, robot.dock), tree=robot.dock.tree)
 
     def _entry(self, name: str, mission: FleetMission) -> RunEntry:
@@ -251,15 +252,20 @@ class FleetDispatch:
         robot.journal = ProgressJournal(prepared.tree, lambda progress: self._progress(mission, progress))
         speaker_W = next(iter(self.robots.values())).start
         entry = self._robot_entry(name, prepared)
+        self._announce(prepared)
         return replace(entry, tree=prepared.tree, journal=robot.journal, speaker_W=speaker_W)
 
+    def spare(self) -> Sequence[RunEntry]:
+        """The robots before they have a mission."""
+        options = next((mission.options for mission in self.missions.values()), {})
+        return [self._robot_entry(name, options[name]) for name in self.robots if name in options]
+
     def _robot_entry(self, name: str, prepared: Prepared) -> RunEntry:
-        """The robot, with its estimators as they were in its last mission."""
+        """The robot with its faults and estimators, which stay the same from mission to mission."""
         robot = self._robots[name]
         if robot.entry is None:
             disturbed = replace(prepared.request, scenario=Scenario(robot.faults))
             robot.entry = entry_for(replace(prepared, request=disturbed), self.backend, None, self._work)
-        self._announce(prepared)
         return robot.entry
 
     def _progress(self, mission: FleetMission, progress: Progress) -> None:
@@ -349,6 +355,7 @@ def run_fleet(dispatch: FleetDispatch, *, out: Path, seed: int, time_limit_s: fl
                 settings=RunSettings(seed=seed, time_limit_s=limit_s),
                 control=control,
                 dispatch=dispatch,
+                spare=dispatch.spare(),
             )
     finally:
         dispatch.log.close()

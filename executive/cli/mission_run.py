@@ -70,6 +70,7 @@ def run_request(
     out, clock, work = prepared.request.out, backend.clock, Work()
     scenario = prepared.request.scenario
     entries = [entry_for(each, backend, durable, work) for each in prepared.all]
+    spare = _spare(prepared, backend)
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock, apart=len(prepared.robots) > 1)
     if listener is not None:
         log.listen(listener)
@@ -94,6 +95,7 @@ def run_request(
                 observer=both(observer, page, watched),
                 work=work,
                 profile=profile,
+                spare=spare,
             )
         if durable is not None:
             _keep(durable, log, prepared.tree.robot_name)
@@ -125,6 +127,13 @@ def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None, wor
         after=prepared.after,
         speaker_W=prepared.speaker_W,
     )
+
+
+def _spare(prepared: Prepared, backend: Backend) -> Sequence[RunEntry]:
+    """The robots of a request that have nothing to do in it."""
+    busy = {each.tree.robot_name for each in prepared.all}
+    names = [name for name in prepared.robots if name not in busy]
+    return [backend.entry(replace(prepared.tree, robot_name=name), None) for name in names]
 
 
 def _settings(request: Request) -> RunSettings:

@@ -291,7 +291,7 @@ def _run_kept(
             )
         with kept(missions, mission) as ended:
             control = control_for(console, quiet=quiet) if shown is None else shown.control
-            durable = None if prepared.robots else new_run(missions, mission)
+            durable = new_run(missions, mission, prepared)
             start = partial(run_simulated, prepared, page=shown, durable=durable, profile=profile)
             talk = None if shown is None else shown.conversation
             finished = show_run(

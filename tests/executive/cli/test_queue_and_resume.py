@@ -46,7 +46,8 @@ class Plant:
         self.stacks.append(prepared.request.stack)
         leaf = next(node.path_id for node in tree.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id)
         done = Change(leaf, NodeState(), NodeState(Status.SUCCESS, None, "done"))
-        durable.journal.note(TickNote(1.0, (done,), {}, None, {}))
+        for journal in durable.journals.values():
+            journal.note(TickNote(1.0, (done,), {}, None, {}))
         outcome = self.outcomes.pop(0) if self.outcomes else "success"
         if outcome == "killed":
             raise GoneError
@@ -175,7 +176,7 @@ def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(erra
             node.path_id for node in other.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id
         )
         change = Change(leaf, NodeState(), NodeState(Status.RUNNING, None, "on the way"))
-        durable.journal.replaced(other).note(TickNote(2.0, (change,), {}, None, {}))
+        next(iter(durable.journals.values())).replaced(other).note(TickNote(2.0, (change,), {}, None, {}))
         raise GoneError
 
     with monkeypatch.context() as patch, pytest.raises(GoneError):

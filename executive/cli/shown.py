@@ -85,12 +85,14 @@ def show_run(
     What the robot says is written there, and said by the `voice`.
     With `whole_tree` all its nodes are shown in the end.
     """
-    for told in prepared.mission.notes:
+    for told in dict.fromkeys(note for each in prepared.all for note in each.mission.notes):
         console.print(f"{told}.", markup=False)
     for line in (*prepared.request.scenario.lines(), *prepared.request.variation.lines()):
         console.print(f"Scenario: {line}", markup=False)
-    for command in prepared.mission.commands:
-        console.print(str(command), markup=False)
+    for each in prepared.all:
+        who = f"{each.mission.robot_name}: " if prepared.robots else ""
+        for command in each.mission.commands:
+            console.print(f"{who}{command}", markup=False)
     talk = conversation or conversation_of(prepared, control)
     talk.begun(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
     listener = speech_heard(console, voice, quiet=quiet)

@@ -152,8 +152,8 @@ def _to_come(faults: Sequence[str], now_s: float) -> list[Fault]:
 
 def _keep(durable: Durable, log: EventLog, robot_name: str) -> None:
     """Keep the world for the next mission, which begins where this one ended, and log what could not be kept."""
-    durable.journal.keep_world()
-    for trouble in durable.journal.troubles:
+    next(iter(durable.journals.values())).keep_world()
+    for trouble in durable.troubles:
         log(ERROR_TOPIC, {"node": robot_name, "what": "keep the mission's state", "traceback": trouble})
 
 

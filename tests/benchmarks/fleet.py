@@ -4,7 +4,7 @@
         [--out FOLDER]
 
 `missions`: twelve missions in the queue, whose objects and places the seed draws, for so many Spots and Fetches.
-`killed`: two Spots, of which Alice dies at a time that the seed draws; her mission is finished by Bob or told as failed,
+`killed`: two Spots; Alice dies at a time that the seed draws; her mission is finished by Bob or told as failed,
 and nothing is done twice: no object is lifted by both. `ticks`: the executive's own time per tick for four scripted
 robots against that for one, in the same run.
 """

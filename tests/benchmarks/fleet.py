@@ -135,7 +135,8 @@ def run_killed(seed: int, out: Path, kinds: Sequence[str]) -> Result:
     assert isinstance(backend, SimulatedBackend)
     lifted_by = {name: {lift.robot for lift in each.lifts} for name, each in backend.referee.objects.items()}
     twice = [name for name, by in lifted_by.items() if len(by) > 1]
-    over = all(row["outcome"] != MissionState.QUEUED.value for row in rows)
+    open_still = {MissionState.QUEUED.value, MissionState.RUNNING.value}
+    over = all(row["outcome"] not in open_still for row in rows)
     claimed = [row for row in rows if row["outcome"] == MissionState.SUCCESS.value]
     true = all(row["referee"]["success"] is not False for row in claimed)
     result = result_of("killed", seed, dispatch, rows, wall_s)

@@ -79,7 +79,7 @@ class Fleet:
         self.since_s.append(since_s)
 
     def run(self):
-        placed = {name: SimpleNamespace(start=START) for name in ROBOTS}
+        placed = {name: SimpleNamespace(start=START, kind="spot") for name in ROBOTS}
         docks = {name: self._docking(name) for name in ROBOTS}
         dispatch = FleetDispatch(self.store, dict(self.missions), placed, self, docks=docks)
         run_fleet(dispatch, out=self.out, seed=3)

@@ -10,6 +10,7 @@ from typing import Any, Final
 from rich.console import Console
 
 from executive.cli.backend import Backend
+from executive.cli.feasibility import route_planner_of
 from executive.cli.fleet_chain import chained
 from executive.cli.fleet_missions import FleetMission, RobotNow, bid_for, charging_time_s, rest_of
 from executive.cli.fleet_progress import Progress, ProgressJournal
@@ -33,6 +34,7 @@ from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.store.given import GivenMission, GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.tree.estimate import RoutePlanner
 from skills.robot import Pose2D
 
 __all__ = ["FleetDispatch", "run_fleet"]
@@ -55,6 +57,7 @@ class _Robot:
     entry: RunEntry | None = None
     journal: ProgressJournal | None = None
     dock: Prepared | None = None
+    planner: RoutePlanner | None = None
     faults: tuple[str, ...] = ()
 
 
@@ -232,7 +235,10 @@ class FleetDispatch:
     def _offer(self, wanted: FleetMission, name: str) -> Bid:
         """What a robot offers from where it is free next."""
         robot = self._robots[name]
-        now = RobotNow(robot.pose, robot.charge, self.battery.low, robot.dock)
+        if robot.planner is None:
+            some = wanted.options.get(name, next(iter(wanted.options.values())))
+            robot.planner = route_planner_of(some.world, some.request.stack, self.robots[name].kind, kept=False)
+        now = RobotNow(robot.pose, robot.charge, self.battery.low, robot.planner, robot.dock)
         if name in self._dispatcher.resting and robot.dock is not None:
             now = replace(now, pose=robot.dock.world.dock or robot.pose, charge=self.battery.charged)
         return replace(bid_for(wanted, name, now), ready_s=self._ready_s(robot))

@@ -196,6 +196,14 @@ class ForgettingCostmap(Protocol):
 
 
 @runtime_checkable
+class SharedCostmap(Protocol):
+    """A costmap that leaves other robots to those who know where they are."""
+
+    def leave_out(self, discs_W: NDArray[np.float64]) -> None:
+        """From now on take in nothing that is seen within these discs, rows of x, y and radius (m, world)."""
+
+
+@runtime_checkable
 class LayeredView(Protocol):
     """A costmap that says what is seen and not surveyed."""
 

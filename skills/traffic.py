@@ -20,7 +20,8 @@ class Neighbour:
     """Another robot: its name, its believed pose (3,) and the poses (N, 3) still before it, all x, y, yaw in the world.
 
     `way` is None while it goes nowhere. `discs` (x, y, radius) cover its outline in the body frame. `first` while it
-    goes before us where the ways of both meet.
+    goes before us where the ways of both meet; `yields` while it clears a way that is reserved against it, since it
+    drives and goes after us, or has nothing to do. One that is neither works where it stands, and is waited for.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Neighbour:
     discs: FloatArray
     stamp_s: float
     first: bool = False
+    yields: bool = False
 
 
 class Traffic(Protocol):

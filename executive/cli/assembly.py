@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from executive.cli.goal_conditions import verdict_of
+from executive.cli.goal_conditions import Share, verdict_of
 from executive.cli.grids import grid_at
 from executive.cli.starts import PlacedRobot
 from executive.mission.errors import InputError
@@ -110,6 +110,13 @@ def take_up_plant(simulation: Simulation, path: Path, *, label: str | None) -> N
         raise InputError(str(error)) from error
 
 
-def judge(simulation: Simulation, tree: CompiledTree, result: RobotResult) -> Verdict:
-    """What the referee says of the mission's goal conditions."""
-    return verdict_of(tree, result, simulation.referee.judge)
+def judge(
+    simulation: Simulation,
+    tree: CompiledTree,
+    result: RobotResult,
+    *,
+    before: Sequence[Share] = (),
+    since_s: float = 0.0,
+) -> Verdict:
+    """What the referee says of the mission's goal conditions, those included that other robots fulfilled `before`."""
+    return verdict_of(tree, result, simulation.referee.judge, before=before, since_s=since_s)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from executive.cli.artifacts import Artifacts
 from executive.cli.durable import Durable
@@ -14,6 +14,9 @@ from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
 from executive.tree.compiler import CompiledTree
 from skills.robot import Clock
+
+if TYPE_CHECKING:
+    from executive.cli.goal_conditions import Share
 
 
 class Scene(Protocol):
@@ -56,8 +59,10 @@ class Backend(Protocol):
     def show_live(self) -> Scene | None:
         """Begin to show the world, where that can be done."""
 
-    def judge(self, tree: CompiledTree, result: RobotResult) -> RefereeReport | None:
-        """What a referee saw; None where there is none."""
+    def judge(
+        self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
+    ) -> RefereeReport | None:
+        """What a referee saw of a mission since it began, of which others did some `before`; None: there is none."""
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Write what was recorded into a folder; the recording's path, None where there is none."""

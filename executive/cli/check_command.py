@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -13,8 +14,8 @@ from rich.markup import escape
 
 from executive.cli.feasibility import check_prepared, route_planner_of
 from executive.cli.output import BAD_INPUT, console_for, print_json, refusals
-from executive.cli.requests import prepare
-from executive.cli.run_options import SET, START
+from executive.cli.requests import Prepared, prepare
+from executive.cli.run_options import ROBOTS, SET, START, robots_of
 from executive.cli.stack_command import STACK
 from executive.mission.errors import InputError
 from executive.mission.file.parameters import given_values
@@ -33,11 +34,11 @@ __all__ = ["CheckedFile", "Checker", "check"]
 
 @dataclass(frozen=True)
 class CheckedFile:
-    """One file: its errors and warnings, and what could be found out about it before them."""
+    """One file: its errors and warnings, what was found out about it before them, and the tree of each robot."""
 
     file: Path
     errors: tuple[InputError, ...] = ()
-    tree: CompiledTree | None = None
+    trees: tuple[CompiledTree, ...] = ()
     estimate: Estimate = field(default_factory=Estimate)
     warnings: tuple[InputError, ...] = ()
 
@@ -48,30 +49,52 @@ class CheckedFile:
 
 
 class Checker:
-    """Checks files; the routes planned in each world are shared among them.
+    """Checks files; the routes planned in each world for each kind of robot are shared among them.
 
-    `like` has what the requests share: the world in place of the files' own, stack, start and values of parameters.
+    `like` has what the requests share: the world in place of the files' own, stack, start, robots and values of
+    parameters.
     """
 
     def __init__(self, like: Request | None = None) -> None:
         self._like = like or Request()
-        self._routes: dict[Path, RoutePlanner] = {}
+        self._routes: dict[tuple[Path, str, Path | None], RoutePlanner] = {}
 
     def check(self, file: Path) -> CheckedFile:
         """Check one file; raises nothing for what stands in it."""
-        tree: CompiledTree | None = None
+        trees: tuple[CompiledTree, ...] = ()
         try:
             prepared = prepare(replace(self._like, file=file), ask=None)
-            tree, world = prepared.tree, prepared.world
-            if world.folder not in self._routes:
-                self._routes[world.folder] = route_planner_of(world, self._like.stack)
-            checked = check_prepared(prepared, self._routes[world.folder])
+            trees = tuple(each.tree for each in prepared.all)
+            checked = {each.mission.robot_name: check_prepared(each, self._planner(each)) for each in prepared.all}
         except InputError as error:
-            return CheckedFile(file, _placed(file, (error, *error.others)), tree)
+            return CheckedFile(file, _placed(file, (error, *error.others)), trees)
         except Exception as defect:  # the other files are still to be checked
             what = f"errand cannot check it ({type(defect).__name__}: {defect})"[:MOST_LETTERS]
-            return CheckedFile(file, _placed(file, (InputError(what, hint="report it with this file"),)), tree)
-        return CheckedFile(file, _placed(file, checked.errors), tree, checked.estimate, checked.warnings)
+            return CheckedFile(file, _placed(file, (InputError(what, hint="report it with this file"),)), trees)
+        errors = tuple(error for each in checked.values() for error in each.errors)
+        warnings = tuple(warning for each in checked.values() for warning in each.warnings)
+        estimates = {name: each.estimate for name, each in checked.items()}
+        return CheckedFile(file, _placed(file, errors), trees, _of_all(prepared, estimates), warnings)
+
+    def _planner(self, prepared: Prepared) -> RoutePlanner:
+        world, stack = prepared.world, prepared.stack_file
+        key = (world.folder, prepared.kind, stack)
+        if key not in self._routes:
+            self._routes[key] = route_planner_of(world, stack, prepared.kind)
+        return self._routes[key]
+
+
+def _of_all(prepared: Prepared, estimates: Mapping[str, Estimate]) -> Estimate:
+    """What several robots take together: until the last is done, all that is driven, the most that one charge gives."""
+    after = {each.mission.robot_name: each.after for each in prepared.all}
+    done_s: dict[str, float] = {}
+    for name in TopologicalSorter(after).static_order():
+        done_s[name] = estimates[name].duration_s + max((done_s[first] for first in after[name]), default=0.0)
+    return Estimate(
+        max(done_s.values()),
+        sum(each.distance_m for each in estimates.values()),
+        max(each.charge for each in estimates.values()),
+    )
 
 
 def check(
@@ -83,13 +106,15 @@ def check(
     given: SET = None,
     stack: STACK = None,
     start: START = None,
+    robots: ROBOTS = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object for all files on standard output.")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Show commands and trees, too.")] = False,
 ) -> None:
     """Check mission files without running them: commands, tree, paths on the map, time and battery."""
     with refusals():
         at = None if start is None else Start.of(start)
-        checker = Checker(Request(world=world, stack=stack, start=at, given=given_values(given or ())))
+        like = Request(world=world, stack=stack, start=at, given=given_values(given or ()))
+        checker = Checker(replace(like, robots=robots_of(robots)))
     checked = [checker.check(file) for file in files]
     if as_json:
         print_json(to_json(checked))
@@ -103,7 +128,7 @@ def check(
 
 def to_json(checked: Sequence[CheckedFile]) -> dict[str, Any]:
     """All files as one object: whether all are well, errors, warnings, how many nodes, and the commands in order."""
-    trees = [one.tree for one in checked if one.tree is not None]
+    trees = [tree for one in checked for tree in one.trees]
     return {
         "ok": all(one.ok for one in checked),
         "errors": [_error_json(error) for one in checked for error in one.errors],
@@ -136,10 +161,10 @@ def _show(one: CheckedFile, console: Console, *, verbose: bool) -> None:
         typer.echo(f"errand: {error}", err=True)
     for warning in one.warnings:
         typer.echo(f"errand: warning: {warning}", err=True)
-    if verbose and one.tree is not None:
-        for command in one.tree.commands:
+    for tree in one.trees if verbose else ():
+        for command in tree.commands:
             console.print(f"  {command}", markup=False)
-        console.print(to_rich(folded_to(node_view(one.tree.root), SHOWN_NODES), collapsed=False))
+        console.print(to_rich(folded_to(node_view(tree.root), SHOWN_NODES), collapsed=False))
 
 
 def _in_words(estimate: Estimate) -> str:

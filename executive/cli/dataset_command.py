@@ -83,11 +83,9 @@ def _rendered(out: Path, images: int, seed: int, pool: Pool, console: Console) -
             bar.update(task, completed=done, total=total)
 
         try:
-            if pool.workers is None and pool.scheduler is None:
-                return render(out, images=images, seed=seed, jobs=pool.jobs, progress=show)
-            with pool.opened() as others:
-                made = partial(_given_out, others)
-                return render(out, images=images, seed=seed, jobs=pool.jobs, progress=show, give_out=made)
+            with pool.opened() as workers:
+                given_out = partial(_given_out, workers)
+                return render(out, images=images, seed=seed, progress=show, give_out=given_out)
         except DatasetError as error:
             raise InputError(error.message, hint=error.hint) from error
 

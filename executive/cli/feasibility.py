@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -16,9 +17,10 @@ from executive.tree.estimate import Route, RoutePlanner, load_estimates
 from plant.kinds import robot_kind
 from plant.models.catalogue import load_catalogue
 from plant.worlds.world import World
+from skills.arm.kinematics import arm_model
 from skills.perception.attributes import known_attributes
 from skills.perception.class_forms import class_forms
-from skills.robot import Pose2D
+from skills.robot import Capabilities, Pose2D
 from skills.stack import RobotStack, default_component
 
 
@@ -78,7 +80,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
         knowledge=prepared.knowledge,
         start=world.start,
         abilities=abilities_in(world, prepared.kind),
-        planner=planner or route_planner_of(world, prepared.request.stack, prepared.kind),
+        planner=planner or route_planner_of(world, prepared.stack_file, prepared.kind),
         estimates=load_estimates(),
     )
 
@@ -105,9 +107,31 @@ def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
 
 @cache
 def abilities_of(kind: str) -> Abilities:
-    """What a kind of robot can lift, and what the lightest of each class weighs as far as is known of it, else 0.0."""
+    """What a kind of robot can lift and reach, and what the lightest and narrowest of each class are like, else 0.0."""
     known = {name: form.mass_kg for name, form in class_forms().items() if name in load_catalogue()}
     masses = {name: 0.0 if mass_kg is None else mass_kg[0] for name, mass_kg in known.items()}
-    arm = robot_kind(kind).capabilities().arm
-    lift_kg = 0.0 if arm is None else arm.max_payload_kg
-    return Abilities(masses, lift_kg, frozenset(class_forms()), known_attributes())
+    capabilities = robot_kind(kind).capabilities()
+    return Abilities(
+        masses,
+        0.0 if capabilities.arm is None else capabilities.arm.max_payload_kg,
+        frozenset(class_forms()),
+        known_attributes(),
+        reached_heights_m(capabilities),
+        {name: form.width_m[0] for name, form in class_forms().items()},
+        math.inf if capabilities.gripper is None else capabilities.gripper.max_grasp_m,
+    )
+
+
+def reached_heights_m(capabilities: Capabilities) -> tuple[float, float]:
+    """The lowest and the highest surface (m over the floor) that an arm reaches: by its length alone, the body as low
+    and as high as it goes, as near to the surface as it stands. All heights without an arm that we can move."""
+    try:
+        model, arm = arm_model(capabilities), capabilities.arm
+    except ValueError:
+        return -math.inf, math.inf
+    assert arm is not None
+    x_m, _, z_m = model.p_BS
+    ahead_m = max(0.0, min(*arm.standing_m, *arm.nearer_m) - float(x_m))
+    upright_m = math.sqrt(max(0.0, arm.max_reach_m**2 - ahead_m**2))
+    low_m, high_m = capabilities.height_range_m
+    return low_m + float(z_m) - upright_m, high_m + float(z_m) + upright_m

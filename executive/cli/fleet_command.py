@@ -57,7 +57,7 @@ def run(
     console = console_for(as_json)
     store = _store(queue)
     with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
-        from executive.cli.fleet_missions import fleet_mission
+        from executive.cli.fleet_missions import charging_missions, fleet_mission
         from executive.cli.fleet_run import FleetDispatch, run_fleet, told
         from executive.cli.simulated import SimulatedBackend
         from executive.cli.starts import placed_robots
@@ -82,10 +82,19 @@ def run(
         }
         backend = SimulatedBackend(where, placed, seed=seed, record=False)
         folder = out or store.parent / "fleet"
-        dispatch = FleetDispatch(missions, wanted, placed, backend, faults, None if quiet else console)
+        dispatch = FleetDispatch(
+            missions,
+            wanted,
+            placed,
+            backend,
+            faults,
+            charging_missions(where, knowledge, placed),
+            knowledge.battery,
+            None if quiet else console,
+        )
         run_fleet(dispatch, out=folder, seed=seed, time_limit_s=time_limit_s(time_limit))
         results = told(missions, [each.id for each in queued])
-    achieved = [_achieved(each) for each in results]
+    achieved = [_achieved(each) for each in results if each["part_of"] is None]
     console.print(f"{sum(achieved)} of {len(achieved)} missions achieved")
     if as_json:
         print_json({"missions": results})
@@ -101,7 +110,7 @@ def status(queue: Queue, as_json: AsJson = False) -> None:
 
         results = told(missions, [each.id for each in missions.missions() if each.queued])
         names = {each.id: each.request.name for each in missions.missions()}
-    header = ("mission", "name", "robot", "state", "referee", "reassigned", "message")
+    header = ("mission", "name", "robot", "state", "after", "referee", "reassigned", "message")
     show_table(console_for(as_json), header, [_row(each, names) for each in results])
     if as_json:
         print_json({"missions": results})
@@ -118,7 +127,10 @@ def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
     """
     given = GivenMissions(missions)
     known = given.all()
+    wholes = {each.part_of for each in known.values()}
     for each in missions.missions(MissionState.RUNNING):
+        if each.id in wholes:
+            continue
         if each.id not in known:
             from executive.cli.queue_run import broken_off
 
@@ -129,6 +141,7 @@ def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
         else:
             missions.finish(each.id, MissionState.QUEUED, "")
             given.hand_back(each.id)
+    given.settle()
     queued = [each for each in missions.missions(MissionState.QUEUED) if each.queued]
     if not queued:
         raise InputError("nothing is queued", hint="queue a mission by `errand queue add`", file=missions.path)
@@ -161,5 +174,6 @@ def _achieved(told: Mapping[str, Any]) -> bool:
 def _row(told: Mapping[str, Any], names: Mapping[int, str]) -> tuple[str, ...]:
     referee = told["referee"]
     seen = "" if referee is None else VERDICTS[referee["success"]]
-    values = (told["id"], names[told["id"]], told["robot"] or "", told["outcome"], seen, told["reassigned"])
+    after = "" if told["after"] is None else told["after"]
+    values = (told["id"], names[told["id"]], told["robot"] or "", told["outcome"], after, seen, told["reassigned"])
     return (*map(str, values), told["message"])

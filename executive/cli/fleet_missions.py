@@ -4,43 +4,66 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 from executive.cli.durable import as_it_was
 from executive.cli.feasibility import check_prepared
-from executive.cli.requests import Prepared, prepare, prepared_for
+from executive.cli.goal_conditions import Share
+from executive.cli.requests import Prepared, prepare_alone, prepared_for
 from executive.cli.several import prepared_part, understood_for_robots
 from executive.cli.starts import PlacedRobot, knowledge_for
 from executive.fleet.auction import Bid
 from executive.language.robots import Part, Whom
+from executive.mission.command import Command, Task
 from executive.mission.errors import InputError
 from executive.mission.file.model import Mission
 from executive.mission.knowledge import Knowledge
+from executive.mission.mission import mission_from_lines
+from executive.mission.request import Request
 from executive.store.missions import MissionStore, StoredMission
+from executive.tree.check import Checked
+from executive.tree.estimate import load_estimates
 from plant.worlds.world import World
 from skills.robot import Pose2D
 
-__all__ = ["CHARGE_LEFT", "FleetMission", "RobotNow", "bid_for", "fleet_mission", "rest_of"]
+__all__ = [
+    "FleetMission",
+    "RobotNow",
+    "bid_for",
+    "charging_missions",
+    "charging_time_s",
+    "fleet_mission",
+    "rest_of",
+    "with_commands",
+]
 
-CHARGE_LEFT = 0.1
-"""A robot offers nothing that would leave it less of its battery (0 to 1)."""
+URGENT: Final = 0.5
+"""At this share of the charge that counts as low, a robot that has something in hand goes to its dock all the same."""
 
 
 @dataclass(frozen=True)
 class FleetMission:
-    """A mission of the queue: what each robot that may do it would do. The first `done` commands are done already."""
+    """A mission of the queue: what each robot that may do it would do. The first `done` commands are done already.
+
+    It began at `since_s` (s on the robots' clock; None: not yet); `shares` are what robots did that had it before.
+    """
 
     stored: StoredMission
     options: Mapping[str, Prepared]
     done: int = 0
+    since_s: float | None = None
+    shares: tuple[Share, ...] = ()
 
 
 @dataclass(frozen=True)
 class RobotNow:
-    """A robot as the auction sees it: where it is free next (world frame), in how long (s), and with which charge."""
+    """A robot as the auction sees it: where it is free next (world frame), with which charge, its mission to `dock`
+    (None: it cannot), and below which charge it is `low`."""
 
     pose: Pose2D
-    ready_s: float
     charge: float
+    low: float
+    dock: Prepared | None = None
 
 
 def fleet_mission(
@@ -76,8 +99,9 @@ def _options(
         meant = understood_for_robots(request, robots, knowledge, None)
         meanings = [part.meaning for part in meant.parts]
         named = _named(meant.parts, robots)
-        return {name: prepared_part(name, meanings, request, world, knowledge, robots) for name in named}
-    filed = prepare(as_it_was(stored, store.path), ask=None)
+        patient = _patient(knowledge)
+        return {name: prepared_part(name, meanings, request, world, patient, robots) for name in named}
+    filed = prepare_alone(as_it_was(stored, store.path))
     if filed.world.seed_rules != world.seed_rules:
         raise InputError("its file brings objects into the world", hint="run it by `errand run`")
     return {name: _for_robot(name, filed, world, robots) for name in robots}
@@ -93,7 +117,7 @@ def _named(parts: Sequence[Part], robots: Mapping[str, PlacedRobot]) -> tuple[st
 
 def _for_robot(name: str, filed: Prepared, world: World, robots: Mapping[str, PlacedRobot]) -> Prepared:
     robot = robots[name]
-    known = knowledge_for(name, robot, robots, filed.knowledge)
+    known = knowledge_for(name, robot, robots, _patient(filed.knowledge))
     own = replace(world, start=robot.start, dock=robot.dock)
     mission = replace(filed.mission, robot_name=name)
     return replace(prepared_for(filed.request, mission, own, known), kind=robot.kind, robots=robots)
@@ -101,12 +125,41 @@ def _for_robot(name: str, filed: Prepared, world: World, robots: Mapping[str, Pl
 
 def rest_of(prepared: Prepared, done: int) -> Prepared:
     """What is left of a mission of plain commands of which the first `done` are done."""
-    if not done:
-        return prepared
+    return with_commands(prepared, prepared.tree.commands[done:]) if done else prepared
+
+
+def with_commands(prepared: Prepared, commands: Sequence[Command]) -> Prepared:
+    """A mission of plain commands with others in their place. Raises InputError: they cannot be carried out."""
     (step,) = prepared.mission.steps
-    mission: Mission = replace(prepared.mission, steps=(replace(step, commands=step.commands[done:]),))
-    rest = prepared_for(prepared.request, mission, prepared.world, prepared.knowledge)
-    return replace(rest, kind=prepared.kind, robots=prepared.robots)
+    mission: Mission = replace(prepared.mission, steps=(replace(step, commands=tuple(commands)),))
+    other = prepared_for(prepared.request, mission, prepared.world, prepared.knowledge)
+    return replace(other, kind=prepared.kind, robots=prepared.robots)
+
+
+def _patient(knowledge: Knowledge) -> Knowledge:
+    """What a robot of a fleet knows: others go on with its mission when it is low, so that it interrupts it later."""
+    battery = knowledge.battery.model_copy(update={"low": URGENT * knowledge.battery.low})
+    return knowledge.model_copy(update={"battery": battery})
+
+
+def charging_missions(world: World, knowledge: Knowledge, robots: Mapping[str, PlacedRobot]) -> Mapping[str, Prepared]:
+    """What each robot does to charge; one without a dock is not among them."""
+    docks = {name: robot for name, robot in robots.items() if robot.dock is not None}
+    line = str(Command(task=Task.CHARGE))
+    return {
+        name: _for_robot(
+            name,
+            prepared_for(
+                Request(commands=(line,), world_name=world.name),
+                mission_from_lines((line,), world=world.name, robot_name=name),
+                replace(world, dock=robot.dock),
+                knowledge_for(name, robot, robots, knowledge),
+            ),
+            world,
+            robots,
+        )
+        for name, robot in docks.items()
+    }
 
 
 def bid_for(mission: FleetMission, robot: str, now: RobotNow) -> Bid:
@@ -114,10 +167,27 @@ def bid_for(mission: FleetMission, robot: str, now: RobotNow) -> Bid:
     prepared = mission.options.get(robot)
     if prepared is None:
         other = next(iter(mission.options))
-        return Bid(mission.stored.id, robot, now.ready_s, 0.0, problems=(f"it is for {other}",))
-    checked = check_prepared(replace(prepared, world=replace(prepared.world, start=now.pose)))
-    left = now.charge - checked.estimate.charge
-    problems = [error.message for error in checked.errors]
-    if left < CHARGE_LEFT:
-        problems.append(f"its battery has {now.charge:.0%}, and {checked.estimate.charge:.0%} would be used")
-    return Bid(mission.stored.id, robot, now.ready_s, checked.estimate.duration_s, left, tuple(problems))
+        return Bid(mission.stored.id, robot, 0.0, 0.0, problems=(f"it is for {other}",))
+    checked = _checked_from(now.pose, prepared)
+    taken, left = checked.estimate, now.charge - checked.estimate.charge
+    problems = tuple(error.message for error in checked.errors)
+    bid = Bid(mission.stored.id, robot, 0.0, taken.duration_s, left, problems=problems)
+    if left >= now.low or problems:
+        return bid
+    charged = prepared.knowledge.battery.charged
+    if now.dock is None or now.dock.world.dock is None or charged - taken.charge < now.low:
+        return replace(bid, problems=(f"its battery has {now.charge:.0%}, and {taken.charge:.0%} would be used",))
+    to_dock, again = _checked_from(now.pose, now.dock), _checked_from(now.dock.world.dock, prepared)
+    problems = tuple(error.message for error in (*to_dock.errors, *again.errors))
+    full_s = charging_time_s(now.charge, charged)
+    duration_s = to_dock.estimate.duration_s + full_s + again.estimate.duration_s
+    return replace(bid, duration_s=duration_s, charge=charged - again.estimate.charge, charges=True, problems=problems)
+
+
+def charging_time_s(charge: float, charged: float) -> float:
+    """How long a battery charges (s), from one state of charge to another (0 to 1)."""
+    return max(0.0, charged - charge) / load_estimates().battery.charging_per_s
+
+
+def _checked_from(pose: Pose2D, prepared: Prepared) -> Checked:
+    return check_prepared(replace(prepared, world=replace(prepared.world, start=pose)))

@@ -12,7 +12,7 @@ from executive.run.journal import TickNote
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
 
-__all__ = ["Progress", "ProgressJournal", "progress_of"]
+__all__ = ["Progress", "ProgressJournal", "is_plain", "progress_of"]
 
 _TOUCHED: Final = (Status.RUNNING, Status.SUCCESS)
 
@@ -26,16 +26,20 @@ class Progress:
     begun: bool
 
 
+def is_plain(tree: CompiledTree) -> bool:
+    """Whether a mission is nothing but commands, one after the other."""
+    plain = len(tree.parts) == len(tree.commands) and all(step.block is None for step in tree.steps)
+    return plain and len(tree.steps) == 1
+
+
 def progress_of(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> Progress:
     """What of a tree is done by what its nodes said, by path id.
 
     Another robot can go on before a command that needs nothing in the gripper. A mission that has more than plain
     commands is done as a whole.
     """
-    plain = len(tree.parts) == len(tree.commands) and all(step.block is None for step in tree.steps)
-    plain = plain and len(tree.steps) == 1
     done = 0
-    for number, part in enumerate(tree.parts if plain else ()):
+    for number, part in enumerate(tree.parts if is_plain(tree) else ()):
         if statuses(part.node or part.path_id) is not Status.SUCCESS:
             break
         after = number + 1

@@ -10,8 +10,10 @@ from typing import Any, Final
 from rich.console import Console
 
 from executive.cli.backend import Backend
-from executive.cli.fleet_missions import FleetMission, RobotNow, bid_for, rest_of
+from executive.cli.fleet_chain import chained
+from executive.cli.fleet_missions import FleetMission, RobotNow, bid_for, charging_time_s, rest_of
 from executive.cli.fleet_progress import Progress, ProgressJournal
+from executive.cli.goal_conditions import Share
 from executive.cli.mission_run import entry_for
 from executive.cli.requests import Prepared
 from executive.cli.signals import cancelled_by_signals
@@ -19,17 +21,18 @@ from executive.cli.starts import PlacedRobot
 from executive.fleet.auction import Bid
 from executive.fleet.dispatcher import Dispatcher
 from executive.mission.errors import listing
+from executive.mission.knowledge import BatteryFacts
 from executive.mission.scenario import Scenario
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
 from executive.record.work import Work
 from executive.run.control import Control
 from executive.run.dispatch import MissionEnd
-from executive.run.outcome import Outcome, RobotResult
+from executive.run.outcome import Outcome, RobotResult, RobotStatus
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
-from executive.store.given import GivenMissions
-from executive.store.missions import MissionState, MissionStore
+from executive.store.given import GivenMission, GivenMissions
+from executive.store.missions import MissionState, MissionStore, StoredMission
 from skills.robot import Pose2D
 
 __all__ = ["FleetDispatch", "run_fleet"]
@@ -40,7 +43,10 @@ TIME_LIMIT_S: Final = 1200.0
 
 @dataclass
 class _Robot:
-    """A robot of the fleet: where it is free next, and from when (s on the robots' clock)."""
+    """A robot of the fleet: where it is free next, and from when (s on the robots' clock).
+
+    Its mission to `dock` is None where it cannot charge.
+    """
 
     placed: PlacedRobot
     pose: Pose2D
@@ -48,31 +54,44 @@ class _Robot:
     free_at_s: float = 0.0
     entry: RunEntry | None = None
     journal: ProgressJournal | None = None
+    dock: Prepared | None = None
     faults: tuple[str, ...] = ()
 
 
 @dataclass
 class FleetDispatch:
     """Gives the missions of a store to robots of a backend (`executive.run.dispatch.Dispatch`), and keeps in the store
-    whose each is, how it ended and what a referee saw."""
+    whose each is, how it ended and what a referee saw.
+
+    A robot whose `battery` is low gives its mission back once it has nothing in hand, and charges by its mission of
+    `docks`.
+    """
 
     store: MissionStore
     missions: dict[int, FleetMission]
     robots: Mapping[str, PlacedRobot]
     backend: Backend
     faults: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    docks: Mapping[str, Prepared] = field(default_factory=dict)
+    battery: BatteryFacts = field(default_factory=BatteryFacts)
     console: Console | None = None
     log: EventLog | None = None
 
     def __post_init__(self) -> None:
         self._given = GivenMissions(self.store)
-        self._dispatcher = Dispatcher(self.missions, self.robots)
+        self._dispatcher = Dispatcher((), self.robots)
+        self._parts = {number: each for number, each in self._given.all().items() if each.part_of is not None}
+        for number in self.missions:
+            follows = self._parts[number].follows if number in self._parts else None
+            self._dispatcher.add(number, after=follows if follows in self.missions else None)
         self._robots = {
-            name: _Robot(placed, placed.start, faults=tuple(self.faults.get(name, ())))
+            name: _Robot(placed, placed.start, dock=self.docks.get(name), faults=tuple(self.faults.get(name, ())))
             for name, placed in self.robots.items()
         }
-        self._bids: dict[tuple[int, str, int, Pose2D], Bid] = {}
+        self._bids: dict[tuple[int, str, int, Pose2D, float, bool], Bid] = {}
         self._gone: dict[str, str] = {}
+        self._recalled: set[str] = set()
+        self._to_dock: list[str] = []
         self._work = Work()
 
     @property
@@ -84,33 +103,75 @@ class FleetDispatch:
         """The missions that begin now."""
         entries: list[RunEntry] = []
         given = self._dispatcher.assign(self._bid)
-        for number, why in given.refused.items():
+        refused = {number: why for number, why in given.refused.items() if not self._split(number)}
+        for number, why in refused.items():
             self._finish(number, MissionState.FAILURE, why)
         for award in given.begun:
             robot, mission = self._robots[award.robot], self.missions[award.mission]
             robot.free_at_s = self._now_s + award.ends_s
             self._given.give(award.mission, award.robot)
             self.store.begin(award.mission)
+            if mission.since_s is None:
+                self.missions[award.mission] = replace(mission, since_s=self._now_s)
             self._tell(f"{award.robot} has mission {award.mission}: {mission.stored.request.name}")
             entries.append(self._entry(award.robot, mission))
-        return entries
+        self._to_dock += given.charging
+        if self._dispatcher.waiting or self._dispatcher.under_way:
+            entries += [self._dock_entry(name) for name in self._to_dock if name in self._dispatcher.resting]
+            self._to_dock = []
+        return entries if len(refused) == len(given.refused) else [*entries, *self.begin()]
+
+    def _split(self, number: int) -> bool:
+        """Have a mission done in two parts, as no robot can do it alone; whether two can."""
+        mission = self.missions[number]
+        chain = None if number in self._parts else chained(mission, self._offer)
+        if chain is None:
+            return False
+        names = [f"{mission.stored.request.name}, part {part} of 2" for part in (1, 2)]
+        added: list[int] = []
+        for name, options in zip(names, (chain.first, chain.second), strict=True):
+            request = next(iter(options.values())).request
+            request = replace(request, sentence=None, file=None, text=None, name=name)
+            stored = self.store.add(request, queued=True)
+            self.missions[stored.id] = FleetMission(stored, options)
+            self._dispatcher.add(stored.id, after=added[0] if added else None)
+            added.append(stored.id)
+        self._given.split(number, added)
+        self._parts = {part: each for part, each in self._given.all().items() if each.part_of is not None}
+        self.store.begin(number)
+        by = "" if chain.table is None else f", by the {chain.table}"
+        self._tell(f"No robot can do mission {number} alone: missions {added[0]} and then {added[1]} do it{by}")
+        return True
+
+    def recalled(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
+        """The robots that are low and have nothing in hand; and those that charge when nothing is left to do."""
+        under_way = self._dispatcher.under_way
+        low = {name: each for name, each in seen.items() if name in under_way and self._may_leave(name, each)}
+        idle = self._dispatcher.resting if not under_way and not self._dispatcher.waiting else ()
+        self._recalled = {*low, *idle}
+        why = {name: f"its battery is at {each.charge:.0%}" for name, each in low.items()}
+        return {**why, **dict.fromkeys(idle, "nothing is left to do")}
+
+    def _may_leave(self, name: str, seen: RobotStatus) -> bool:
+        """Whether a robot is low, can charge, and leaves nothing half done."""
+        robot = self._robots[name]
+        low = seen.charge is not None and seen.charge < self.battery.low
+        return low and robot.dock is not None and not seen.holding and not _progress_of(robot).begun
 
     def ended(self, end: MissionEnd) -> None:
         """A robot's mission is over, or another robot goes on with it."""
         name = end.result.robot_name
-        robot = self._robots[name]
-        robot.free_at_s = self._now_s
-        gone = end.gone
-        if end.seen is not None:
-            robot.pose = end.seen.pose or robot.pose
-            robot.charge = robot.charge if end.seen.charge is None else end.seen.charge
-            if end.seen.pose is None and gone is None and end.result.outcome is not Outcome.SUCCESS:
-                gone = "it does not know where it is"
+        robot, recalled = self._robots[name], name in self._recalled
+        self._recalled.discard(name)
+        gone = self._look(robot, end)
         if gone is not None:
             self._gone[name] = gone
             self._dispatcher.lose(name)
             self._tell(f"{name} is given no more work: {gone}")
-        if gone is None or end.result.outcome is Outcome.SUCCESS:
+        if name not in self._dispatcher.under_way:
+            self._charged(name, end.result, recalled=recalled)
+            return
+        if end.result.outcome is Outcome.SUCCESS or (gone is None and not recalled):
             self._over(name, end.result)
             return
         why = self._stuck(name, holding=end.seen is not None and end.seen.holding)
@@ -119,15 +180,37 @@ class FleetDispatch:
             self._over(name, replace(end.result, message=f"{reason}; {why or 'there is no other robot'}"))
             return
         number = self._dispatcher.hand_back(name)
-        self._go_on_later(number, robot)
+        self._go_on_later(number, robot, end.result)
         self._tell(f"Mission {number} waits for another robot")
+        if gone is None:
+            self._dispatcher.rest(name)
+            self._to_dock.append(name)
+
+    def _look(self, robot: _Robot, end: MissionEnd) -> str | None:
+        """See where a robot is at the end of a mission; why nothing more can be asked of it (None: it can)."""
+        robot.free_at_s = self._now_s
+        if end.seen is None:
+            return end.gone
+        robot.pose = end.seen.pose or robot.pose
+        robot.charge = robot.charge if end.seen.charge is None else end.seen.charge
+        if end.seen.pose is None and end.gone is None and end.result.outcome is not Outcome.SUCCESS:
+            return "it does not know where it is"
+        return end.gone
+
+    def _charged(self, name: str, result: RobotResult, *, recalled: bool) -> None:
+        """A robot's way to its dock is over. Where it could not charge, it is not sent there again."""
+        self._dispatcher.wake(name)
+        robot = self._robots[name]
+        if result.outcome is not Outcome.SUCCESS and not recalled:
+            robot.dock = None
+        self._tell(f"{name} is at {robot.charge:.0%}: {result.message}")
 
     def close(self) -> None:
         """What no robot has at the end stays in the queue; what was handed back is told as failed."""
         handed_back = self._given.all()
         for number in self.waiting:
             given = handed_back.get(number)
-            if given is not None and given.reassigned:
+            if given is not None and given.robot is not None:
                 reasons = listing([f"{name}: {why}" for name, why in self._gone.items()])
                 self._finish(number, MissionState.FAILURE, f"no robot is left to go on with it ({reasons})")
 
@@ -137,22 +220,47 @@ class FleetDispatch:
 
     def _bid(self, mission: int, name: str) -> Bid:
         """What a robot offers; the route is planned once for each place that it offers it from."""
-        robot, wanted = self._robots[name], self.missions[mission]
-        key = (mission, name, wanted.done, robot.pose)
-        ready_s = max(0.0, robot.free_at_s - self._now_s)
+        wanted, robot = self.missions[mission], self._robots[name]
+        key = (mission, name, wanted.done, robot.pose, robot.charge, name in self._dispatcher.resting)
         if key not in self._bids:
-            self._bids[key] = bid_for(wanted, name, RobotNow(robot.pose, 0.0, robot.charge))
-        return replace(self._bids[key], ready_s=ready_s)
+            self._bids[key] = self._offer(wanted, name)
+        return replace(self._bids[key], ready_s=self._ready_s(robot))
+
+    def _ready_s(self, robot: _Robot) -> float:
+        return max(0.0, robot.free_at_s - self._now_s)
+
+    def _offer(self, wanted: FleetMission, name: str) -> Bid:
+        """What a robot offers from where it is free next."""
+        robot = self._robots[name]
+        now = RobotNow(robot.pose, robot.charge, self.battery.low, robot.dock)
+        if name in self._dispatcher.resting and robot.dock is not None:
+            now = replace(now, pose=robot.dock.world.dock or robot.pose, charge=self.battery.charged)
+        return replace(bid_for(wanted, name, now), ready_s=self._ready_s(robot))
+
+    def _dock_entry(self, name: str) -> RunEntry:
+        """A robot goes to its dock and charges."""
+        robot = self._robots[name]
+        assert robot.dock is not None
+        robot.free_at_s = self._now_s + charging_time_s(robot.charge, self.battery.charged)
+        robot.journal = None
+        self._tell(f"{name} goes to its dock: its battery is at {robot.charge:.0%}")
+        return replace(self._robot_entry(name, robot.dock), tree=robot.dock.tree)
 
     def _entry(self, name: str, mission: FleetMission) -> RunEntry:
         robot, prepared = self._robots[name], mission.options[name]
+        robot.journal = ProgressJournal(prepared.tree, lambda progress: self._progress(mission, progress))
+        speaker_W = next(iter(self.robots.values())).start
+        entry = self._robot_entry(name, prepared)
+        return replace(entry, tree=prepared.tree, journal=robot.journal, speaker_W=speaker_W)
+
+    def _robot_entry(self, name: str, prepared: Prepared) -> RunEntry:
+        """The robot, with its estimators as they were in its last mission."""
+        robot = self._robots[name]
         if robot.entry is None:
             disturbed = replace(prepared.request, scenario=Scenario(robot.faults))
             robot.entry = entry_for(replace(prepared, request=disturbed), self.backend, None, self._work)
-        robot.journal = ProgressJournal(prepared.tree, lambda progress: self._progress(mission, progress))
         self._announce(prepared)
-        speaker_W = next(iter(self.robots.values())).start
-        return replace(robot.entry, tree=prepared.tree, journal=robot.journal, speaker_W=speaker_W)
+        return robot.entry
 
     def _progress(self, mission: FleetMission, progress: Progress) -> None:
         done = mission.done + progress.done
@@ -166,7 +274,7 @@ class FleetDispatch:
     def _stuck(self, name: str, *, holding: bool) -> str | None:
         """Why no other robot can go on with the mission of one that is gone; None: one can."""
         robot, mission = self._robots[name], self.missions[self._dispatcher.under_way[name]]
-        progress = robot.journal.progress if robot.journal is not None else Progress(0, False)
+        progress = _progress_of(robot)
         if not progress.begun:
             return None
         commands = mission.options[name].tree.commands[progress.done :]
@@ -175,30 +283,55 @@ class FleetDispatch:
             return f"the {thing or 'thing'} is in {name}'s gripper"
         return f"{name} had begun it, and how far it came is not known"
 
-    def _go_on_later(self, number: int, robot: _Robot) -> None:
+    def _go_on_later(self, number: int, robot: _Robot, result: RobotResult) -> None:
         """What is left of a mission that is handed back."""
-        mission = self.missions[number]
-        done = robot.journal.progress.done if robot.journal is not None else 0
-        options = {name: rest_of(each, done) for name, each in mission.options.items()} if done else mission.options
-        self.missions[number] = FleetMission(mission.stored, options, mission.done + done)
+        mission, done = self.missions[number], _progress_of(robot).done
+        if done:
+            share = Share(mission.options[result.robot_name].tree, result, done)
+            options = {name: rest_of(each, done) for name, each in mission.options.items()}
+            shares, done = (*mission.shares, share), mission.done + done
+            self.missions[number] = replace(mission, options=options, done=done, shares=shares)
         self._given.hand_back(number)
         self.store.finish(number, MissionState.QUEUED, "")
 
     def _over(self, name: str, result: RobotResult) -> None:
         """A mission has come to its end."""
         number = self._dispatcher.over(name)
-        report = self.backend.judge(self.missions[number].options[name].tree, result)
+        mission = self.missions[number]
+        tree, since_s = mission.options[name].tree, mission.since_s or 0.0
+        report = self.backend.judge(tree, result, before=mission.shares, since_s=since_s)
         seen = None if report is None else {key: value for key, value in vars(report).items() if key != "events"}
         self._given.judge(number, seen)
+        if number in self._parts:
+            self._part_over(number, Share(tree, result, len(tree.parts)), seen)
         self._finish(number, MissionState(result.outcome.value), result.message)
+
+    def _part_over(self, number: int, share: Share, seen: Mapping[str, Any] | None) -> None:
+        """The next part goes on from what this one did; after the last, all are judged together."""
+        mission, whole = self.missions[number], self._parts[number].part_of
+        following = [part for part, each in self._parts.items() if each.follows == number]
+        for part in following:
+            shares = (*mission.shares, share)
+            self.missions[part] = replace(self.missions[part], since_s=mission.since_s, shares=shares)
+        if whole is not None and not following:
+            self._given.judge(whole, seen)
 
     def _finish(self, number: int, state: MissionState, message: str) -> None:
         self.store.finish(number, state, message)
         self._tell(f"Mission {number}: {state.value}: {message}")
+        if state is MissionState.SUCCESS:
+            self._dispatcher.done(number)
+        else:
+            self._dispatcher.drop(number)
+        self._given.settle()
 
     def _tell(self, line: str) -> None:
         if self.console is not None:
             self.console.print(line, markup=False)
+
+
+def _progress_of(robot: _Robot) -> Progress:
+    return Progress(0, False) if robot.journal is None else robot.journal.progress
 
 
 def run_fleet(dispatch: FleetDispatch, *, out: Path, seed: int, time_limit_s: float | None = None) -> None:
@@ -223,17 +356,24 @@ def run_fleet(dispatch: FleetDispatch, *, out: Path, seed: int, time_limit_s: fl
 
 
 def told(store: MissionStore, numbers: Sequence[int]) -> list[dict[str, Any]]:
-    """Missions as JSON values: whose each is or was, and how it ended."""
+    """Missions as JSON values, with their parts and what they are part of: whose each is or was, and how it ended."""
     given = GivenMissions(store).all()
     missions = {mission.id: mission for mission in store.missions()}
-    return [
-        {
-            "id": number,
-            "robot": given[number].robot if number in given else None,
-            "outcome": missions[number].state.value,
-            "referee": given[number].referee if number in given else None,
-            "reassigned": given[number].reassigned if number in given else 0,
-            "message": missions[number].message,
-        }
-        for number in numbers
-    ]
+    wanted = {*numbers, *(whole for number in numbers if (whole := given.get(number, GivenMission()).part_of))}
+    wanted |= {number for number, each in given.items() if each.part_of in wanted}
+    return [_told(missions[number], given) for number in sorted(wanted)]
+
+
+def _told(mission: StoredMission, given: Mapping[int, GivenMission]) -> dict[str, Any]:
+    known = given.get(mission.id, GivenMission())
+    parts = [each.robot for each in given.values() if each.part_of == mission.id and each.robot is not None]
+    return {
+        "id": mission.id,
+        "robot": parts[-1] if parts else known.robot,
+        "outcome": mission.state.value,
+        "referee": known.referee,
+        "reassigned": known.reassigned,
+        "message": mission.message,
+        "part_of": known.part_of,
+        "after": known.follows,
+    }

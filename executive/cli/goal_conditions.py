@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from py_trees.common import Status
 
 from executive.mission.errors import listing
-from executive.mission.goal import Area, GoalCondition
+from executive.mission.goal import Area, GoalCondition, GoalKind
 from executive.run.outcome import Outcome, RobotResult
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.tree.node import NodeSpec
@@ -16,15 +16,32 @@ from plant import referee
 from skills.speak.skill import Speak
 
 
+@dataclass(frozen=True)
+class Share:
+    """What another robot did of a mission before it was handed on: the first `done` parts of its tree."""
+
+    tree: CompiledTree
+    result: RobotResult
+    done: int
+
+
 def verdict_of(
-    tree: CompiledTree, result: RobotResult, judge: Callable[[Sequence[referee.GoalCondition]], referee.Verdict]
+    tree: CompiledTree,
+    result: RobotResult,
+    judge: Callable[[Sequence[referee.GoalCondition]], referee.Verdict],
+    *,
+    before: Sequence[Share] = (),
+    since_s: float = 0.0,
 ) -> referee.Verdict:
     """The verdict on a tree that has run; `judge` is the referee's, on the goal conditions.
 
     A run that did not end with success has not fulfilled its mission, whatever holds. One with a step that has no goal
-    condition is not judged, unless a condition of another step does not hold.
+    condition is not judged, unless a condition of another step does not hold. What other robots did `before` belongs to
+    the mission as well, and what happened before `since_s` (simulated time) does not.
     """
-    verdict = judge(conditions_of(tree, result))
+    shares = [condition for share in before for condition in _of_parts(share.tree, share.result, _parts_of(share))]
+    conditions = [*shares, *conditions_of(tree, result)]
+    verdict = judge([replace(condition, since_s=since_s) for condition in conditions])
     without = [part for part in _done(tree, result) if part.goal is None]
     if result.outcome is not Outcome.SUCCESS:
         return replace(
@@ -42,10 +59,18 @@ def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.Goal
     """The goal conditions of a tree that has run: of all its parts that were done.
 
     A count is one condition, however many trips it takes; an answer belongs to the check that gave it; what comes
-    before a step without condition needs to have been so at some time only.
+    before a step without condition needs to have been so at some time only, and so does where a robot went that stepped
+    aside for another afterwards.
     """
+    return _of_parts(tree, result, _done(tree, result))
+
+
+def _parts_of(share: Share) -> Sequence[StepPart]:
+    return [part for part in share.tree.parts[: share.done] if part.skill is not Speak]
+
+
+def _of_parts(tree: CompiledTree, result: RobotResult, parts: Sequence[StepPart]) -> tuple[referee.GoalCondition, ...]:
     found: list[referee.GoalCondition] = []
-    parts = _done(tree, result)
     for n, part in enumerate(parts):
         if part.goal is None:
             continue
@@ -54,7 +79,8 @@ def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.Goal
         times_s = [finding.t_s for finding in result.findings if finding.path_id == path]
         condition = condition_of(part.goal, robot=tree.robot_name, answer=result.answers.get(path))
         condition = replace(condition, answered_s=times_s[-1] if times_s else None)
-        found.append(replace(condition, passing=any(later.goal is None for later in parts[n + 1 :])))
+        was = result.stepped_aside and part.goal.kind is GoalKind.WENT
+        found.append(replace(condition, passing=was or any(later.goal is None for later in parts[n + 1 :])))
     return tuple(found)
 
 

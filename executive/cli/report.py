@@ -16,7 +16,8 @@ class RefereeReport:
     """The referee's verdict with its counts, and one sentence for each lift, drop and bump.
 
     `success` is None when the referee has not judged all that was asked for. `people_hit` counts collisions with
-    people, `hit_by_people` how often somebody walked into the robot while it stood: no collision of the robot's.
+    people, `robots_hit` those between two robots, and `hit_by_people` how often somebody walked into the robot while it
+    stood: no collision of the robot's.
     """
 
     success: bool | None
@@ -25,6 +26,7 @@ class RefereeReport:
     drops: int
     people_hit: int = 0
     hit_by_people: int = 0
+    robots_hit: int = 0
     events: tuple[str, ...] = ()
 
 
@@ -203,7 +205,8 @@ def _reported_object(values: Mapping[str, Any]) -> ReportedObject:
 
 def counts_text(referee: RefereeReport) -> str:
     """The counts; those with people where there were any."""
-    people = f" ({referee.people_hit} with people)" if referee.people_hit else ""
+    with_whom = ((referee.people_hit, "with people"), (referee.robots_hit, "between robots"))
+    people = "".join(f" ({count} {whom})" for count, whom in with_whom if count)
     walked_in = f"{referee.hit_by_people} times somebody walked into the robot" if referee.hit_by_people else ""
     return ", ".join(filter(None, (f"{referee.collisions} collisions{people}", f"{referee.drops} drops", walked_in)))
 

@@ -13,7 +13,16 @@ from executive.cli.evaluate_scenario import command_of
 from executive.cli.output import console_for, print_json, refusals, show_table
 from executive.evaluation.page import EvaluationPage, to_page
 from executive.evaluation.results import ResultsFile
-from executive.evaluation.summary import Case, causes_of, compared, group_rows, groups_of, time_rows, totals_of
+from executive.evaluation.summary import (
+    Case,
+    causes_of,
+    compared,
+    group_rows,
+    groups_of,
+    label_of,
+    time_rows,
+    totals_of,
+)
 from executive.mission.errors import InputError
 
 __all__ = ["report"]
@@ -70,7 +79,9 @@ def _show(console: Console, cases: Sequence[Case], other: Sequence[Case] | None)
     for found in compared(cases, other) if other is not None else ():
         test = "McNemar" if found.paired else "Fisher"
         here, there = (f"{rate.successes} of {rate.total}" for rate in (found.first, found.second))
-        console.print(f"{found.dimension} {found.name}: {here} against {there}, p {found.p:.3g} ({test})", markup=False)
+        console.print(
+            f"{label_of(found.dimension, found.name)}: {here} against {there}, p {found.p:.3g} ({test})", markup=False
+        )
 
 
 def _write(path: Path, text: str) -> None:

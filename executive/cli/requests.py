@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -24,11 +24,23 @@ from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import Knowledge, Pose
 from executive.mission.mission import lines_of, mission_from_lines, mission_from_meaning, understood
 from executive.mission.request import Request
+from executive.mission.robots import RobotSetup, display_name, robots_in
+from executive.mission.yaml_source import read_yaml
 from executive.tree.compiler import CompiledTree, compile_mission
 from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
 from skills.robot import Pose2D
 
-__all__ = ["Prepared", "filed", "fingerprint", "prepare", "prepared_for", "replacing", "world_of_file"]
+__all__ = [
+    "Prepared",
+    "commanded",
+    "filed",
+    "fingerprint",
+    "prepare",
+    "prepare_alone",
+    "prepared_for",
+    "replacing",
+    "world_of",
+]
 
 
 @dataclass(frozen=True)
@@ -59,6 +71,12 @@ class Prepared:
         """This, and what the other robots do."""
         return (replace(self, others=()), *self.others)
 
+    @property
+    def stack_file(self) -> Path | None:
+        """The stack file of its robot; None for that of its kind."""
+        own = (setup for name, setup in self.request.robots.items() if display_name(name) == self.mission.robot_name)
+        return next((setup.stack for setup in own), self.request.stack)
+
 
 def prepare(
     request: Request,
@@ -79,16 +97,58 @@ def prepare(
         raise InputError("a mission file or --say is needed, and not both", hint='try: --say "Hey Alice, ..."')
     if request.given and request.file is None:
         raise InputError("--set gives values to a mission file, and there is none", hint="name the file as well")
-    if request.robots:
-        from executive.cli.several import prepare_several
+    request, loaded, world, knowledge = _opened(request)
+    robots = request.robots or _named_robots(loaded, world, knowledge)
+    if not robots:
+        return _alone(request, loaded, world, knowledge, ask)
+    from executive.cli.several import prepare_several
 
-        return prepare_several(request, ask=ask)
+    return prepare_several(replace(request, robots=robots), ask=ask, loaded=loaded)
+
+
+def prepare_alone(request: Request) -> Prepared:
+    """A request understood for one robot, whichever robots it names; nobody is asked. Raises InputError."""
+    request, loaded, world, knowledge = _opened(replace(request, robots={}))
+    return _alone(request, loaded, world, knowledge, None)
+
+
+def _opened(request: Request) -> tuple[Request, MissionFile | None, World, Knowledge]:
+    """A request with its file read where it has one, its world, and what is known of that. Raises InputError."""
+    loaded = None
     if request.file is not None:
         file = mission_file(request.file)
-        return filed(replace(request, file=file), file, ask)
-    world, knowledge = _standing(request, open_world(request.world or request.world_name or DEFAULT_WORLD))
+        request, loaded = replace(request, file=file), load_mission(file, request.given)
+    world = world_of(request, loaded)
+    return request, loaded, world, knowledge_of(world)
+
+
+def world_of(request: Request, loaded: MissionFile | None) -> World:
+    """The world of a request, which stands in for that of its mission file. Raises InputError."""
+    if request.world is None and loaded is not None:
+        return _own_world(loaded)
+    return open_world(request.world or request.world_name or DEFAULT_WORLD)
+
+
+def _named_robots(loaded: MissionFile | None, world: World, knowledge: Knowledge) -> Mapping[str, RobotSetup]:
+    """The robots that a mission file names, else its world; none where it is for the world's one robot."""
+    named = knowledge.robots if loaded is None or loaded.robots is None else loaded.robots
+    if named is None:
+        return {}
+    from plant.kinds import robot_kinds
+
+    own = read_yaml(world.knowledge_path) if loaded is None or loaded.robots is None else loaded.source
+    return robots_in(named, robot_kinds(), own)
+
+
+def _alone(
+    request: Request, loaded: MissionFile | None, world: World, knowledge: Knowledge, ask: Answerer | None
+) -> Prepared:
+    """What the one robot of a run is to do. Raises InputError."""
+    if loaded is not None:
+        return filed(request, loaded, *_standing(request, world, knowledge), ask)
+    world, knowledge = _standing(request, world, knowledge)
     if request.sentence is None:
-        return prepared_for(request, _commanded(request, world), world, knowledge)
+        return prepared_for(request, commanded(request, world), world, knowledge)
     robot = knowledge.robot
     wake = robot.require_wake if request.require_wake is None else request.require_wake
     meant = understood(
@@ -102,25 +162,13 @@ def prepare(
     return prepared_for(replace(request, sentence=meant.text, require_wake=wake), mission, world, knowledge, meant)
 
 
-Standing = Callable[[Request, World], tuple[World, Knowledge]]
-"""A world and what is known of it, with the robot where a request has it."""
-
-
-def world_of_file(request: Request, file: Path) -> World:
-    """The world of a mission file; the request's stands in for the file's own. Raises InputError."""
-    return open_world(request.world) if request.world is not None else _own_world(load_mission(file, request.given))
-
-
-def filed(request: Request, file: Path, ask: Answerer | None, standing: Standing | None = None) -> Prepared:
-    """What a mission file asks of the robot that knows what `standing` gives. Raises InputError."""
-    loaded = load_mission(file, request.given)
-    world = open_world(request.world) if request.world is not None else _own_world(loaded)
-    world, knowledge = (standing or _standing)(request, world)
+def filed(request: Request, loaded: MissionFile, world: World, knowledge: Knowledge, ask: Answerer | None) -> Prepared:
+    """What a mission file asks of the robot that stands in a world and knows `knowledge` of it. Raises InputError."""
     knowledge = overridden(loaded, knowledge)
     answer = answerer(request.answers, request.questions or loaded.questions, ask)
     mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
     world = _with_people(loaded, _with_objects(loaded, world, knowledge), knowledge)
-    text = file.read_text(encoding="utf-8")
+    text = None if request.file is None else request.file.read_text(encoding="utf-8")
     return prepared_for(replace(request, text=text), mission, world, knowledge)
 
 
@@ -152,9 +200,8 @@ def _with_objects(loaded: MissionFile, world: World, knowledge: Knowledge) -> Wo
     return world
 
 
-def _standing(request: Request, world: World) -> tuple[World, Knowledge]:
+def _standing(request: Request, world: World, knowledge: Knowledge) -> tuple[World, Knowledge]:
     """The world and what is known of it, with the robot where the request has it. Raises InputError: it is not free."""
-    knowledge = knowledge_of(world)
     if request.map is not None:
         world = with_map(world, request.map)
     start = None if request.start is None else request.start.pose
@@ -172,7 +219,7 @@ def _own_world(loaded: MissionFile) -> World:
         raise loaded.error(("world",), error.message, error.hint) from error
 
 
-def _commanded(request: Request, world: World) -> Mission:
+def commanded(request: Request, world: World) -> Mission:
     """The mission of commands in their text form, or of steps in their written form."""
     try:
         mission = mission_from_lines(request.commands, world=world.name, robot_name=request.robot)

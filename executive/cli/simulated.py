@@ -10,6 +10,7 @@ from executive.cli.artifacts import Artifacts, draw_artifacts
 from executive.cli.assembly import judge, run_entry, simulate, take_up_plant
 from executive.cli.backend import Scene
 from executive.cli.durable import Durable
+from executive.cli.goal_conditions import Share
 from executive.cli.mission_run import Finished, run_request
 from executive.cli.page_view import PageView
 from executive.cli.report import RefereeReport
@@ -89,9 +90,11 @@ class SimulatedBackend:
         scene: Scene = self._simulation.show_live()
         return scene
 
-    def judge(self, tree: CompiledTree, result: RobotResult) -> RefereeReport:
+    def judge(
+        self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
+    ) -> RefereeReport:
         """What the plant's referee saw."""
-        verdict = judge(self._simulation, tree, result)
+        verdict = judge(self._simulation, tree, result, before=before, since_s=since_s)
         return RefereeReport(**asdict(verdict), events=self._simulation.referee.events)
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:

@@ -66,10 +66,13 @@ def placed_robots(world: World, knowledge: Knowledge, setups: Mapping[str, Robot
     placed: dict[str, PlacedRobot] = {}
     told = {name: setup.start or (world.start if not number else None) for number, (name, setup) in _numbered(setups)}
     for number, (name, setup) in sorted(_numbered(setups), key=lambda each: told[each[1][0]] is None):
-        start = told[name] or _free_start(free, world, setup, placed)
-        if setup.start is not None:
-            _refuse_overlap(name, setup.kind, start, placed, free)
-        own = _dock(name, setup, knowledge) or (world.dock if number == 0 else start)
+        try:
+            start = told[name] or _free_start(free, world, setup, placed)
+            if setup.start is not None:
+                _refuse_overlap(name, setup.kind, start, placed, free)
+            own = _dock(name, setup, knowledge) or (world.dock if number == 0 else start)
+        except InputError as error:
+            raise InputError.at(setup.source, error.message, hint=error.hint) from error
         stack = load_stack(setup.stack or robot_kind(setup.kind).stack)
         placed[display_name(name)] = PlacedRobot(setup.kind, start, stack, own)
     return {display_name(name): placed[display_name(name)] for name in setups}

@@ -84,9 +84,11 @@ def _view(text: str | None, say: str | None, world: str | None, at_s: float | No
     if at_s is not None:
         raise InputError("--at is for logs", hint="name a log.mcap that a run has written")
     prepared = prepare(_request(text, say, world))
-    for note in prepared.mission.notes:
-        typer.echo(note, err=True)
-    return node_view(prepared.tree.root)
+    for each in prepared.all:
+        for note in each.mission.notes:
+            typer.echo(note, err=True)
+    trees = tuple(node_view(each.tree.root) for each in prepared.all)
+    return trees[0] if len(trees) == 1 else NodeView("robots", "together", prepared.mission.name, children=trees)
 
 
 def _request(text: str | None, say: str | None, world: str | None) -> Request:

@@ -18,7 +18,7 @@ __all__ = ["EvaluationPage", "to_page"]
 MOST_PICTURE_BYTES: Final = 40_000_000
 SIGNIFICANT: Final = 0.05
 _STYLE: Final = """
-.bar { display: block; position: relative; height: .55rem; min-width: 8rem; }
+.bar { display: block; position: relative; top: .35rem; height: .55rem; min-width: 8rem; }
 .bar { background: var(--line); border-radius: 4px; }
 .bar i { position: absolute; top: 0; bottom: 0; background: var(--success-line); opacity: .4; border-radius: 4px; }
 .bar b { position: absolute; top: -2px; bottom: -2px; width: 3px; background: var(--success-line); }
@@ -102,7 +102,8 @@ def _row(found: Comparison) -> Sequence[str]:
     alone = (str(found.only_first), str(found.only_second)) if found.paired else ("", "")
     verdict = "differs" if found.p < SIGNIFICANT else "may be chance"
     test = "McNemar, exact, paired" if found.paired else "Fisher, exact"
-    return _safe(found.dimension), _safe(found.name), *rates, *alone, f"{found.p:.3g}", f"{verdict} ({test})"
+    dimension = "" if found.dimension == "all" else _safe(found.dimension)
+    return dimension, _safe(found.name), *rates, *alone, f"{found.p:.3g}", f"{verdict} ({test})"
 
 
 def _causes(cases: Sequence[Case]) -> str:

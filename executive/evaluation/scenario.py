@@ -176,9 +176,9 @@ def _with_used(file: Path) -> Iterator[tuple[str, str]]:
 
 
 def _uses(data: Any) -> Iterator[str]:
-    """The files that stand under a key `use` anywhere in a document."""
+    """The files that stand under a key `use` or `stack` anywhere in a document."""
     if isinstance(data, dict):
-        yield from (value for key, value in data.items() if key == "use" and isinstance(value, str))
+        yield from (value for key, value in data.items() if key in ("use", "stack") and isinstance(value, str))
     for value in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
         yield from _uses(value)
 

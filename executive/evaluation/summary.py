@@ -11,7 +11,18 @@ from executive.evaluation.outcome import RunOutcome
 from executive.evaluation.runs import RunSpec
 from executive.evaluation.statistics import Rate, fisher, mcnemar
 
-__all__ = ["Case", "Comparison", "Group", "TimeRow", "causes_of", "compared", "group_rows", "groups_of", "time_rows"]
+__all__ = [
+    "Case",
+    "Comparison",
+    "Group",
+    "TimeRow",
+    "causes_of",
+    "compared",
+    "group_rows",
+    "groups_of",
+    "label_of",
+    "time_rows",
+]
 
 FALSE_CLAIM: Final = "FALSE CLAIM"
 PLAIN: Final = "as it is"
@@ -91,6 +102,11 @@ def _keys(case: Case) -> Iterator[tuple[str, str]]:
         yield "variation", case.run.variation_words
 
 
+def label_of(dimension: str, name: str) -> str:
+    """A group's dimension and name in words."""
+    return name if dimension == "all" else f"{dimension}: {name}"
+
+
 def _group(dimension: str, name: str, cases: Iterable[Case]) -> Group:
     found = list(cases)
     return Group(
@@ -113,7 +129,7 @@ def group_rows(groups: Iterable[Group]) -> Iterator[tuple[str, ...]]:
     """The table of groups as text."""
     for group in groups:
         low, high = group.rate.interval()
-        name = group.name if group.dimension == "all" else f"{group.dimension}: {group.name}"
+        name = label_of(group.dimension, group.name)
         success = f"{group.achieved} ({group.rate.value:.1%})"
         yield name, str(group.runs), success, f"{low:.1%} to {high:.1%}", str(group.fulfilled), str(group.false_claims)
 

@@ -13,7 +13,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any, Final, Generic, Protocol, TypeVar
 
-__all__ = ["MOST_DEATHS", "Finished", "LocalWorkers", "Workers", "end_with_starter"]
+__all__ = ["MOST_DEATHS", "Finished", "LocalWorkers", "Workers"]
 
 MOST_DEATHS: Final = 3
 """Work with which so many workers have died is given up."""
@@ -107,10 +107,10 @@ def _begin() -> None:
     """A worker does not hear Ctrl-C at the terminal, and ends with the process that started it."""
     os.setpgrp()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_starter()
+    _end_with_starter()
 
 
-def end_with_starter() -> None:
+def _end_with_starter() -> None:
     """Let this process end when the one that started it is gone: one that is killed cannot end its own."""
     starter = multiprocessing.parent_process()
     if starter is None:

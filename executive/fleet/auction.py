@@ -13,7 +13,8 @@ class Bid:
     """What one robot offers for one mission.
 
     It is free in `ready_s` (s from now), takes `duration_s` from there, and has `charge` (0 to 1) left afterwards.
-    `problems` are sentences that say why it cannot do it; such a bid never wins.
+    `problems` are sentences that say why it cannot do it; such a bid never wins. With `charges` it would have to charge
+    first, which `duration_s` includes.
     """
 
     mission: int
@@ -21,18 +22,20 @@ class Bid:
     ready_s: float
     duration_s: float
     charge: float = 1.0
+    charges: bool = False
     problems: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Award:
     """A mission that goes to a robot, which is done with it at `ends_s` (s from now); `first`: it begins right away
-    after what the robot does now."""
+    after what the robot does now, or when it has charged, where it `charges` before."""
 
     mission: int
     robot: str
     ends_s: float
     first: bool
+    charges: bool = False
 
 
 def award(bids: Iterable[Bid]) -> Sequence[Award]:
@@ -46,7 +49,7 @@ def award(bids: Iterable[Bid]) -> Sequence[Award]:
     while left:
         best = min(left, key=lambda bid: (ready_s[bid.robot] + bid.duration_s, bid.mission, bid.robot))
         ready_s[best.robot] += best.duration_s
-        awards.append(Award(best.mission, best.robot, ready_s[best.robot], best.robot not in busy))
+        awards.append(Award(best.mission, best.robot, ready_s[best.robot], best.robot not in busy, best.charges))
         busy.add(best.robot)
         left = [bid for bid in left if bid.mission != best.mission]
     return awards

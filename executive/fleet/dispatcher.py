@@ -14,10 +14,12 @@ BidOf = Callable[[int, str], Bid]
 
 @dataclass(frozen=True)
 class Round:
-    """What one round of the auction brings: missions that begin now, and why nobody can do some others."""
+    """What one round of the auction brings: missions that begin now, why nobody can do some others, and robots that
+    charge before they begin theirs."""
 
     begun: Sequence[Award]
     refused: Mapping[int, str]
+    charging: Sequence[str] = ()
 
 
 class Dispatcher:
@@ -28,6 +30,8 @@ class Dispatcher:
         self._waiting: list[int] = list(dict.fromkeys(missions))
         self._robots: list[str] = list(dict.fromkeys(robots))
         self._under_way: dict[str, int] = {}
+        self._resting: set[str] = set()
+        self._after: dict[int, int] = {}
 
     @property
     def waiting(self) -> tuple[int, ...]:
@@ -40,6 +44,11 @@ class Dispatcher:
         return dict(self._under_way)
 
     @property
+    def resting(self) -> frozenset[str]:
+        """The robots that charge: they bid, and begin nothing meanwhile."""
+        return frozenset(self._resting)
+
+    @property
     def robots(self) -> tuple[str, ...]:
         """The robots that can be given work."""
         return tuple(self._robots)
@@ -47,21 +56,42 @@ class Dispatcher:
     def assign(self, bid: BidOf) -> Round:
         """One round of the auction, in which robots that are busy bid as well; `bid` is asked for each pair.
 
-        A mission that goes to a busy robot waits, and is put up again when any robot is free. Without a robot that
-        can be given work, nothing is refused.
+        A mission that goes to a busy robot, or to one that has to charge first, waits, and is put up again when any
+        robot is free. Without a robot that can be given work, nothing is refused.
         """
-        if not self._waiting or all(robot in self._under_way for robot in self._robots):
+        free = [robot for robot in self._robots if robot not in self._under_way and robot not in self._resting]
+        up = [mission for mission in self._waiting if mission not in self._after]
+        if not up or not free:
             return Round((), {})
-        bids = {mission: [bid(mission, robot) for robot in self._robots] for mission in self._waiting}
+        bids = {mission: [bid(mission, robot) for robot in self._robots] for mission in up}
         awards = award(one for each in bids.values() for one in each)
         given = {each.mission for each in awards}
         refused = {mission: _why(each) for mission, each in bids.items() if mission not in given}
-        begun = [each for each in awards if each.first and each.robot not in self._under_way]
+        next_up = [each for each in awards if each.first and each.robot in free]
+        begun = [each for each in next_up if not each.charges]
+        charging = [each.robot for each in next_up if each.charges]
+        self._resting.update(charging)
         for each in begun:
             self._under_way[each.robot] = each.mission
         gone = {each.mission for each in begun} | set(refused)
         self._waiting = [mission for mission in self._waiting if mission not in gone]
-        return Round(begun, refused)
+        return Round(begun, refused, charging)
+
+    def add(self, mission: int, *, after: int | None = None) -> None:
+        """One more mission, which is put up when the one that it comes `after` has been done."""
+        self._waiting.append(mission)
+        if after is not None:
+            self._after[mission] = after
+
+    def done(self, mission: int) -> None:
+        """A mission has been done: those that come after it are put up."""
+        self._after = {each: before for each, before in self._after.items() if before != mission}
+
+    def drop(self, mission: int) -> Sequence[int]:
+        """A mission was not done: those that come after it are not waiting any more; their numbers."""
+        dropped = [each for each, before in self._after.items() if before == mission]
+        self._waiting = [each for each in self._waiting if each not in dropped]
+        return [*dropped, *(later for each in dropped for later in self.drop(each))]
 
     def over(self, robot: str) -> int:
         """The robot's mission has come to its end; its number. Raises KeyError: it has none."""
@@ -73,8 +103,17 @@ class Dispatcher:
         self._waiting.insert(0, mission)
         return mission
 
+    def rest(self, robot: str) -> None:
+        """The robot charges from now on."""
+        self._resting.add(robot)
+
+    def wake(self, robot: str) -> None:
+        """The robot charges no more."""
+        self._resting.discard(robot)
+
     def lose(self, robot: str) -> None:
         """The robot can be given no work any more."""
+        self.wake(robot)
         self._robots = [each for each in self._robots if each != robot]
 
 

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.mission.command import Task
 from executive.mission.errors import InputError, suggestion
+from executive.mission.robots import RobotsFile
 from executive.mission.yaml_source import Name, YamlSource, read_yaml, validate
 from skills.perception.class_forms import PERSON, THING, class_forms
 from skills.quantities import Angle, Coordinate
@@ -124,6 +125,9 @@ class Knowledge(_Facts):
     """All that is known of one world. Names are matched without regard to case."""
 
     robot: RobotFacts = Field(default=RobotFacts(name="Alice"), description="the robot")
+    robots: RobotsFile | None = Field(
+        default=None, description="the robots of runs in this world that name none themselves, by name"
+    )
     start: Pose = Field(description="where it stands at the beginning")
     dock: Pose | None = Field(default=None, description="where it stands to charge; without one it cannot charge")
     battery: BatteryFacts = Field(default=BatteryFacts(), description="when it charges, and until when")

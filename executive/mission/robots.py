@@ -4,24 +4,30 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Annotated, Any, Final
 
-from executive.mission.errors import InputError, known_names, suggestion
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from executive.mission.errors import InputError, SourceLine, known_names, suggestion
+from executive.mission.yaml_source import Name, YamlSource
 from skills.quantities import Angle, Coordinate, in_range
 from skills.robot import Pose2D
 
 __all__ = [
     "EVERYBODY",
+    "RobotFile",
     "RobotSetup",
+    "RobotsFile",
     "checked_kind",
     "checked_name",
     "display_name",
     "name_key",
     "parse_robots",
     "robot_called",
+    "robots_in",
     "same_name",
 ]
 
@@ -39,13 +45,46 @@ class RobotSetup:
     """One robot of a run.
 
     `kind` is a name of the entry-point group `errand.robots`; the robot begins at `start` (world frame), charges at the
-    place `dock` and uses the components of the file `stack`. What is None is as the world says, or the kind.
+    place `dock` and uses the components of the file `stack`. What is None is as the world says, or the kind. A file
+    names it at `source`.
     """
 
     kind: str
     start: Pose2D | None = None
     dock: str | None = None
     stack: Path | None = None
+    source: SourceLine | None = field(default=None, compare=False)
+
+
+class RobotFile(BaseModel):
+    """A robot of a run: its kind, and where and with what it begins."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    kind: Name = Field(description="The kind of robot: spot, fetch, or one that a package adds.")
+    at: tuple[Coordinate, Coordinate, Angle] | None = Field(
+        None,
+        description="Where it begins: x and y (m) and the heading (rad), in the world frame. By default the first "
+        "robot begins at the world's start, each other one at the nearest free place.",
+    )
+    dock: Name | None = Field(
+        None, description="The place where it charges; by default the world's dock for the first, else where it begins."
+    )
+    stack: Name | None = Field(
+        None, description="A stack file, as seen from this file's folder; by default its kind's."
+    )
+
+
+def _short_robot(value: object) -> Any:
+    """A robot may be named by its kind alone."""
+    return {"kind": value} if isinstance(value, str) else value
+
+
+RobotsFile = Annotated[
+    dict[Name, Annotated[RobotFile, BeforeValidator(_short_robot, json_schema_input_type=RobotFile | Name)]],
+    Field(min_length=1),
+]
+"""Robots by name, each as its kind alone or with more."""
 
 
 def name_key(name: str) -> str:
@@ -111,6 +150,34 @@ def parse_robots(text: str, kinds: Collection[str]) -> Mapping[str, RobotSetup]:
         checked_kind(kind.strip(), kinds)
         robots[name] = RobotSetup(kind.strip(), _start(name, start) if at else None)
     return MappingProxyType(robots)
+
+
+def robots_in(
+    robots: Mapping[str, RobotFile], kinds: Collection[str], source: YamlSource | None
+) -> Mapping[str, RobotSetup]:
+    """The robots that stand under `robots` in a file, in its order; their stacks are seen from its folder.
+
+    Raises:
+        InputError: with file and line: two have one name, a name is none, or a kind is not among `kinds`.
+    """
+    setups: dict[str, RobotSetup] = {}
+    for name, robot in robots.items():
+        line = None if source is None else SourceLine(source.path, source.line(("robots", name)))
+        try:
+            if (double := same_name(checked_name(name), setups)) is not None:
+                raise double
+            checked_kind(robot.kind, kinds)
+        except InputError as error:
+            raise InputError.at(line, error.message, hint=error.hint) from error
+        stack = None if robot.stack is None else Path(robot.stack)
+        setups[name] = RobotSetup(
+            robot.kind,
+            None if robot.at is None else Pose2D(*robot.at),
+            robot.dock,
+            stack if stack is None or source is None else source.path.parent / stack,
+            line,
+        )
+    return MappingProxyType(setups)
 
 
 def _entries(text: str) -> Iterator[str]:

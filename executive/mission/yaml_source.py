@@ -221,6 +221,9 @@ def _input_error(model: type[BaseModel], source: YamlSource, errors: list[ErrorD
     if error["type"] == "extra_forbidden":
         hint = suggestion(str(path[-1]), known, f"known keys are {listing(known)}")
         return source.error(path, f"unknown {_quoted(path[-1])}", hint)
+    if error["type"] == "missing" and isinstance(path[-1], int):
+        parts = ".".join(str(part) for part in path[:-1])
+        return source.error(path[:-1], f"{parts}: it should have more parts than {path[-1]}", "add what is missing")
     if error["type"] == "missing":
         parent = ".".join(str(part) for part in path[:-1]) or "the file"
         return source.error(path[:-1], f"key {path[-1]!r} is missing in {parent}", f"add {path[-1]!r}")

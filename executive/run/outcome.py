@@ -27,7 +27,8 @@ class RobotResult:
     """How one robot's mission ended: its answers to status checks by path id, and the last state of its tree.
 
     `answers` has the last answer of each node, `findings` all answers in order, and `said` what the robot said.
-    `preempting` are the results of the missions that came in between, in the order of their ends.
+    `preempting` are the results of the missions that came in between, in the order of their ends. `stepped_aside` when
+    the robot made way for another after its end.
     """
 
     robot_name: str
@@ -40,6 +41,7 @@ class RobotResult:
     preempting: tuple[RobotResult, ...] = ()
     findings: tuple[Finding, ...] = ()
     said: tuple[Said, ...] = ()
+    stepped_aside: bool = False
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, TypeVar, cast
+from typing import TypeVar, cast
 
 from executive.mission.errors import disk_is_full
 from executive.record.profile import Profile
@@ -15,10 +15,12 @@ from executive.record.schemas import CONTROL, WAY
 from executive.record.ticks import TickMeter
 from executive.record.work import Work
 from executive.run.control import Control, ControlRequests, Event
-from executive.run.dispatch import Dispatch, MissionEnd
+from executive.run.dispatch import Dispatch, DispatchedSessions, never_began
+from executive.run.endings import CancelledError, LastingLog, TimeOverError, ending_of
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
-from executive.run.outcome import Outcome, RobotResult, RobotStatus, RunResult
+from executive.run.outcome import Outcome, RobotStatus, RunResult
+from executive.run.resting import Resting
 from executive.run.session import Session
 from executive.run.traffic import TrafficTable
 from executive.run.tree_run import Ending
@@ -30,10 +32,10 @@ from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
 from executive.tree.compiling.builder import slug
 from executive.tree.snapshot import Snapshot
-from skills.api import Cause, Costmap, Detector, Localiser, Publish, Worker
+from skills.api import Cause, Costmap, Detector, Localiser, Publish, SharedCostmap, Worker
 from skills.detection import NO_DETECTOR
 from skills.navigate.footprint import Footprint
-from skills.robot import Clock, LeaseError, Pose2D, Robot
+from skills.robot import Clock, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 from skills.traffic import NO_TRAFFIC
 
@@ -95,14 +97,6 @@ class Progress:
 Observer = Callable[[Progress], None]
 
 
-class _CancelledError(Exception):
-    """Somebody cancelled the run."""
-
-
-class _TimeOverError(Exception):
-    """The run's time limit has passed."""
-
-
 def run(
     entries: Sequence[RunEntry],
     *,
@@ -135,42 +129,27 @@ def run(
     control = control or Control(pace=None)
     control.begin({entry.tree.robot_name: entry.tree for entry in entries})
     made = _Run(clock, worker, publish, settings, control)
-    made.observer, made.work, made.profile, made.dispatch = observer, work or Work(), profile, dispatch
+    made.observer, made.work, made.profile = observer, work or Work(), profile
+    if dispatch is not None:
+        made.give_out(dispatch)
     return made.run(entries)
-
-
-class _LastingLog:
-    """The log as the parts of a run see it: while a run is ending, a broken log keeps no robot from being stopped."""
-
-    def __init__(self, publish: Publish) -> None:
-        self._publish = publish
-        self.ending = False
-
-    def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
-        """Log a message. Raises what the log raises, but not while the run is ending."""
-        try:
-            self._publish(topic, message)
-        except Exception:
-            if not self.ending:
-                raise
 
 
 class _Run:
     """The state of one run."""
 
     def __init__(self, clock: Clock, worker: Worker, publish: Publish, settings: RunSettings, control: Control) -> None:
-        self._clock, self._worker, self._publish = clock, worker, _LastingLog(publish)
+        self._clock, self._worker, self._publish = clock, worker, LastingLog(publish)
         self._settings, self._control = settings, control
         self.observer: Observer | None = None
         self.work = Work()
         self.profile: Profile | None = None
-        self.dispatch: Dispatch | None = None
-        self._seen: dict[str, RobotStatus] = {}
-        self._over: list[tuple[RobotResult, CompiledTree]] = []
+        self._given: DispatchedSessions | None = None
         self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
         self._traffic: TrafficTable | None = None
         self._ways_due_s = clock.now()
+        self._resting: Resting | None = None
         self._after: dict[str, tuple[str, ...]] = {}
         self._ticks = 0
         self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
@@ -178,6 +157,10 @@ class _Run:
         told_s = settings.time_of_day_s
         self._day_began_s = (_time_of_day_s() if told_s is None else told_s) - self._begun_s
         self._time = StoppableTime(clock)
+
+    def give_out(self, dispatch: Dispatch) -> None:
+        """Robots are given missions as long as there are any."""
+        self._given = DispatchedSessions(dispatch, self._sessions, self._control, self._publish, lambda: self._ticks)
 
     def run(self, entries: Sequence[RunEntry]) -> RunResult:
         """The whole run."""
@@ -188,8 +171,10 @@ class _Run:
         ending: Ending | None = None
         full: BaseException | None = None
         try:
-            if len(entries) > 1 or self.dispatch is not None:
+            if len(entries) > 1 or self._given is not None:
                 self._traffic = TrafficTable({}, self._clock.now)
+                tick_limit_s = self._settings.tick_limit_s
+                self._resting = Resting(self._traffic, self._watchdog, tick_limit_s, self._sense)
             for entry in sorted(entries, key=lambda entry: entry.robot.name):
                 self._sessions.append(self._open(entry))
                 self._after[entry.robot.name] = entry.after
@@ -197,15 +182,18 @@ class _Run:
                 self._cycle()
         except (Exception, VerbHung, KeyboardInterrupt) as stop:
             self._publish.ending = True
-            ending = self._ending(stop)
-            if isinstance(stop, _CancelledError | _TimeOverError):
+            ending = ending_of(stop, self._publish)
+            if isinstance(stop, CancelledError | TimeOverError):
                 self._end_early()
             full = stop if disk_is_full(stop) else None
         finally:
             self._publish.ending = True
+            if self._resting is not None:
+                self._resting.close()
             for session in self._sessions:
                 session.close(ending)
-                self._dispatched(session, None)
+                if self._given is not None:
+                    self._given.tell(session, None)
             self._tell(self._control.end())
         if full is not None:
             raise full
@@ -213,64 +201,33 @@ class _Run:
 
     def _has_work(self) -> bool:
         """Whether a mission is under way, after those were begun that are given out now."""
-        while self.dispatch is not None and (given := self.dispatch.begin()):  # again while one cannot begin
-            for entry in given:
-                self._begin_given(entry, self.dispatch)
+        if self._given is not None:
+            self._given.begin(self._begin_given)
         return not all(session.finished for session in self._sessions)
 
-    def _begin_given(self, entry: RunEntry, dispatch: Dispatch) -> None:
-        """Begin a mission that was given out; a robot that cannot be had is told of."""
-        try:
-            session = self._open(entry)
-        except (Exception, VerbHung) as stop:
-            ending = self._ending(stop)
-            result = _never_began(entry, ending)
-            self._over.append((result, entry.tree))
-            dispatch.ended(MissionEnd(result, self._seen.get(entry.robot.name), gone=ending.message))
-            return
-        self._sessions.append(session)
-        self._after[session.name] = ()
-        self._control.mission_begun(session.name, entry.tree)
+    def _begin_given(self, entry: RunEntry) -> Session:
+        """Begin a mission that was given out, of a robot that may be resting. Raises what its verbs raise."""
+        if self._resting is not None:
+            self._resting.leave(entry.robot.name)
+        return self._open(entry)
 
     def _for(self, session: Session, call: Callable[[], ResultT], otherwise: ResultT) -> ResultT:
-        """What a call for one robot gives. Where missions are given out, one that fails ends only that robot's."""
-        if self.dispatch is None:
+        """What a call for one robot gives. With several robots, one that fails ends only its own mission.
+
+        It is no more than an obstacle to the others then. Raises OSError: the disk is full.
+        """
+        if self._traffic is None:
             return call()
         try:
             return call()
         except (Exception, VerbHung) as stop:
             if disk_is_full(stop):
                 raise
-            ending = self._ending(stop)
+            ending = ending_of(stop, self._publish)
             session.close(ending)
+            self._leave_way(session)
             self._end_given(session, ending.message)
             return otherwise
-
-    def _look(self, session: Session) -> bool:
-        """See how a robot is."""
-        charge = session.context.robot.battery().charge
-        self._seen[session.name] = replace(session.status, charge=charge)
-        return True
-
-    def _end_given(self, session: Session, gone: str | None) -> None:
-        """A robot's mission is over, and it is free again unless it is `gone`."""
-        if session not in self._sessions or self.dispatch is None:
-            return
-        if gone is None:
-            try:
-                self._look(session)
-            except (Exception, VerbHung) as stop:
-                gone = self._ending(stop).message
-        self._dispatched(session, gone)
-        self._sessions.remove(session)
-        self._control.mission_ended(session.name)
-
-    def _dispatched(self, session: Session, gone: str | None) -> None:
-        """Tell how a mission that was given out ended."""
-        if self.dispatch is not None and session.result is not None:
-            session.log_end(self._ticks)
-            self._over.append((session.result, session.main_tree))
-            self.dispatch.ended(MissionEnd(session.result, self._seen.get(session.name), gone))
 
     def _end_early(self) -> None:
         """Do what missions always do in the end, for `endings_limit_s` at most; a second cancel ends that as well."""
@@ -346,6 +303,7 @@ class _Run:
         turn = [session for session in live if session.result is None and self._is_its_turn(session)]
         free = [session for session in turn if self._for(session, session.may_move, False)]
         moving = [session for session in free if not requests.held(session.name)]
+        self._rest(live, turn, requests.held)
         self._tick(moving, requests.breakpoints)
         for session in live:
             if session.result is not None:  # it was cancelled, or its lease was another's for too long
@@ -356,14 +314,41 @@ class _Run:
                 session.close()
                 self._leave_way(session)
                 self._end_given(session, None)
-            elif self.dispatch is not None:
-                self._for(session, partial(self._look, session), False)
+                if self._resting is not None and self._others_go_on(session):
+                    self._resting.rest(session)
+            elif self._given is not None:
+                self._for(session, partial(self._given.look, session), None)
+        if self._given is not None:
+            self._given.recall()
         if self.observer is not None:
             self.observer(self._progress())
         self._keep_pace(begun_wall_s)
 
+    def _end_given(self, session: Session, gone: str | None) -> None:
+        """Where missions are given out, the robot has none any more, and is free again unless it is `gone`."""
+        if self._given is not None:
+            self._given.end(session, gone)
+
+    def _others_go_on(self, session: Session) -> bool:
+        """Whether a robot whose mission is over may still be in somebody's way."""
+        return self._given is not None or any(not one.finished for one in self._sessions if one is not session)
+
+    def _rest(self, live: Sequence[Session], turn: Sequence[Session], held: Callable[[str], bool]) -> None:
+        """Let the robots that wait for others, and those whose missions are over, clear ways that are reserved."""
+        if self._resting is None:
+            return
+        for session in live:
+            if session in turn:
+                self._resting.leave(session.name)
+            elif session.result is None:
+                self._resting.wait(session)
+        self._resting.tick(held)
+
     def _sense(self, session: Session) -> None:
         """Bring a robot's estimators up to date, and tell the others where it believes to be."""
+        costmap = session.context.costmap
+        if self._traffic is not None and isinstance(costmap, SharedCostmap):
+            costmap.leave_out(self._traffic.covered_W(session.name))
         session.sense()
         if self._traffic is not None:
             self._traffic.heard(session.name, session.context.known_pose())
@@ -375,7 +360,7 @@ class _Run:
     def _is_its_turn(self, session: Session) -> bool:
         """Whether the robots that a mission waits for are done; it ends when one of them has failed."""
         results = {each.name: each.result for each in self._sessions}
-        for name in self._after[session.name]:
+        for name in self._after.get(session.name, ()):
             result = results[name]
             if result is None:
                 return False
@@ -386,11 +371,11 @@ class _Run:
         return True
 
     def _poll(self, live: Sequence[Session]) -> ControlRequests:
-        """Do what is asked for before time passes. Raises _CancelledError or _TimeOverError."""
+        """Do what is asked for before time passes. Raises CancelledError or TimeOverError."""
         requests = self._control.poll()
         self._tell(requests.events)
         if requests.cancel is not None:
-            raise _CancelledError(requests.cancel)
+            raise CancelledError(requests.cancel)
         for session in live:
             for request in requests.instead:
                 if request.tree.robot_name == session.name:
@@ -410,7 +395,7 @@ class _Run:
         for session in held:
             session.hold()
         if self._time.elapsed_s() >= self._settings.time_limit_s:
-            raise _TimeOverError(f"the mission was not done within {self._settings.time_limit_s:g} s")
+            raise TimeOverError(f"the mission was not done within {self._settings.time_limit_s:g} s")
         return requests
 
     def _tick(self, moving: Sequence[Session], breakpoints: frozenset[str]) -> None:
@@ -430,8 +415,8 @@ class _Run:
     def _progress(self) -> Progress:
         states = {session.name: session.states for session in self._sessions}
         trees = {session.name: session.tree for session in self._sessions}
-        robots = self._seen if self.dispatch else {session.name: session.status for session in self._sessions}
-        return Progress(self._clock.now(), self._ticks, self._meter.overruns, states, trees, robots)
+        seen = {session.name: session.status for session in self._sessions} if self._given is None else self._given.seen
+        return Progress(self._clock.now(), self._ticks, self._meter.overruns, states, trees, seen)
 
     def _keep_pace(self, begun_wall_s: float) -> None:
         """Do not let simulated time run ahead of people who have something to decide."""
@@ -446,27 +431,21 @@ class _Run:
         for event in events:
             self._publish(CONTROL, {"t": round(self._clock.now(), 6), "what": event.what, "message": event.message})
 
-    def _ending(self, stop: BaseException) -> Ending:
-        """What an exception means for the missions that are not done yet."""
-        for kind, (outcome, cause, sentence) in _ENDINGS.items():
-            if isinstance(stop, kind):
-                return Ending(outcome, cause, str(stop) or sentence)
-        trace = "".join(traceback.format_exception(stop))
-        self._publish(ERROR_TOPIC, {"node": "runner", "traceback": trace})
-        return Ending(Outcome.ERROR, Cause.ERROR, f"{type(stop).__name__}: {stop}")
-
     def _result(self, entries: Sequence[RunEntry], ending: Ending | None) -> RunResult:
-        if self.dispatch is None:
+        if self._given is None:
             for session in self._sessions:
                 session.log_end(self._ticks)
-                self._over.append((session.close(ending), session.main_tree))
-        robots = tuple(result for result, _ in self._over)
+            over = [(session.close(ending), session.main_tree) for session in self._sessions]
+        else:
+            over = self._given.over
+        stepped_aside = frozenset[str]() if self._resting is None else self._resting.stepped_aside
+        robots = tuple(replace(result, stepped_aside=result.robot_name in stepped_aside) for result, _ in over)
         wall_time_s = time.perf_counter() - self._begun_wall_s
         self._meter.close(wall_time_s)
         began = {session.name for session in self._sessions}
-        absent = tuple(_never_began(e, ending) for e in entries if ending is not None and e.robot.name not in began)
+        absent = tuple(never_began(e, ending) for e in entries if ending is not None and e.robot.name not in began)
         sim_time_s = self._clock.now() - self._begun_s
-        trees = {result.robot_name: tree for result, tree in self._over}
+        trees = {result.robot_name: tree for result, tree in over}
         overruns, work = self._meter.overruns, self.work.totals()
         return RunResult(robots + absent, self._ticks, overruns, sim_time_s, wall_time_s, trees, work)
 
@@ -484,17 +463,3 @@ def _time_of_day_s() -> float:
 
 def _for_robot(session: Session, trees: Sequence[CompiledTree]) -> Sequence[CompiledTree]:
     return [tree for tree in trees if tree.robot_name == session.name]
-
-
-def _never_began(entry: RunEntry, ending: Ending) -> RobotResult:
-    """The result of a robot whose mission did not begin."""
-    return RobotResult(entry.robot.name, ending.outcome, ending.cause, ending.message, {}, {})
-
-
-_ENDINGS: dict[type[BaseException], tuple[Outcome, Cause, str]] = {
-    _CancelledError: (Outcome.CANCELLED, Cause.CANCELLED, "cancelled"),
-    KeyboardInterrupt: (Outcome.CANCELLED, Cause.CANCELLED, "cancelled from the keyboard"),
-    _TimeOverError: (Outcome.FAILURE, Cause.TIMEOUT, "time over"),
-    LeaseError: (Outcome.FAILURE, Cause.PRECONDITION, "the lease is held by another"),
-    VerbHung: (Outcome.ERROR, Cause.ERROR, "a verb hung"),
-}

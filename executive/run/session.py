@@ -25,7 +25,7 @@ from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
 from executive.tree.compiling.builder import slug, start_key
 from executive.tree.snapshot import NodeState, Snapshot
-from skills.api import Cause, LayeredView, LocalisationEstimate, ParticleView
+from skills.api import Cause, LayeredView, LocalisationEstimate, ParticleView, SkillContext
 from skills.robot import Pose2D
 
 POSE_PERIOD_S = 0.5
@@ -54,6 +54,7 @@ class Session:
             context.board.put(start_key(tree.robot_name, tree.mission_name), speaker_W)
         self.context = context
         self._robot, self._control, self._profile = robot, control, profile
+        self._holder = context.lease.holder
         self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal, profile),)
         self._given_up: tuple[TreeRun, ...] = ()
         self._held = False
@@ -272,6 +273,17 @@ class Session:
             self._stack = self._stack[:1]
             self.result = self._top.judge(ending, self._preempting)
         return self.result
+
+    def rest(self) -> SkillContext:
+        """Claim the lease again after the end: what may be used to step aside for others. Raises LeaseError."""
+        return replace(self.context, lease=self._robot.claim(self._holder))
+
+    def leave(self) -> None:
+        """Stop the robot and give back the lease that `rest` claimed."""
+        if self._robot.token is not None:
+            context = replace(self.context, lease=self._robot.token)
+            self._attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
+        self._attempt("return the lease", self._robot.give_lease_back)
 
     def log_end(self, ticks: int) -> None:
         """Write the outcome to the log."""

@@ -15,13 +15,16 @@ __all__ = ["SILENT_S", "TrafficTable"]
 
 SILENT_S = 2.0
 """Who was not heard of for so long (s of the run's clock) has no claim and no way any more."""
-
+_ABOUT_M = 0.2
 _TOLD_EVERY_M = 0.25
 
 
 @dataclass
 class _Robot:
-    """What is known of one robot. `turn` is its place in the order of claims, None without one."""
+    """What is known of one robot. `turn` is its place in the order of claims, None without one.
+
+    `idle` while it has nothing to do and clears ways that others reserve.
+    """
 
     discs: FloatArray
     pose: FloatArray | None = None
@@ -29,6 +32,7 @@ class _Robot:
     way: FloatArray | None = None
     turn: int | None = None
     told: Mapping[str, Any] | None = None
+    idle: bool = False
 
 
 class TrafficTable:
@@ -52,6 +56,10 @@ class TrafficTable:
         robot.stamp_s = self._now()
         if pose is not None:
             robot.pose = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
+
+    def rest(self, name: str, *, idle: bool) -> None:
+        """A robot has nothing to do and clears ways that others reserve, or has work again."""
+        self._robots[name].idle = idle
 
     def view_of(self, name: str) -> Traffic:
         """What one robot sees of it."""
@@ -78,7 +86,15 @@ class TrafficTable:
     def others(self, name: str) -> Sequence[Neighbour]:
         """See `Traffic.others`."""
         return tuple(
-            Neighbour(other, robot.pose, robot.way, robot.discs, robot.stamp_s, self.goes_before(other, name))
+            Neighbour(
+                other,
+                robot.pose,
+                robot.way,
+                robot.discs,
+                robot.stamp_s,
+                first=self.goes_before(other, name),
+                yields=self.goes_before(name, other) and (robot.turn is not None or robot.idle),
+            )
             for other, robot in self._robots.items()
             if other != name and robot.pose is not None and not self._silent(robot)
         )
@@ -94,6 +110,18 @@ class TrafficTable:
             if message != (robot.told or {**message, "turn": None, "x": [], "y": []}):
                 robot.told = message
                 yield message
+
+    def covered_W(self, name: str) -> FloatArray:
+        """What the others cover where they believe to be: discs (N, 3) of x, y and radius (m, world), a little wider.
+
+        What a robot sees there is one of them.
+        """
+        covered = [np.empty((0, 3))]
+        for one in self.others(name):
+            c, s = np.cos(one.pose[2]), np.sin(one.pose[2])
+            centres = one.pose[:2] + one.discs[:, :2] @ np.array([[c, s], [-s, c]])
+            covered.append(np.column_stack([centres, one.discs[:, 2] + _ABOUT_M]))
+        return np.vstack(covered)
 
     def goes_before(self, one: str, other: str) -> bool:
         """Whether one has the right of way: it claimed first, and still answers."""

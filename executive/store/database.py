@@ -10,7 +10,7 @@ from typing import Final
 
 from executive.mission.errors import InputError, disk_is_full
 
-VERSION: Final = 7
+VERSION: Final = 8
 APPLICATION_ID: Final = 0x45525244  # "ERRD"
 BUSY_S: Final = 2.0
 _DAMAGED: Final = "move it away (its missions are lost), or name another by --store"
@@ -96,8 +96,12 @@ CREATE TABLE given (
     referee TEXT
 );
 """
+_CHAINS: Final = """
+ALTER TABLE given ADD COLUMN part_of INTEGER;
+ALTER TABLE given ADD COLUMN follows INTEGER;
+"""
 _OLDEST: Final = 4
-_ADDED: Final = {5: _TRIGGERS + _SCENARIOS_AND_TIMES, 6: _VARIATIONS, 7: _FLEET}
+_ADDED: Final = {5: _TRIGGERS + _SCENARIOS_AND_TIMES, 6: _VARIATIONS, 7: _FLEET, 8: _CHAINS}
 """What each version has added to the one before; `_OLDEST` is `_SCHEMA`."""
 
 

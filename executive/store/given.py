@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from executive.store.missions import MissionStore
+from executive.store.missions import MissionState, MissionStore
 
 __all__ = ["GivenMission", "GivenMissions"]
 
+_FAILED: Final = (MissionState.FAILURE, MissionState.ERROR, MissionState.CANCELLED)
 _PUT: Final = "INSERT INTO given (mission) VALUES (?) ON CONFLICT (mission) DO NOTHING"
 
 
@@ -18,8 +19,12 @@ _PUT: Final = "INSERT INTO given (mission) VALUES (?) ON CONFLICT (mission) DO N
 class GivenMission:
     """What is known of a mission that was given out.
 
-    `robot` has it, or had it last. The first `done` of its commands are done and not done again; `blocked` is why it
-    cannot begin again where it is broken off now. `referee` is what a referee said in the end, as JSON values.
+    `robot` has it, or had it last; it was given to another `reassigned` times. The first `done` of its commands are
+    done and not done again; `blocked` is why it cannot begin again where it is broken off now. `referee` is what a
+    referee said in the end, as JSON values.
+
+    A mission that no robot could do alone is done in parts, which are missions `part_of` it; a part that `follows`
+    another begins when that is done.
     """
 
     robot: str | None = None
@@ -27,6 +32,8 @@ class GivenMission:
     done: int = 0
     blocked: str | None = None
     referee: Mapping[str, Any] | None = None
+    part_of: int | None = None
+    follows: int | None = None
 
 
 class GivenMissions:
@@ -45,13 +52,16 @@ class GivenMissions:
                 done=row["done"],
                 blocked=row["blocked"],
                 referee=None if row["referee"] is None else json.loads(row["referee"]),
+                part_of=row["part_of"],
+                follows=row["follows"],
             )
             for row in rows
         }
 
     def give(self, mission: int, robot: str) -> None:
         """A robot has the mission from now on."""
-        self._set(mission, "robot = ?, blocked = NULL", robot)
+        again = "reassigned = reassigned + (robot IS NOT NULL AND robot <> ?)"
+        self._set(mission, f"{again}, robot = ?, blocked = NULL", robot, robot)
 
     def progress(self, mission: int, done: int, blocked: str | None) -> None:
         """How many commands are done, and why what is under way cannot begin again (None: it can)."""
@@ -59,7 +69,28 @@ class GivenMissions:
 
     def hand_back(self, mission: int) -> None:
         """The mission waits for another robot."""
-        self._set(mission, "reassigned = reassigned + 1, blocked = NULL")
+        self._set(mission, "blocked = NULL")
+
+    def split(self, mission: int, parts: Sequence[int]) -> None:
+        """The mission is done in parts, one after the other."""
+        for part, before in zip(parts, (None, *parts), strict=False):
+            self._set(part, "part_of = ?, follows = ?", mission, before)
+
+    def settle(self) -> None:
+        """What does not go on, since a part before it was not done, ends as a failure; what has no part left to do ends
+        as the last one did."""
+        given, states = self.all(), {mission.id: mission for mission in self._store.missions()}
+        for number, one in given.items():
+            if one.part_of is None or states[one.part_of].state is not MissionState.RUNNING:
+                continue
+            part, before = states[number], None if one.follows is None else states[one.follows]
+            last = not any(other.follows == number for other in given.values())
+            if part.state in _FAILED or (last and part.state is MissionState.SUCCESS):
+                self._store.finish(one.part_of, part.state, f"mission {number}: {part.message}")
+            elif before is not None and before.state in _FAILED:
+                message = f"mission {before.id}, which comes before it, was not done"
+                self._store.finish(number, MissionState.FAILURE, message)
+                self._store.finish(one.part_of, before.state, f"mission {before.id}: {before.message}")
 
     def judge(self, mission: int, referee: Mapping[str, Any] | None) -> None:
         """What a referee saw."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from executive.mission.command import Task
@@ -27,13 +27,18 @@ class Abilities:
     """What is known of robot and objects: masses (kg) of the classes that can be handled, and what the arm lifts (kg).
 
     A class that is not in `masses_kg` has no model: no world has such an object. `classes` and `attributes` are those
-    that the robot knows by sight; one that it does not know spoils a search for several.
+    that the robot knows by sight; one that it does not know spoils a search for several. `reaches_m` are the lowest and
+    the highest surface that the arm reaches, over the floor; `widths_m` is the least width of each class, and `opens_m`
+    is how wide an object the gripper takes.
     """
 
     masses_kg: Mapping[str, float]
     lift_kg: float
     classes: frozenset[str]
     attributes: frozenset[str]
+    reaches_m: tuple[float, float] = (-math.inf, math.inf)
+    widths_m: Mapping[str, float] = field(default_factory=dict)
+    opens_m: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -109,9 +114,14 @@ def _skill_objection(skill: type[Skill[Any]], held: InGripper | None) -> tuple[s
 
 
 def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[InputError]:
-    """What makes a command impossible: its object is not known by sight, or nothing that it means can be lifted."""
+    """What makes a command impossible: its object is not known by sight, none that it means can be taken, or its
+    surface is out of the arm's reach."""
     command = part.command
-    if command is None or command.task not in (Task.GRASP, Task.FIND) or command.object is None:
+    if command is None:
+        return
+    if (command.item is not None or command.task is Task.GRASP) and command.goal is not None:
+        yield from _out_of_reach(part, tree, command.goal, knowledge, abilities)
+    if command.task not in (Task.GRASP, Task.FIND) or command.object is None:
         return
     thing = command.object
     classes = knowledge.classes(knowledge.thing(thing.name) or thing.name)
@@ -124,10 +134,31 @@ def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilit
     elif command.task is Task.GRASP and min(masses) > abilities.lift_kg:
         message = f"'{thing.name}' is too heavy: {min(masses):g} kg, and the arm lifts {abilities.lift_kg:g} kg"
         yield _at(part, tree, message, "ask for something lighter")
+    elif command.task is Task.GRASP and (least_m := _narrowest_m(classes, abilities)) > abilities.opens_m:
+        message = f"'{thing.name}' is too wide: {least_m:g} m, and the gripper takes {abilities.opens_m:g} m"
+        yield _at(part, tree, message, "ask for something narrower")
     elif unseen:
         known = [one for one in knowledge.things if one in abilities.classes]
         message = f"the robot does not know what {listing(unseen)} looks like"
         yield _at(part, tree, message, f"it knows {listing(known)} by sight")
+
+
+def _narrowest_m(classes: Collection[str], abilities: Abilities) -> float:
+    """The least width of some classes that can be lifted; 0.0 where nothing is known of one."""
+    light = [one for one in classes if abilities.masses_kg.get(one, math.inf) <= abilities.lift_kg]
+    return min((abilities.widths_m.get(one, 0.0) for one in light), default=0.0)
+
+
+def _out_of_reach(
+    part: StepPart, tree: CompiledTree, goal: str, knowledge: Knowledge, abilities: Abilities
+) -> Iterator[InputError]:
+    """That something is to be taken from or put on a surface that is too high or too low for the arm."""
+    surface = knowledge.surfaces.get(knowledge.place(goal) or goal)
+    low_m, high_m = abilities.reaches_m
+    if surface is not None and not low_m <= surface.height <= high_m:
+        limit = f"down to {low_m:.2f} m" if surface.height < low_m else f"up to {high_m:.2f} m"
+        message = f"the {goal} is {surface.height:g} m high, and the arm reaches {limit}"
+        yield _at(part, tree, message, "name another surface, or another kind of robot")
 
 
 def _at(part: StepPart, tree: CompiledTree, message: str, hint: str) -> InputError:

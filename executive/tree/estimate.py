@@ -40,10 +40,11 @@ class DriveTimes(_Data):
 
 
 class BatteryUse(_Data):
-    """What is drawn in a second, as a share of a full battery."""
+    """What is drawn in a second, or charged, as a share of a full battery."""
 
     driving_per_s: Positive
     standing_per_s: Positive
+    charging_per_s: Positive
 
 
 class Estimates(_Data):

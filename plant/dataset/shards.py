@@ -11,14 +11,9 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
-import multiprocessing
 import os
 import shutil
-import tempfile
-import threading
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
@@ -39,6 +34,7 @@ MANIFEST: Final = "dataset.json"
 SPLITS: Final = ("train", "val")
 LEAST_FREE_BYTES: Final = 50_000_000
 _SCENES: Final = "scenes"
+_SHOTS: Final = "shots.json"
 
 
 GiveOut = Callable[[Callable[[int], Mapping[str, bytes]], list[int]], Iterator[tuple[int, Mapping[str, bytes] | None]]]
@@ -64,29 +60,33 @@ def digest() -> str:
     return made.hexdigest()[:10]
 
 
+def one_by_one(
+    function: Callable[[int], Mapping[str, bytes]], numbers: list[int]
+) -> Iterator[tuple[int, Mapping[str, bytes]]]:
+    """A `GiveOut` to this process itself."""
+    return ((number, function(number)) for number in numbers)
+
+
 def render(
-    out: Path,
-    *,
-    images: int,
-    seed: int,
-    jobs: int,
-    progress: Callable[[int, int], None],
-    give_out: GiveOut | None = None,
+    out: Path, *, images: int, seed: int, progress: Callable[[int, int], None], give_out: GiveOut = one_by_one
 ) -> Summary:
     """Render what is still missing of a data set and write its COCO files. Raises DatasetError.
 
-    `progress` is told how many scenes are there, and how many there will be. `give_out` has others write the scenes,
-    who may be on other machines; else `jobs` processes of this one do.
+    `progress` is told how many scenes are there, and how many there will be. `give_out` has the scenes made.
     """
     scenes = len(_taken(images))
     with _told(out):
         _claim(out, seed)
         missing = [index for index in range(scenes) if not _scene_folder(out, index).is_dir()]
         progress(scenes - len(missing), scenes)
-        made = _rendered(out, seed, missing, jobs) if give_out is None else _elsewhere(out, seed, missing, give_out)
+        made = _rendered(out, seed, missing, give_out)
         for done, _ in enumerate(made, start=scenes - len(missing) + 1):
             progress(done, scenes)
         return _assemble(out, images, seed)
+
+
+class _LostSceneError(Exception):
+    """Nobody has rendered a scene."""
 
 
 @contextmanager
@@ -94,11 +94,9 @@ def _told(out: Path) -> Iterator[None]:
     """Errors of the disk, said in a sentence."""
     try:
         yield
-    except BrokenProcessPool as error:
-        raise DatasetError(
-            f"{out}: a rendering process was killed, perhaps for want of memory",
-            "the same command goes on where it stopped; take fewer --jobs",
-        ) from error
+    except _LostSceneError as error:
+        hint = "perhaps for want of memory; the same command goes on where it stopped; take fewer --jobs"
+        raise DatasetError(str(error), hint) from error
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             raise DatasetError(
@@ -154,84 +152,41 @@ def _scene_folder(out: Path, index: int) -> Path:
     return out / _SCENES / f"{index:06d}"
 
 
-def _rendered(out: Path, seed: int, missing: list[int], jobs: int) -> Iterator[int]:
-    """Render scenes, in this process or in several; each number as soon as its folder is there."""
-    if jobs == 1 or len(missing) < 2:
-        for index in missing:
-            write_scene(out, seed, index)
-            yield index
-        return
-    pool = ProcessPoolExecutor(
-        min(jobs, len(missing)), mp_context=multiprocessing.get_context("spawn"), initializer=end_with_starter
-    )
-    try:
-        tasks = {pool.submit(write_scene, out, seed, index): index for index in missing}
-        for task in as_completed(tasks):
-            task.result()
-            yield tasks[task]
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _elsewhere(out: Path, seed: int, missing: list[int], give_out: GiveOut) -> Iterator[int]:
-    """Have others make scenes, and write each whole into its folder here; each number as soon as that is there."""
+def _rendered(out: Path, seed: int, missing: list[int], give_out: GiveOut) -> Iterator[int]:
+    """Have scenes made and write each whole into its folder; each number as soon as that is there."""
     for index, files in give_out(partial(scene_files, seed), missing):
         if files is None:
-            raise BrokenProcessPool(f"scene {index}")
-
-        def fill(fresh: Path, files: Mapping[str, bytes] = files) -> None:
-            for name, data in files.items():
-                (fresh / name).write_bytes(data)
-
-        kept_folder(_scene_folder(out, index), fill)
+            raise _LostSceneError(f"{out}: the processes that rendered scene {index} were killed")
+        if shutil.disk_usage(out).free < LEAST_FREE_BYTES:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(out))
+        kept_folder(_scene_folder(out, index), partial(_write_files, files))
         yield index
 
 
+def _write_files(files: Mapping[str, bytes], folder: Path) -> None:
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+
+
 def scene_files(seed: int, index: int) -> Mapping[str, bytes]:
-    """The files of one scene by name, made in a folder that is thrown away."""
-    with tempfile.TemporaryDirectory(prefix="errand-scene-") as made:
-        out = Path(made)
-        (out / _SCENES).mkdir()
-        write_scene(out, seed, index)
-        return {path.name: path.read_bytes() for path in sorted(_scene_folder(out, index).iterdir())}
-
-
-def end_with_starter() -> None:
-    """Let this process end when the one that started it is gone: one that is killed cannot end its own."""
-    starter = multiprocessing.parent_process()
-    if starter is None:
-        return
-
-    def outlive() -> None:
-        starter.join()
-        os._exit(1)
-
-    threading.Thread(target=outlive, name="end-with-starter", daemon=True).start()
-
-
-def write_scene(out: Path, seed: int, index: int) -> None:
-    """Render one scene into its folder, which appears only when it is complete."""
+    """Render one scene; its files by name."""
     cv2.setNumThreads(1)
-    folder = _scene_folder(out, index)
-    if shutil.disk_usage(out).free < LEAST_FREE_BYTES:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(out))
-
-    def fill(fresh: Path) -> None:
-        shots = enumerate(render_scene(seed, index))
-        entries = [_write_shot(fresh, folder.relative_to(out), number, shot) for number, shot in shots]
-        (fresh / "shots.json").write_text(json.dumps(entries, separators=(",", ":")), encoding="utf-8")
-
-    kept_folder(folder, fill)
+    shown_as = _scene_folder(Path(), index)
+    pictures: dict[str, bytes] = {}
+    entries: list[dict[str, Any]] = []
+    for number, shot in enumerate(render_scene(seed, index)):
+        name = f"{number}.jpg"
+        pictures[name] = _encoded(number, shot)
+        entries.append({"image": {"file_name": (shown_as / name).as_posix(), **shot.facts}, "annotations": shot.labels})
+    return {**pictures, _SHOTS: json.dumps(entries, separators=(",", ":")).encode()}
 
 
-def _write_shot(folder: Path, shown_as: Path, number: int, shot: Shot) -> dict[str, Any]:
+def _encoded(number: int, shot: Shot) -> bytes:
     picture = shot.picture if shot.picture.ndim == 2 else cv2.cvtColor(shot.picture, cv2.COLOR_RGB2BGR)
     ok, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, shot.quality])
     if not ok:
         raise OSError(f"picture {number} could not be encoded")
-    (folder / f"{number}.jpg").write_bytes(data.tobytes())
-    image = {"file_name": (shown_as / f"{number}.jpg").as_posix(), **shot.facts}
-    return {"image": image, "annotations": shot.labels}
+    return data.tobytes()
 
 
 def _assemble(out: Path, images: int, seed: int) -> Summary:
@@ -247,7 +202,7 @@ def _assemble(out: Path, images: int, seed: int) -> Summary:
 
 def _shots(out: Path, images: int) -> Iterator[Mapping[str, Any]]:
     for index, count in enumerate(_taken(images)):
-        path = _scene_folder(out, index) / "shots.json"
+        path = _scene_folder(out, index) / _SHOTS
         try:
             entries = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, json.JSONDecodeError) as error:

@@ -35,7 +35,9 @@ def _lower(lowest: dict[Pair, float], a: int, b: int, z: float) -> None:
 
 @dataclass(frozen=True)
 class Collision:
-    """A robot bumped into something, or a person `walked_in`: into a robot that stood."""
+    """A robot bumped into something, perhaps `other_robot`, or into a `person`; or that person `walked_in`: into a
+    robot that stood.
+    """
 
     time_s: float
     robot: str
@@ -43,13 +45,14 @@ class Collision:
     sentence: str
     person: str | None = None
     walked_in: bool = False
+    other_robot: str | None = None
 
 
 class CollisionCounter:
     """Counts rising edges of contact between robots and scenery, persons or other robots.
 
     A pair that parts for less than `debounce_s` is still the same bump. What touches at first does not count. With a
-    person a robot is one, whatever part of it touches.
+    person or another robot a robot is one, whatever part of it touches.
     """
 
     def __init__(self, entities: Mapping[int, Entity], debounce_s: float = 0.5) -> None:
@@ -76,7 +79,7 @@ class CollisionCounter:
         """The record so far."""
         touched = None if self._last_touched_s is None else [[*pair, t] for pair, t in self._last_touched_s.items()]
         bumps = [
-            [bump.time_s, bump.robot, bump.part.value, bump.sentence, bump.person, bump.walked_in]
+            [bump.time_s, bump.robot, bump.part.value, bump.sentence, bump.person, bump.walked_in, bump.other_robot]
             for bump in self.collisions
         ]
         return {"touched": touched, "bumps": bumps}
@@ -88,9 +91,10 @@ class CollisionCounter:
         self.collisions = [Collision(at_s, robot, Kind(part), *told) for at_s, robot, part, *told in state["bumps"]]
 
     def _counted_as(self, pair: Pair) -> Pair:
-        """The pair itself; with a person, one that stands for the whole robot."""
+        """The pair itself; with a person or another robot, one that stands for the whole robot."""
         a, b = (self._entities[number] for number in pair)
-        return (self._first_of[a.owner], self._first_of[b.owner]) if Kind.PERSON in (a.kind, b.kind) else pair
+        whole = Kind.PERSON in (a.kind, b.kind) or (a.kind in ROBOT_KINDS and b.kind in ROBOT_KINDS)
+        return (self._first_of[a.owner], self._first_of[b.owner]) if whole else pair
 
     def _is_bump(self, pair: Pair, z: float) -> bool:
         """Whether a touch is a collision: not feet on the floor, not loose objects, not a robot with itself."""
@@ -106,5 +110,6 @@ class CollisionCounter:
         robot, other = (first, second) if first.kind in ROBOT_KINDS else (second, first)
         person = other.owner if other.kind is Kind.PERSON else None
         walked_in = person is not None and speeds_m_s.get(robot.owner, 0.0) <= MOVES_M_S
+        other_robot = other.owner if other.kind in ROBOT_KINDS else None
         told = f"{other.label} walked into {robot.label}" if walked_in else f"{robot.label} hit {other.label}"
-        return Collision(time_s, robot.owner, robot.kind, f"{told} at {time_s:.2f} s.", person, walked_in)
+        return Collision(time_s, robot.owner, robot.kind, f"{told} at {time_s:.2f} s.", person, walked_in, other_robot)

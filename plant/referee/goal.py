@@ -52,7 +52,8 @@ class GoalCondition:
     answer, where was to be looked; `goal` where they or the robot were to go (any of the regions); `person` the one to
     be handed to or, where the class is "person", asked for (None: anyone); `answer` what was said, and `answered_s`
     when (None: now; where people are counts now); `robot` who was to do it (None: any); with `passing` it is enough
-    that it was so at some time, since later steps may undo it.
+    that it was so at some time, since later steps may undo it. What happened before `since_s` (simulated time) does not
+    count: it was another mission's doing.
     """
 
     kind: GoalKind
@@ -66,6 +67,7 @@ class GoalCondition:
     robot: str | None = None
     wanted: str = ""
     passing: bool = False
+    since_s: float = 0.0
 
     @property
     def needed(self) -> int:
@@ -76,10 +78,10 @@ class GoalCondition:
 @dataclass(frozen=True)
 class Verdict:
     """What the referee saw: whether all goal conditions hold (None: that was not judged), a sentence on each, and the
-    counts of the whole run.
+    counts of the whole run, or since the conditions count.
 
-    `collisions` are the robots' own, `people_hit` those of them with people; `hit_by_people` counts who walked into a
-    robot that stood.
+    `collisions` are the robots' own, `people_hit` those of them with people, `robots_hit` those between two robots;
+    `hit_by_people` counts who walked into a robot that stood.
     """
 
     success: bool | None
@@ -88,3 +90,4 @@ class Verdict:
     drops: int
     people_hit: int = 0
     hit_by_people: int = 0
+    robots_hit: int = 0

@@ -20,13 +20,22 @@ _STATE_KINDS = (GoalKind.WENT, GoalKind.PLACED, GoalKind.HANDED_OVER)
 
 @dataclass(frozen=True)
 class Truth:
-    """The record: histories of the objects, where robots and people are now (m, world), paths, what was on trays."""
+    """The record: histories of the objects, where robots and people are now (m, world), and their paths.
+
+    A path is an array (N, 4) of points (m, world) and when they were reached (s); `given` says when which object last
+    rested on whose tray.
+    """
 
     histories: tuple[ObjectHistory, ...]
     bases: Mapping[str, FloatArray]
     paths: Mapping[str, FloatArray]
     persons: Mapping[str, FloatArray]
-    given: frozenset[tuple[str, str]]
+    given: Mapping[tuple[str, str], float]
+
+    def path_since(self, robot: str, since_s: float) -> FloatArray:
+        """Where a robot was at a time and went from there, (N, 3)."""
+        path = self.paths[robot]
+        return path[max(0, int(np.searchsorted(path[:, 3], since_s)) - 1) :, :3]
 
 
 @dataclass(frozen=True)
@@ -37,11 +46,14 @@ class Finding:
     sentence: str
 
 
-def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[Collision], drops: int) -> Verdict:
+def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[Collision]) -> Verdict:
     """The verdict on all conditions: the last is judged by the present state, earlier ones by the record."""
     findings = [_judge_one(conditions, i, truth) for i in range(len(conditions))]
     success = all(finding.holds for finding in findings) if findings else None
+    since_s = min((condition.since_s for condition in conditions), default=0.0)
+    bumps = [bump for bump in bumps if bump.time_s >= since_s]
     own = [bump for bump in bumps if not bump.walked_in]
+    drops = sum(when_s >= since_s for history in truth.histories for when_s in history.dropped_s)
     return Verdict(
         success,
         " ".join(finding.sentence for finding in findings),
@@ -49,6 +61,7 @@ def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[
         drops=drops,
         people_hit=sum(bump.person is not None for bump in own),
         hit_by_people=len(bumps) - len(own),
+        robots_hit=sum(bump.other_robot is not None for bump in own),
     )
 
 
@@ -72,7 +85,8 @@ def _judge_grasped(condition: GoalCondition, truth: Truth, past: bool) -> Findin
     if len(done) >= condition.needed:
         froms = (f"the {history.name} was lifted{_from(condition, lift)}" for history, lift in done.items())
         return Finding(True, f"{' and '.join(froms)}.")
-    other = [history for history in truth.histories if history.lifts and history not in done]
+    lifted = [history for history in truth.histories if history.lifts_since(condition.since_s)]
+    other = [history for history in lifted if history not in done]
     was = f"; {_names(other)} {_were(other)}" if other else ""
     return Finding(False, f"{_tally(done, condition)} lifted{_out_of(condition.source)}{was}.")
 
@@ -84,13 +98,20 @@ def _judge_handed_over(condition: GoalCondition, truth: Truth, past: bool) -> Fi
         return Finding(False, f"There is no person {condition.person or ''} to hand anything to.".replace("  ", " "))
     objects = [history for history in _of_class(condition, truth) if _lift(history, condition) is not None]
     if past:
-        done = [history for history in objects if any((history.name, person) in truth.given for person in people)]
+        done = [history for history in objects if _was_given(history, people, condition, truth)]
     else:
         done = [one for one in objects if one.on_tray_of in people and not one.lies_where_others_put_it]
     if len(done) >= condition.needed:
         verb = _were(done) + " put" if past else "rests" if len(done) == 1 else "rest"
         return Finding(True, f"{_names(done)} {verb} on {_either(people)}'s tray.")
     return Finding(False, _why_not_handed(condition, objects, people))
+
+
+def _was_given(history: ObjectHistory, people: Collection[str], condition: GoalCondition, truth: Truth) -> bool:
+    """Whether it rested on the tray of one of the people after it was lifted."""
+    lift = _lift(history, condition)
+    given_s = (truth.given.get((history.name, person), -np.inf) for person in people)
+    return lift is not None and any(when_s >= lift.time_s for when_s in given_s)
 
 
 def _why_not_handed(
@@ -131,9 +152,9 @@ def _judge_went(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
     """The body in the place, now or (when overtaken) at some time."""
     robots = [name for name in truth.bases if condition.robot in (None, name)]
     if condition.person is not None and robots:
-        return _judge_near_person(condition.person, robots[0], truth, past)
+        return _judge_near_person(condition, robots[0], truth, past)
     for name in robots:
-        points = truth.paths[name] if past else truth.bases[name][None, :]
+        points = truth.path_since(name, condition.since_s) if past else truth.bases[name][None, :]
         there = next((on for p in points if (on := _region_at(condition.goal, p)) is not None), None)
         if there is not None:
             return Finding(True, f"{name} {'was' if past else 'is'} at {there}.")
@@ -143,12 +164,14 @@ def _judge_went(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
     return Finding(False, f"{robots[0]} is at ({x:.2f}, {y:.2f}), not at {_where(condition.goal)}.")
 
 
-def _judge_near_person(person: str, robot: str, truth: Truth, past: bool) -> Finding:
+def _judge_near_person(condition: GoalCondition, robot: str, truth: Truth, past: bool) -> Finding:
     """The robot near a person, now or (when overtaken) at some time."""
+    person = condition.person or ""
     p_WP = truth.persons.get(person)
     if p_WP is None:
         return Finding(False, f"there is no person {person} to go to.")
-    apart_m = min(_apart_m(p, p_WP) for p in (truth.paths[robot] if past else [truth.bases[robot]]))
+    points = truth.path_since(robot, condition.since_s) if past else [truth.bases[robot]]
+    apart_m = min(_apart_m(p, p_WP) for p in points)
     return Finding(apart_m <= NEAR_PERSON_M, f"{robot} {'was' if past else 'is'} {apart_m:.1f} m from {person}.")
 
 
@@ -178,11 +201,13 @@ def _judge_answered(condition: GoalCondition, truth: Truth, past: bool) -> Findi
 
 def _judge_cleared(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
     """All that rested in the source rests in the goal; without a goal, no longer in the source."""
-    source, there = condition.source, [one for one in truth.histories if _began_in(one, condition.source)]
+    source, since_s = condition.source, condition.since_s
+    there = [one for one in truth.histories if _was_in(one, source, since_s)]
     if not there:
         return Finding(True, f"nothing stood on {_where(source)}.")
     if not condition.goal:
-        left = [one for one in there if _region_at(source, one.last.p_WO) is not None and not (past and one.lifts)]
+        still = [one for one in there if _region_at(source, one.last.p_WO) is not None]
+        left = [one for one in still if not (past and one.lifts_since(since_s))]
         told = f"{_names(left)} {'is' if len(left) == 1 else 'are'}" if left else "nothing is"
         return Finding(not left, f"{told} left on {_where(source)}.")
     missing = [one for one in there if _rest_in(one, condition, past) is None]
@@ -193,9 +218,9 @@ def _judge_cleared(condition: GoalCondition, truth: Truth, past: bool) -> Findin
     )
 
 
-def _began_in(history: ObjectHistory, regions: Sequence[Region]) -> bool:
-    """Whether it ever rested in one of the regions."""
-    return any(_region_at(regions, p) is not None for p in (*history.rests_W, history.last.p_WO))
+def _was_in(history: ObjectHistory, regions: Sequence[Region], since_s: float) -> bool:
+    """Whether it rested in one of the regions then, or did since."""
+    return any(_region_at(regions, p) is not None for p in (*history.rested_W(since_s), history.last.p_WO))
 
 
 _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth, bool], Finding]] = {
@@ -217,7 +242,7 @@ def _lift(history: ObjectHistory, condition: GoalCondition) -> Lift | None:
     return next(
         (
             lift
-            for lift in history.lifts
+            for lift in history.lifts_since(condition.since_s)
             if condition.robot in (None, lift.robot)
             and (not condition.source or _region_at(condition.source, lift.from_W) is not None)
         ),
@@ -227,7 +252,7 @@ def _lift(history: ObjectHistory, condition: GoalCondition) -> Lift | None:
 
 def _rest_in(history: ObjectHistory, condition: GoalCondition, past: bool) -> FloatArray | None:
     """Where in the goal it rests, or did after it was carried; None when nowhere."""
-    rests = history.own_rests_W if past else [history.last.p_WO] if history.resting else []
+    rests = history.own_rests_W(condition.since_s) if past else [history.last.p_WO] if history.resting else []
     return next((p for p in rests if _region_at(condition.goal, p) is not None), None)
 
 

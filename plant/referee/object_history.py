@@ -19,7 +19,7 @@ WITH_HAND_M_S = 0.2
 REST_S = 0.2
 FLICKER_S = 0.15
 _PLAIN = (
-    *("events", "drops", "touches", "speed_m_s", "_grip_s", "_grip_robot", "_grip_z_m", "_supported_s"),
+    *("events", "dropped_s", "touches", "speed_m_s", "_grip_s", "_grip_robot", "_grip_z_m", "_supported_s"),
     *("_still_since_s", "_carried", "_left_z_m", "_dropped", "_tray_s", "_tray_of", "_by_others"),
 )
 
@@ -65,7 +65,7 @@ class Lift:
 class ObjectHistory:
     """The record of one object; `take` is called with every sample.
 
-    `rests_W` are the places where it rested, `rested_s` since when.
+    `rests_W` are the places where it rested, `rested_s` since when; at `dropped_s` it was dropped.
     """
 
     name: str
@@ -74,7 +74,7 @@ class ObjectHistory:
     rests_W: list[FloatArray] = field(default_factory=list)
     rested_s: list[float] = field(default_factory=list)
     events: list[str] = field(default_factory=list)
-    drops: int = 0
+    dropped_s: list[float] = field(default_factory=list)
     touches: int = 0
     speed_m_s: float = 0.0
     _last: ObjectSample | None = None
@@ -90,10 +90,25 @@ class ObjectHistory:
     _tray_of: str | None = None
     _by_others: list[int] = field(default_factory=list)
 
+    def own_rests_W(self, since_s: float = 0.0) -> list[FloatArray]:
+        """Where it came to rest since then, but for its first place and where somebody who is no robot put it."""
+        rests = enumerate(zip(self.rested_s, self.rests_W, strict=True))
+        own = [(when_s, p_W) for number, (when_s, p_W) in rests if number > 0 and number not in self._by_others]
+        return [p_W for when_s, p_W in own if when_s >= since_s]
+
+    def rested_W(self, since_s: float) -> list[FloatArray]:
+        """Where it rested then, or came to rest since."""
+        before = [p_W for when_s, p_W in zip(self.rested_s, self.rests_W, strict=True) if when_s < since_s]
+        return [*before[-1:], *self.rests_W[len(before) :]]
+
+    def lifts_since(self, since_s: float) -> list[Lift]:
+        """Its lifts since a time."""
+        return [lift for lift in self.lifts if lift.time_s >= since_s]
+
     @property
-    def own_rests_W(self) -> list[FloatArray]:
-        """Where it came to rest, but for its first place and where somebody who is no robot put it."""
-        return [p_W for number, p_W in enumerate(self.rests_W) if number > 0 and number not in self._by_others]
+    def drops(self) -> int:
+        """How often it was dropped."""
+        return len(self.dropped_s)
 
     @property
     def lies_where_others_put_it(self) -> bool:
@@ -192,7 +207,7 @@ class ObjectHistory:
         if self._last is not None and self.held_by is None:
             self.lifts, self.rests_W, self.rested_s, self._by_others = [], [], [], []
             self._rests(self._last)
-        self.events, self.drops, self.touches = [], 0, 0
+        self.events, self.dropped_s, self.touches = [], [], 0
 
     def _measure_speed(self, sample: ObjectSample) -> None:
         if self._last is None or sample.time_s <= self._last.time_s:
@@ -233,7 +248,7 @@ class ObjectHistory:
             return
         if self._left_z_m - sample.p_WO[2] > FALL_M or sample.on_floor:
             self._dropped = True
-            self.drops += 1
+            self.dropped_s.append(sample.time_s)
             self.events.append(f"{self._grip_robot} dropped the {self.name} at {sample.time_s:.2f} s.")
 
     def _note_rest(self, sample: ObjectSample) -> None:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from plant.worlds.placement import Placement
 
 PATH_STEP_M = 0.02
+PATH_VALUES = 4
 BEFORE_SAMPLES = 3
 
 
@@ -86,7 +87,7 @@ class Referee:
 
     def path(self, robot: str) -> FloatArray:
         """The path of a robot's body so far, (N, 3) in the world, a point every few centimetres. Raises KeyError."""
-        return np.array(self._paths[robot], dtype=np.float64).reshape(-1, 3)
+        return self._timed_path(robot)[:, :3]
 
     def observe(self, plant_context: Context, time_s: float, *, asleep: Collection[str] = ()) -> None:
         """Take in the plant's state at time_s; objects that are `asleep` are as they were before."""
@@ -98,7 +99,7 @@ class Referee:
         self._bases = {name: self._position(plant_context, body) for name, body in self._entities.bases.items()}
         self._persons = {name: self._position(plant_context, body) for name, body in self._entities.persons.items()}
         for name, p_WB in self._bases.items():
-            _extend(self._paths[name], p_WB)
+            _extend(self._paths[name], p_WB, time_s)
         neighbours = self._neighbours(pairs)
         for name, body in self._entities.objects.items():
             history, touches = self._histories[name], neighbours.get(int(body.index()), {})
@@ -115,14 +116,14 @@ class Referee:
         truth = Truth(
             histories=tuple(self._histories.values()),
             bases=self._bases,
-            paths={name: self.path(name) for name in self._paths},
+            paths={name: self._timed_path(name) for name in self._paths},
             persons=self._persons,
-            given=frozenset(self._given),
+            given=dict(self._given),
         )
-        return judge(conditions, truth, bumps=self._counter.collisions, drops=self.drops)
+        return judge(conditions, truth, bumps=self._counter.collisions)
 
     def state(self) -> State:
-        """The whole record; paths are arrays (N, 3)."""
+        """The whole record, without the paths."""
         return {
             "bumps": self._counter.state(),
             "histories": {name: history.state() for name, history in self._histories.items()},
@@ -132,7 +133,9 @@ class Referee:
         }
 
     def restore(self, state: State, paths: Mapping[str, FloatArray]) -> None:
-        """Go on with such a record."""
+        """Go on with such a record; paths are arrays (N, 4) of `points`. Raises ValueError: they have no times."""
+        if any(path.shape[1:] != (PATH_VALUES,) for path in paths.values()):
+            raise ValueError("paths without times")
         self._counter.restore(state["bumps"])
         for name, history in self._histories.items():
             history.restore(state["histories"][name])
@@ -153,8 +156,11 @@ class Referee:
         self._histories[name].moved_by_others(self._position(plant_context, self._entities.objects[name]), time_s)
 
     def points(self, robot: str) -> Sequence[FloatArray]:
-        """The points of `path`, not to be changed; those that were there stay as more are added."""
+        """The points of `path`, each with its time (s), not to be changed; as more are added, those stay."""
         return self._paths[robot]
+
+    def _timed_path(self, robot: str) -> FloatArray:
+        return np.array(self._paths[robot], dtype=np.float64).reshape(-1, PATH_VALUES)
 
     def _speeds_before(self) -> dict[str, float]:
         """The least speed of each robot just before now: a push that began unnoticed does not count as its own."""
@@ -213,7 +219,7 @@ class Referee:
                 self._given[history.name, history.on_tray_of] = time_s
 
 
-def _extend(path: list[FloatArray], p_W: FloatArray) -> None:
-    """Add a point to a path when it is some way from the last."""
+def _extend(path: list[FloatArray], p_W: FloatArray, time_s: float) -> None:
+    """Add a point to a path, with its time, when it is some way from the last."""
     if not path or float(np.linalg.norm(p_W[:2] - path[-1][:2])) >= PATH_STEP_M:
-        path.append(p_W)
+        path.append(np.append(p_W, time_s))

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 PERIOD_S: Final = 1.0
 _WORLD: Final = "world: "
 _PATH: Final = "path: "
+_POINT_VALUES: Final = 4
+_POINT_BYTES: Final = 8 * _POINT_VALUES
 
 
 class SnapshotWriter:
@@ -50,11 +52,11 @@ class SnapshotWriter:
     def _grown(self, robot: str) -> tuple[tuple[int, int], bytearray]:
         """The path so far; only what was added since the last time is taken over."""
         raw, points = self._paths[robot], self._referee.points(robot)
-        if len(points) * 24 < len(raw):
+        if len(points) * _POINT_BYTES < len(raw):
             raw.clear()
-        for point in points[len(raw) // 24 :]:
+        for point in points[len(raw) // _POINT_BYTES :]:
             raw.extend(point.tobytes())
-        return (len(points), 3), raw
+        return (len(points), _POINT_VALUES), raw
 
 
 def restore(snapshot: Snapshot, engine: Engine, referee: Referee, facts: Mapping[str, Any]) -> None:

@@ -49,6 +49,7 @@ _LEAST_SEEN = 0.02
 _FITS_NEAR_M = 0.4
 _LOOKED_AT_M = 0.08
 _AVOIDED_M = 0.08
+_BELOW_TOP_M = 0.01
 _RAISED_M = 0.15
 """A head looks once more from a body that is higher by so much."""
 
@@ -141,13 +142,16 @@ class Detect(ArmSkill[DetectInputs]):
         self._tried: dict[int, int] = {}
         self._clusters: list[Cluster] = []
         blocked: list[SkillFailure] = []
-        for k, target in enumerate(targets):
-            yield from self._look_and_confirm(inputs, target, blocked, close=_fits_near(inputs))
+        targets_W = [X_WB @ p_BT for p_BT in targets]
+        for k, p_WT in enumerate(targets_W):
+            p_BT = self.X_WB().inverse() @ p_WT
+            yield from self._look_and_confirm(inputs, p_BT, blocked, close=_fits_near(inputs))
             if self._has_enough(inputs):
                 break
             yield Running(f"looking for {wanted(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
         yield from self._look_closer(inputs)
         yield from self._look_around(inputs)
+        yield from self._look_from_above(inputs, targets_W)
         yield from self._refresh(inputs)
         self.context.publish("surfaces_seen", coverage_message(self.context, self._coverage.shares()))
         return (yield from self._ended(inputs, blocked if len(blocked) == len(targets) else []))
@@ -196,13 +200,27 @@ class Detect(ArmSkill[DetectInputs]):
             self._clusters = kept
 
     def _look_around(self, inputs: DetectInputs) -> Routine[None]:
-        """Look from either side at what something hides."""
-        for p_W in self._coverage.hidden_middle_W().values() if inputs.expected_W is None else ():
+        """Look from either side at what something hides; a camera on a head has no other side."""
+        around = inputs.expected_W is None and self.object_camera.on_hand
+        for p_W in self._coverage.hidden_middle_W().values() if around else ():
             for shift_rad in self.options.around_rad:
                 if self._has_enough(inputs):
                     return
                 p_BT = self.X_WB().inverse() @ p_W
                 yield from self._look_and_confirm(inputs, p_BT, [], shift_rad=shift_rad)
+
+    def _look_from_above(self, inputs: DetectInputs, targets_W: Sequence[FloatArray]) -> Routine[None]:
+        """Look from a body that stands as high as it can, where the camera is on a head: it looks flat over tables."""
+        capabilities = self.context.robot.capabilities()
+        raised_m = capabilities.height_range_m[1] - capabilities.standing_height_m - _BELOW_TOP_M
+        if self.object_camera.on_hand or raised_m < _RAISED_M or self._has_enough(inputs):
+            return
+        for p_WT in targets_W:
+            p_BT = self.X_WB().inverse() @ p_WT
+            yield from self._look_and_confirm(inputs, p_BT, [], raised_m=raised_m)
+            if self._has_enough(inputs):
+                break
+        yield from self.stand_at(capabilities.standing_height_m, "standing as usual")
 
     def _refresh(self, inputs: DetectInputs) -> Routine[None]:
         """Look once more at what was seen last, when that is a while ago: an answer rests on fresh pictures."""
@@ -231,18 +249,20 @@ class Detect(ArmSkill[DetectInputs]):
         *,
         close: bool = False,
         shift_rad: float = 0.0,
+        raised_m: float = 0.0,
     ) -> Routine[None]:
         """Look at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
         viewpoints = self._viewpoints(p_BT, shift_rad, close=close)
-        failure = yield from self._look_if_possible(inputs, p_BT, viewpoints)
+        failure = yield from self._look_if_possible(inputs, p_BT, viewpoints, raised_m)
         if failure is not None:
             blocked.append(failure)
             return
         while (track := self._candidate(inputs)) is not None:
             tries = self._tried[track.number] = self._tried.get(track.number, 0) + 1
             p_BO = self.X_WB().inverse() @ track.position_W
-            raised_m = _RAISED_M * (tries % 3)
-            yield from self._look_if_possible(inputs, p_BO, self._confirming(track, tries, close=close), raised_m)
+            other_m = _RAISED_M * (tries % 3)
+            other_m = raised_m - other_m if raised_m > 0.0 else other_m
+            yield from self._look_if_possible(inputs, p_BO, self._confirming(track, tries, close=close), other_m)
 
     def _look_if_possible(
         self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray], raised_m: float = 0.0

@@ -63,6 +63,7 @@ class LayeredCostmap:
         self._returns_W: FloatArray = np.empty((0, 3))
         self._X_WB: Pose2D | None = None
         self._filter: SelfFilter | None = None
+        self._left_out_W: FloatArray = np.empty((0, 3))
 
     @property
     def keepout(self) -> GridMap:
@@ -95,6 +96,13 @@ class LayeredCostmap:
         self._note_change()
         return forgotten
 
+    def leave_out(self, discs_W: FloatArray) -> None:
+        """From now on take in nothing that is seen within these discs, rows of x, y and radius (m, world).
+
+        `unexplained` still has it.
+        """
+        self._left_out_W = discs_W
+
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
         """Take in the newest scan, if it is new and the robot knows where it is."""
         odometry = robot.odometry()
@@ -113,7 +121,7 @@ class LayeredCostmap:
         if self._X_WB is None or self._filter is None or len(points_W) == 0:
             return
         own = self._filter.foreign(in_body_axes(points_W, self._X_WB), np.empty((0, 3)))
-        points = self._unexplained(points_W[own])
+        points = self._others_left_out(self._unexplained(points_W[own]))
         if len(points) == 0:
             return
         cells, first, counts = np.unique(self._layer.cells(points), axis=0, return_index=True, return_counts=True)
@@ -162,6 +170,7 @@ class LayeredCostmap:
         if len(points):
             points = points[foreign(in_body_axes(points, X_WF))]
         self._returns_W = points
+        points = self._others_left_out(points)
         times = (scan.stamp_s, options.confirm_s, options.memory_s)
         cells = self._layer.cells(points)
         changed |= mark_cells(cells, points[:, 2].copy(), times, self._candidate_s, self._until_s, self._height_m)
@@ -182,6 +191,13 @@ class LayeredCostmap:
     def _unexplained(self, points_W: FloatArray) -> FloatArray:
         """Those (x, y, z) rows that lie on the grid and away from all that was surveyed."""
         return np.ascontiguousarray(points_W[self._keepout.distance_m(points_W) > self._options.explained_m])
+
+    def _others_left_out(self, points_W: FloatArray) -> FloatArray:
+        """Those (x, y, z) rows that do not lie where another robot says that it is."""
+        if not len(self._left_out_W) or not len(points_W):
+            return points_W
+        offsets = np.linalg.norm(points_W[:, None, :2] - self._left_out_W[None, :, :2], axis=2)
+        return np.ascontiguousarray(points_W[(offsets > self._left_out_W[:, 2]).all(axis=1)])
 
     def _seen_field(self) -> NDArray[np.float32] | None:
         """Distance (m) from each cell of the layer to what is seen, None when nothing is."""

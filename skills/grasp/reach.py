@@ -7,7 +7,7 @@ known to stand around.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice, pairwise
 from typing import Any, Final
@@ -194,6 +194,16 @@ def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
     return Target(points, (float(centre[0]), float(centre[1])), yaw, length, width, height, base_m, is_round)
 
 
+def resting_on(seen: ObjectObservation, surfaces: Sequence[Surface]) -> ObjectObservation:
+    """An object where it was seen, but not sunk into the surface that it lies on: then no fingers would get round it.
+
+    From a distance a flat object seems to be lower than it is, by as much as it is high.
+    """
+    x, y, z = seen.position_W
+    top_m = max((surface.height_m for surface in surfaces if surface.name == seen.surface), default=-np.inf)
+    return replace(seen, position_W=(x, y, max(z, float(top_m) + 0.5 * seen.size_m[2])))
+
+
 def space_about(
     seen: ObjectObservation, half_m: float = _SURFACE_AROUND_M
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
@@ -236,6 +246,7 @@ def reach_check(
     Around it stands what the hand camera has seen within the arm's reach and `beyond_m`, but just about the object.
     """
     X_WB, known_W = skill.X_WB(), skill.known_W
+    seen = resting_on(seen, surfaces)
     skill.known_W = space_about(seen)
     boxes = [*surface_boxes(surfaces, X_WB), *skill.seen_boxes(beyond_m)]
     skill.known_W = known_W

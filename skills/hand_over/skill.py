@@ -18,9 +18,12 @@ from skills.arm.collision import ArmScene, Box
 from skills.arm.pull import PullWatch
 from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
+from skills.hand_over.given import Release, Seen, names_in, release_from, release_of, seen_given
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
 from skills.navigate.skill import NavigateInputs
+from skills.perception.detection_3d import detections_3d
+from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
 from skills.perception.people import SeenPerson, people_in_scan
 from skills.quantities import Duration, Force, Height, Length
 from skills.robot import FloatArray, Pose2D
@@ -33,6 +36,7 @@ _STILL_S = 0.5
 _FREE_S = 2.0
 _LETS_GO, _KEEPS = "let go", "hold on"
 _POINTS_DOWN = 0.8
+_LOOKS = 3
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ class HandOver(ArmSkill[HandOverInputs]):
         Cause.PRECONDITION: "nothing is held, or nobody is seen near",
         Cause.PLANNING: "no free place before the person, or no free path for the arm",
         Cause.EXECUTION: "the robot or its arm did not reach its goal",
-        Cause.POSTCONDITION: "the object was lost, is not near the person, or is still in the open gripper",
+        Cause.POSTCONDITION: "the object was lost, is still in the gripper, or is not seen with the person",
         Cause.TIMEOUT: "the person did not take the object",
     }
     default_timeout_s = 120.0
@@ -144,9 +148,15 @@ class HandOver(ArmSkill[HandOverInputs]):
             asked.withdraw()
 
     def _let_go(self, inputs: HandOverInputs) -> Routine[None]:
-        """Open, wait until the gripper feels nothing, and leave the object without dragging it."""
+        """Open, wait until the gripper feels nothing, leave the object without dragging it, and look who has it.
+
+        A robot whose camera is on its hand does not look: there it would be before the person's face.
+        """
         message, gripper = f"giving the {inputs.thing} to {inputs.person}", self.context.robot.gripper
-        self.checkpoint = {"lets_go": True}
+        if not self.checkpoint.get("lets_go"):
+            corners_H = self.context.payload.corners_H
+            release = release_of(self.X_WB() @ self.model.X_BH(self.q_rad()), self.p_HT, corners_H)
+            self.checkpoint = {"lets_go": True, "release": release.state()}
         yield from self.move_gripper(self.release_rad(), GRIPPER_FORCE_N, message)
         end_s = self.context.clock.now() + _FREE_S
         while gripper().holding:
@@ -156,6 +166,42 @@ class HandOver(ArmSkill[HandOverInputs]):
         yield from self.pause(_STILL_S, message)
         yield from self.leave_object()
         yield from self.try_stow()
+        camera = self.context.robot.capabilities().object_camera
+        if camera is not None and not camera.on_hand:
+            yield from self._check_given(inputs, release_from(self.checkpoint["release"]))
+
+    def _check_given(self, inputs: HandOverInputs, release: Release) -> Routine[None]:
+        """Raise SkillFailure with cause POSTCONDITION unless the object is seen with the person."""
+        thing, message = inputs.thing, f"looking whether {inputs.person} has the {inputs.thing}"
+        for level_m in (*[release.low_m] * _LOOKS, 0.0):
+            if self.context.robot.gripper().holding:
+                raise SkillFailure(Cause.POSTCONDITION, f"the {thing} is still in the gripper")
+            seen = yield from self._look(release, level_m, thing, message)
+            if seen is Seen.GIVEN:
+                return
+            if seen is Seen.FELL:
+                raise SkillFailure(Cause.POSTCONDITION, f"the {thing} fell to the floor before {inputs.person}")
+        why = f"the {thing} is not seen where it was let go of before {inputs.person}"
+        raise SkillFailure(Cause.POSTCONDITION, why)
+
+    def _look(self, release: Release, level_m: float, thing: str, message: str) -> Routine[Seen]:
+        """What a picture of where the object was let go of shows, at a height over the floor (m)."""
+        context = self.context
+        p_BT = self.X_WB().inverse() @ np.array([release.x_m, release.y_m, level_m])
+        try:
+            yield from self.look_at(p_BT, (), message)
+            image = yield from self.picture(message)
+        except SkillFailure as failure:
+            raise SkillFailure(
+                Cause.POSTCONDITION, f"the {thing} is let go of, but not seen: {failure.message}"
+            ) from failure
+        place, names = context.localiser.estimate(), names_in(thing, context.detector.class_names)
+
+        def look() -> Seen:
+            found = detections_3d(image, place, detections_in(context.detector, image), ())
+            return seen_given(image, place.X_WO, found, names, release)
+
+        return (yield from self.compute(look, latency_s=DETECTION_LATENCY_S, name="look who has it", message=message))
 
     def _find(self, name: str) -> Routine[SeenPerson]:
         """The nearest person that is seen in several scans, ahead rather than behind."""

@@ -1,7 +1,14 @@
-"""Right of way among robots: what the others' bodies and ways take up, where to stop short, and where to step aside."""
+"""Right of way among robots: what the others' bodies and ways take up, where to stop short, and where to step aside.
+
+Prioritised planning (Erdmann and Lozano-Perez, "On Multiple Moving Objects", 1987) with the priority that PIBT inherits
+(Okumura, Machida, Defago and Tamura, "Priority Inheritance with Backtracking for Iterative Multi-Agent Path Finding",
+2022): who goes first reserves a way even where one stands who goes later, who then has to clear it, and where that one
+cannot, the two change turns. Waiting places lie off the union of the ways that are reserved.
+"""
 
 from __future__ import annotations
 
+import enum
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -14,7 +21,7 @@ from numpy.typing import NDArray
 from skills.api import Costmap, LocalisationEstimate, SkillContext
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.navigate.path import TURN_M_PER_RAD
-from skills.quantities import Delay, Length, Margin
+from skills.quantities import Count, Delay, Length, Margin
 from skills.robot import FloatArray, Pose2D, Robot
 from skills.stack import LocalController
 from skills.traffic import Neighbour
@@ -22,12 +29,16 @@ from skills.traffic import Neighbour
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-__all__ = ["GivingWay", "GivingWayOptions", "WithBodies", "first_that_suits", "reachable", "with_bodies"]
+__all__ = ["Avoided", "GivingWay", "GivingWayOptions", "WithBodies", "first_that_suits", "reachable", "with_bodies"]
 
 _WAY_STEP_M = 0.12
 _CELL_M = 0.1
 _YAWS = 8
 _SLACK_M = 0.03
+_UNSURE_M = 0.04
+_ROUND_UP_M = 0.02
+_AT_ONCE = 200
+_ANEW_M = 0.6
 _ABOUT_M = 1.2
 _BODY_M = 0.6
 
@@ -37,8 +48,9 @@ class GivingWayOptions:
     """Distances are between outlines (m), times on the robot's clock (s).
 
     A way that comes within `apart_m` of one that is reserved waits for it, `short_m` before. Who goes first waits for
-    one who stands within `room_m` of the next `room_look_m` of its way, for `patience_s` at most. A waiting place lies
-    `aside_m` off reserved ways, and within `reach_m`; the way on is looked for every `again_s`.
+    one who stands within `room_m` of the next `room_look_m` of its way, for `patience_s` at most; then the two change
+    turns. A waiting place lies `aside_m` off reserved ways, and within `reach_m`; so many `places` are tried. The way
+    on is looked for every `again_s`, and what robots keep from going counts as failed after `blocked_patience_s`.
     """
 
     apart_m: Margin = 0.15
@@ -49,8 +61,17 @@ class GivingWayOptions:
     patience_s: Delay = 20.0
     blocked_patience_s: Delay = 60.0
     aside_m: Margin = 0.25
-    reach_m: Length = 5.0
+    reach_m: Length = 9.0
+    places: Count = 3
     again_s: Delay = 1.5
+
+
+class Avoided(enum.Enum):
+    """What of the other robots a plan leads around, beside all that stands in the costmap."""
+
+    WAYS = "ways"  # their bodies, and the ways that are reserved against us
+    BODIES = "bodies"  # their bodies: the robot stops before a reserved way
+    WORKING = "working"  # only those that do not clear a way which is reserved
 
 
 @dataclass(frozen=True)
@@ -76,14 +97,16 @@ class WithBodies:
         self.costmap.add_points(points_W, stamp_s)
 
 
-def with_bodies(costmap: Costmap, swept: Sequence[tuple[FloatArray, FloatArray]]) -> Costmap:
-    """The costmap with outlines (discs) at poses (N, 3)."""
+def with_bodies(costmap: Costmap, swept: Sequence[tuple[FloatArray, FloatArray]], larger_m: float = 0.0) -> Costmap:
+    """The costmap with outlines (discs), larger_m wider to all sides, at poses (N, 3)."""
     from scipy.spatial import cKDTree
 
     for discs, poses in swept:
-        radius = float(discs[:, 2].max())
-        round_ones = discs[discs[:, 2] >= 0.9 * radius]
-        costmap = WithBodies(costmap, cKDTree(_centres(round_ones, poses)), radius)
+        steps = np.ceil(discs[:, 2] / _ROUND_UP_M - 1e-6)
+        for step in np.unique(steps):
+            same = discs[steps == step]
+            tree = cKDTree(_centres(same, poses))
+            costmap = WithBodies(costmap, tree, float(same[:, 2].max()) + larger_m)
     return costmap
 
 
@@ -116,6 +139,9 @@ class GivingWay:
         self._traffic, self._options = context.traffic, options
         self._clock = context.clock
         self._making_room_since_s: float | None = None
+
+    def begin(self) -> None:
+        """Ask for the right to go, from now on."""
         self._traffic.release()
         self._traffic.claim()
 
@@ -143,13 +169,26 @@ class GivingWay:
         """Those who go first, and go somewhere."""
         return [one for one in self._traffic.others() if one.first and one.way is not None]
 
-    def bodies(self, costmap: Costmap) -> Costmap:
-        """The costmap with the others where they are."""
-        return with_bodies(costmap, [(one.discs, one.pose[None, :]) for one in self._traffic.others()])
+    def costmap(self, costmap: Costmap, avoided: Avoided) -> Costmap:
+        """The costmap with that of the others which is to be avoided."""
+        others = [one for one in self._traffic.others() if avoided is not Avoided.WORKING or not _will_move(one)]
+        with_others = with_bodies(costmap, [(one.discs, one.pose[None, :]) for one in others], _UNSURE_M)
+        if avoided is not Avoided.WAYS:
+            return with_others
+        return with_bodies(with_others, [(one.discs, _thinned(one)) for one in self.ahead_of_us()])
 
-    def reserved(self, costmap: Costmap) -> Costmap:
-        """The costmap with the others where they are, and all of the ways that are reserved against us."""
-        return with_bodies(self.bodies(costmap), [(one.discs, _thinned(one)) for one in self.ahead_of_us()])
+    def less(self, avoided: Avoided) -> Avoided | None:
+        """What is avoided instead when there was no way around more; None: nothing less would help."""
+        if avoided is Avoided.WAYS and self.ahead_of_us():
+            return Avoided.BODIES
+        if avoided is not Avoided.WORKING and any(_will_move(one) for one in self._traffic.others()):
+            return Avoided.WORKING
+        return None
+
+    def let_pass(self, names: Sequence[str]) -> None:
+        """Change turns with robots for which we should have made way and cannot."""
+        for name in names:
+            self._traffic.let_pass(name)
 
     def conflict_m(self, follower: LocalController, footprint: Footprint) -> tuple[float, str] | None:
         """How far (m) it is along the path to where it meets a reserved way, and whose; None: it meets none."""
@@ -164,17 +203,23 @@ class GivingWay:
         return found
 
     def room_for(self, follower: LocalController, footprint: Footprint) -> str | None:
-        """Who is to make way and stands near ahead, so that we wait a while; None: nobody does."""
+        """Who is to make way and stands near ahead, so that we wait a while; None: nobody does.
+
+        Once that has taken too long, turns are changed.
+        """
         ahead = follower.ahead(self._options.room_look_m)
         for one in self._traffic.others():
-            if one.first or one.way is None:
+            if not one.yields:
                 continue
             body = with_bodies(_Nothing(), [(one.discs, one.pose[None, :])])
             clearance = footprint_clearance_m(body, footprint, ahead)
             if clearance.min() < min(self._options.room_m, float(clearance[0]) - 0.02):
                 now_s = self._clock.now()
                 since_s = self._making_room_since_s = self._making_room_since_s or now_s
-                return one.name if now_s - since_s < self._options.patience_s else None
+                if now_s - since_s < self._options.patience_s:
+                    return one.name
+                self.let_pass([one.name])
+                return None
         self._making_room_since_s = None
         return None
 
@@ -193,34 +238,43 @@ class GivingWay:
         about = (one.name for one in self._traffic.others() if math.dist(place_W, one.pose[:2].tolist()) < _ABOUT_M)
         return next(about, None)
 
-    def stands_in_way(self, here: Pose2D, footprint: Footprint) -> bool:
-        """Whether the robot stands where a way is reserved against it."""
-        ways = [(one.discs, _thinned(one)[1:]) for one in self.ahead_of_us()]
-        if not ways:
-            return False
-        clearance = footprint_clearance_m(with_bodies(_Nothing(), ways), footprint, pose_array([here]))
-        return bool(clearance[0] < self._options.apart_m)
+    def in_whose_way(self, here: Pose2D, footprint: Footprint) -> Sequence[str]:
+        """Those who have reserved a way where the robot stands."""
+        return [one.name for one in self.ahead_of_us() if self._in_way_of(one, here, footprint)]
 
-    def waiting_place(self, costmap: Costmap, footprint: Footprint, here: Pose2D) -> Pose2D | None:
-        """The nearest pose that can be reached and lies off all reserved ways; None: there is none."""
+    def _in_way_of(self, one: Neighbour, here: Pose2D, footprint: Footprint) -> bool:
+        way = with_bodies(_Nothing(), [(one.discs, _thinned(one)[1:])])
+        return bool(footprint_clearance_m(way, footprint, pose_array([here]))[0] < self._options.apart_m)
+
+    def waiting_place(
+        self, costmap: Costmap, footprint: Footprint, here: Pose2D, tried: Sequence[Pose2D] = ()
+    ) -> Pose2D | None:
+        """The nearest pose that can be reached and lies off all reserved ways; None: there is none.
+
+        Places beside those that were `tried` are left out.
+        """
         options = self._options
         n = int(2.0 * options.reach_m / _CELL_M) + 1
         axis = np.linspace(-options.reach_m, options.reach_m, n)
         x, y = np.meshgrid(here.x_m + axis, here.y_m + axis)
-        everything = self.bodies(costmap)
-        clearance = everything.clearance_m(np.column_stack([x.ravel(), y.ravel()]))
-        free = clearance.reshape(n, n) > footprint.inscribed_m + SAFE_MARGIN_M
+        centres = np.column_stack([x.ravel(), y.ravel()])
+        everything = self.costmap(costmap, Avoided.BODIES)
+        free = everything.clearance_m(centres).reshape(n, n) > footprint.inscribed_m + SAFE_MARGIN_M
         ways = with_bodies(_Nothing(), [(one.discs, _thinned(one)) for one in self.ahead_of_us()])
+        aside = ways.clearance_m(centres).reshape(n, n) > footprint.inscribed_m + options.aside_m
+        for other in tried:
+            aside &= np.hypot(x - other.x_m, y - other.y_m) > _ANEW_M
         yaws = here.yaw_rad + np.arange(_YAWS) * (2.0 * math.pi / _YAWS)
 
-        def suits(row: int, column: int) -> Pose2D | None:
-            poses = np.column_stack([np.full(_YAWS, x[row, column]), np.full(_YAWS, y[row, column]), yaws])
+        def suits(places: FloatArray) -> Pose2D | None:
+            poses = np.column_stack([np.repeat(places, _YAWS, axis=0), np.tile(yaws, len(places))])
             room = footprint_clearance_m(everything, footprint, poses) > SAFE_MARGIN_M + _SLACK_M
-            aside = footprint_clearance_m(ways, footprint, poses) > options.aside_m
-            good = np.flatnonzero(room & aside)
+            good = np.flatnonzero(room & (footprint_clearance_m(ways, footprint, poses) > options.aside_m))
             return Pose2D(*poses[good[0]].tolist()) if len(good) else None
 
-        return first_that_suits(reachable(free, (n // 2, n // 2)), suits)
+        cells = [cell for cell in reachable(free, (n // 2, n // 2)) if aside[cell] and sum(cell) % 2 == 0]
+        rows, columns = np.array(cells, dtype=np.int64).reshape(-1, 2).T
+        return first_that_suits(np.column_stack([x[rows, columns], y[rows, columns]]), suits)
 
 
 def reachable(free: NDArray[np.bool_], begin: tuple[int, int]) -> list[tuple[int, int]]:
@@ -237,14 +291,17 @@ def reachable(free: NDArray[np.bool_], begin: tuple[int, int]) -> list[tuple[int
     return order
 
 
-def first_that_suits(
-    candidates: Sequence[tuple[int, int]], suits: Callable[[int, int], Pose2D | None]
-) -> Pose2D | None:
-    """The first place that suits, every third cell looked at; None: there is none."""
-    for row, column in candidates:
-        if (row + column) % 3 == 0 and (place := suits(row, column)) is not None:
+def first_that_suits(places_W: FloatArray, suits: Callable[[FloatArray], Pose2D | None]) -> Pose2D | None:
+    """The first pose that suits at places (N, 2), many of which are looked at together; None: there is none."""
+    for begin in range(0, len(places_W), _AT_ONCE):
+        if (place := suits(places_W[begin : begin + _AT_ONCE])) is not None:
             return place
     return None
+
+
+def _will_move(one: Neighbour) -> bool:
+    """Whether a robot goes on by itself, or clears a way that is reserved against it."""
+    return one.yields or (one.first and one.way is not None)
 
 
 def _thinned(one: Neighbour) -> FloatArray:

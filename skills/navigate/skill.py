@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -27,8 +27,8 @@ from skills.geometry import relative
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
-from skills.navigate.footprint import footprint_clearance_m
-from skills.navigate.giving_way import GivingWay, GivingWayOptions
+from skills.navigate.footprint import Footprint, footprint_clearance_m
+from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
 from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
@@ -113,9 +113,11 @@ class Navigate(Skill[NavigateInputs]):
         self._base = Base(self.context)
         self._inputs = inputs
         self._aside: Pose2D | None = None
-        self._around = True
+        self._tried: tuple[Pose2D, ...] = ()
+        self._avoided, self._waits = Avoided.WAYS, False
         self._giving = GivingWay(self.context, self.options.giving_way)
-        self._around_due_s = self._neighbour_s = self._neighbour_since_s = -math.inf
+        self._giving.begin()
+        self._asked_due_s = self._around_due_s = self._neighbour_s = self._neighbour_since_s = -math.inf
         self._outline = ArmFootprint(self.context)
         self._footprint = self._outline.now()
         self._outline_due_s = -math.inf
@@ -151,12 +153,16 @@ class Navigate(Skill[NavigateInputs]):
         if refusal is not None:
             cause = Cause.EXECUTION if self._base.accepted else Cause.PRECONDITION
             return Failed(cause, f"The robot refused to drive: {refusal}.")
-        return self._phase()
+        return self._make_way() or self._phase()
 
     def end(self) -> None:
         """Stop what this skill set in motion, and give the way back."""
         self._base.stop()
         self.context.traffic.release()
+
+    def outline(self) -> Footprint:
+        """The robot's footprint as it stands now."""
+        return ArmFootprint(self.context).now()
 
     def undone(self, inputs: NavigateInputs) -> str | None:
         """The robot's place tells; skills that came after may have gone a little aside."""
@@ -206,9 +212,9 @@ class Navigate(Skill[NavigateInputs]):
         self._outline_due_s = self._now() + _OUTLINE_PERIOD_S
         speed = max(0.1, self._inputs.max_speed_m_s)
         begin, goal = start or self.context.pose(), self._goal
-        around = self._around and self._aside is None
+        avoided = self._avoided if self._aside is None else Avoided.BODIES
         plan = self.context.stack.planner.problem(
-            self._costmap(begin, around=around),
+            self._costmap(begin, avoided),
             self._footprint,
             begin,
             goal,
@@ -222,13 +228,10 @@ class Navigate(Skill[NavigateInputs]):
         """Where the robot goes just now: the goal, or a place where it waits for others to pass."""
         return self._aside or self._inputs.goal
 
-    def _costmap(self, here: Pose2D, *, around: bool = False) -> Costmap:
-        """What is in the way, with room about people as far as `here` and the goal leave it.
-
-        Other robots stand in the way, and their ways too where the plan is to lead `around` them.
-        """
+    def _costmap(self, here: Pose2D, avoided: Avoided = Avoided.BODIES) -> Costmap:
+        """What is in the way, with room about people as far as `here` and the goal leave it."""
         fixed = (here, self._goal)
-        costmap = (self._giving.reserved if around else self._giving.bodies)(self.context.costmap)
+        costmap = self._giving.costmap(self.context.costmap, avoided)
         return spaced(costmap, self._footprint, fixed, self._persons(), self._room_m)
 
     def _look_out(self) -> None:
@@ -240,8 +243,6 @@ class Navigate(Skill[NavigateInputs]):
         """Stand and wait for a plan, or for the time of the next attempt."""
         self._look_out()
         if self._job is None:
-            if self._giving.stands_in_way(self.context.pose(), self._footprint):
-                return self._step_aside()
             if self._now() < self._wait_until_s:
                 return Running(self._waiting_sentence())
             self._ask_for_plan()
@@ -260,7 +261,7 @@ class Navigate(Skill[NavigateInputs]):
         self._follower = controller.build(path, self._footprint, max_speed_m_s=speed)
         self._whole_m = self._whole_m or max(self._follower.length_m, 1e-3)
         self._blocked_since_s = self._obstacle = None
-        self._best_m, self._best_s = math.inf, self._now()
+        self._best_m, self._best_s, self._waits = math.inf, self._now(), False
         self._phase = self._following
         poses = [[round(float(v), 3) for v in pose] for pose in path.poses[::4]]
         self.context.publish("path", {"robot": self.context.robot.name, "frame": "world", "poses": poses})
@@ -294,14 +295,18 @@ class Navigate(Skill[NavigateInputs]):
         return recently and now_s - self._person_since_s < self.options.person_patience_s
 
     def _other_plan(self) -> bool:
-        """Whether there is another plan to try after one failed that led around reserved ways, or aside."""
+        """Whether there is another plan to try, or to wait for, after one failed that led around others, or aside."""
+        waits, self._waits = self._waits, False
         if self._aside is not None:
-            self._aside = None
-            for one in self._giving.ahead_of_us():
-                self.context.traffic.let_pass(one.name)
-        elif self._around and self._giving.ahead_of_us():
-            self._around = False
-        else:
+            self._tried = (*self._tried, self._aside)
+            self._go_aside(self._giving.in_whose_way(self.context.pose(), self._footprint))
+            return True
+        if waits and self._giving.ahead_of_us():
+            self._phase = self._waiting_aside
+            return True
+        less = self._giving.less(self._avoided)
+        self._avoided = less or Avoided.WAYS
+        if less is None:
             return False
         self._phase = self._planning
         self._ask_for_plan()
@@ -313,7 +318,7 @@ class Navigate(Skill[NavigateInputs]):
         What the costmap remembers of it is forgotten; what still stands there is seen anew.
         """
         now_s, costmap = self._now(), self.context.costmap
-        if self._giving.somebody_goes():
+        if self._giving.others():
             gap_s, self._neighbour_s = now_s - self._neighbour_s, now_s
             if gap_s > self.options.after_person_s:
                 self._neighbour_since_s = now_s
@@ -330,35 +335,45 @@ class Navigate(Skill[NavigateInputs]):
         """The people near; what a camera takes for one where a robot says that it stands is that robot."""
         return tuple(one for one in self._people.people() if not self._giving.is_robot(one.place_W))
 
-    def _step_aside(self) -> Step:
-        """Go out of a way that is reserved, to the nearest place where it is free; change turns where there is none."""
+    def _make_way(self) -> Step | None:
+        """Go out of a way that is reserved; None where the robot stands in none, or is on its way out."""
+        goes_aside = self._aside is not None and self._phase != self._waiting_aside
+        if goes_aside or self._phase in (self._localising, self._settling) or self._now() < self._asked_due_s:
+            return None
+        first = self._giving.in_whose_way(self.context.pose(), self._footprint)
+        if not first:
+            return None
         self._base.stop()
-        place = self._giving.waiting_place(self.context.costmap, self._footprint, self.context.pose())
-        first = ", ".join(one.name for one in self._giving.ahead_of_us())
+        self._tried = ()
+        self._go_aside(first)
+        return Running(f"making way for {', '.join(first)}")
+
+    def _go_aside(self, first: Sequence[str]) -> None:
+        """Go to the nearest waiting place; where none is left to try, change turns, so that the others make way."""
+        here, place = self.context.pose(), None
+        if len(self._tried) < self.options.giving_way.places:
+            place = self._giving.waiting_place(self.context.costmap, self._footprint, here, self._tried)
         if place is None:
-            for one in self._giving.ahead_of_us():
-                self.context.traffic.let_pass(one.name)
-        self._aside, self._around = place, True
+            self._giving.let_pass(first)
+            self._asked_due_s = self._now() + self.options.giving_way.again_s
+        self._aside, self._avoided, self._waits = place, Avoided.WAYS, False
         self._best_m, self._best_s = math.inf, self._now()
         self._phase = self._planning
         self._ask_for_plan()
-        return Running(f"making way for {first}")
 
     def _waiting_aside(self) -> Step:
         """Stand at a waiting place until there is a way that nobody has reserved."""
         self._look_out()
         self._giving.stand(self.context.pose(), self._footprint)
         self._best_s = self._now()
-        if self._giving.stands_in_way(self.context.pose(), self._footprint):
-            return self._step_aside()
         if self._giving.ahead_of_us() and self._now() < self._wait_until_s:
             return Running("waiting aside for another robot to pass")
         self._wait_until_s = self._now() + self.options.giving_way.again_s
-        self._aside, self._around, self._phase = None, True, self._planning
+        self._aside, self._avoided, self._phase, self._waits = None, Avoided.WAYS, self._planning, True
         self._ask_for_plan()
         return Running("planning a path")
 
-    def _give_way(self, follower: LocalController, pose: Pose2D) -> tuple[float, Step | None]:
+    def _give_way(self, follower: LocalController) -> tuple[float, Step | None]:
         """How fast others' rights let the robot go (m/s), and what it does while it stands for them."""
         self._giving.announce(follower, self._footprint)
         if self._aside is not None:
@@ -368,13 +383,11 @@ class Navigate(Skill[NavigateInputs]):
             name = self._giving.room_for(follower, self._footprint)
             return (math.inf, None) if name is None else (0.0, self._waits_for(name, "to make way"))
         way_m, name = conflict
-        if self._giving.stands_in_way(pose, self._footprint):
-            return 0.0, self._step_aside()
         left_m = way_m - options.short_m
         if left_m > 0.02:
             return math.sqrt(2.0 * 0.4 * left_m), None
         if self._job is None and self._now() >= self._around_due_s:
-            self._around, self._around_due_s = True, self._now() + 2.0 * options.again_s
+            self._avoided, self._around_due_s = Avoided.WAYS, self._now() + 2.0 * options.again_s
             self._ask_for_plan()
         return 0.0, self._waits_for(name, "to pass")
 
@@ -400,7 +413,7 @@ class Navigate(Skill[NavigateInputs]):
         if danger is not None:
             return self._stand_at_once(danger)
         pace = self._paced(self._follower, pose)
-        most_m_s, waits = self._give_way(self._follower, pose)
+        most_m_s, waits = self._give_way(self._follower)
         if self._phase != self._following:
             return waits or Running("making way")
         costmap, most_m_s = self._costmap(pose), min(most_m_s, pace.most_m_s)
@@ -472,7 +485,8 @@ class Navigate(Skill[NavigateInputs]):
 
     def _review(self, follower: LocalController, costmap: Costmap) -> None:
         """Plan anew, while the robot drives on, once what is seen leaves the path too little clearance."""
-        if self._job is not None or not self.options.review_m or self._now() < self._review_due_s:
+        through = self._avoided is Avoided.WORKING and self._aside is None
+        if through or self._job is not None or not self.options.review_m or self._now() < self._review_due_s:
             return
         self._review_due_s = self._now() + self.options.review_s
         ahead = follower.ahead(self.options.review_m)
@@ -493,7 +507,7 @@ class Navigate(Skill[NavigateInputs]):
     def _replan(self, why: str) -> Step:
         """Plan anew from here; fail when that was done too often."""
         self._replans += not self._giving.somebody_goes()
-        self._around = True
+        self._avoided = Avoided.WAYS
         if self._replans > self.options.replans:
             self._base.stop()
             return Failed(Cause.EXECUTION, f"{why} Planning anew {self.options.replans} times did not help.")

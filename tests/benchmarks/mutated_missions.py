@@ -20,7 +20,7 @@ from pathlib import Path
 from executive.language import load_parser
 from executive.mission.errors import InputError
 from executive.mission.file.overrides import overridden
-from executive.mission.file.resolve import load_mission, mission_from_file
+from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
 from executive.mission.knowledge import load_knowledge
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
@@ -30,21 +30,21 @@ ROOT = Path(__file__).parents[2]
 MOST_S, MOST_MB = 1.0, 300.0
 
 
-def compiler() -> Callable[[Path], object]:
+def compiler() -> Callable[[Path], None]:
     """What loads and compiles a file; the world, the skills and the parser are loaded once."""
     flat, skills, parser = load_knowledge(ROOT / "plant/worlds/flat/knowledge.yaml"), installed_skills(), load_parser()
 
-    def compile_path(path: Path) -> object:
+    def compile_path(path: Path) -> None:
         loaded = load_mission(path)
         knowledge = overridden(loaded, flat)
-        return compile_mission(
-            mission_from_file(loaded, parser=parser, knowledge=knowledge), knowledge=knowledge, registry=skills
-        )
+        for part in [for_robot(loaded, name, name) for name in loaded.parts] if loaded.parts else [loaded]:
+            mission = mission_from_file(part, parser=parser, knowledge=knowledge)
+            compile_mission(mission, knowledge=knowledge, registry=skills)
 
     return compile_path
 
 
-def fault(path: Path, compile_path: Callable[[Path], object]) -> tuple[str, str]:
+def fault(path: Path, compile_path: Callable[[Path], None]) -> tuple[str, str]:
     """How a file ends ("compiles", "refused"), and what is wrong with that."""
     begun = time.process_time()
     try:

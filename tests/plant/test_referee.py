@@ -402,7 +402,7 @@ def test_a_robot_that_moved_before_it_touched_a_person_caused_it(speed, hit):
 
 def test_contacts_with_people_outlive_a_restart():
     stage, other = Stage().put("body", (0, 3 - 0.2 - 0.049, 0.9)).watch(), Stage()
-    other.referee.restore(stage.referee.state(), {"alice": stage.referee.path("alice")})
+    other.referee.restore(stage.referee.state(), {"alice": np.array(stage.referee.points("alice"))})
     assert other.referee.collisions == stage.referee.collisions
 
 
@@ -559,3 +559,43 @@ def test_a_table_on_which_nothing_stood_is_cleared():
     verdict = Stage().referee.judge([dataclasses.replace(THERE, source=(empty,))])
     assert verdict.success
     assert verdict.why == "Nothing stood on the bench."
+
+
+def since_now(stage, *conditions):
+    return [dataclasses.replace(condition, since_s=stage.time) for condition in conditions]
+
+
+def test_a_second_mission_is_not_fulfilled_by_what_the_first_lifted_and_placed():
+    stage = Stage().lift().carry("coke", np.add(ON_TABLE, (0, 0, 0.3)), ON_SHELF).let_go().watch()
+    assert stage.holds(GRASPED, PLACED)
+    second = since_now(stage.watch(0.1), GRASPED, PLACED)
+    assert not stage.holds(second[0])
+    assert not stage.holds(second[1])
+    stage.lift("coke", ON_SHELF).carry("coke", np.add(ON_SHELF, (0, 0, 0.3)), ON_SHELF).let_go().watch()
+    assert stage.holds(second[1])
+    assert not stage.holds(second[0])  # it was not on the table any more
+
+
+def test_a_second_mission_is_not_fulfilled_by_what_the_first_handed_over_or_was_near():
+    stage = given().watch()
+    second = since_now(stage, HANDED)
+    assert stage.holds(HANDED)
+    assert not stage.holds(*second)
+    there = GoalCondition(GoalKind.WENT, goal=(square("the gate", 0.0, 0.0),), passing=True)
+    stage.put("body", (0, 0, 0.6)).watch(0.1).put("body", (-3, -3, 0.6)).watch(0.1)
+    assert stage.holds(there)
+    assert not stage.holds(*since_now(stage, there))
+
+
+def test_where_the_robot_stood_when_its_mission_began_counts_as_passed():
+    stage = Stage().put("body", (0, 0, 0.6)).watch(1.0)
+    there = GoalCondition(GoalKind.WENT, goal=(square("the gate", 0.0, 0.0),), passing=True)
+    began = since_now(stage, there)
+    stage.put("body", (-3, -3, 0.6)).watch(0.1)
+    assert stage.holds(*began)
+
+
+def test_bumps_and_drops_before_a_mission_are_not_its_own():
+    stage = given().watch(0.1).fall("coke", ON_TRAY, (0.6, 2.4, HALF - TOUCH))
+    assert stage.referee.judge([GRASPED]).drops == 1
+    assert stage.referee.judge(since_now(stage, GRASPED)).drops == 0

@@ -12,6 +12,7 @@ from executive.mission.yaml_source import YamlSource
 __all__ = ["overridden"]
 
 _KEY: Final = "knowledge"
+_ROBOTS: Final = "robots"
 
 
 def overridden(file: MissionFile, knowledge: Knowledge) -> Knowledge:
@@ -24,6 +25,9 @@ def overridden(file: MissionFile, knowledge: Knowledge) -> Knowledge:
     """
     if not file.knowledge or file.source is None:
         return knowledge
+    if _ROBOTS in file.knowledge:
+        what = "the robots of a mission do not stand in its knowledge"
+        raise file.error((_KEY, _ROBOTS), what, "write 'robots' at the top of the file")
     merged = _merged(knowledge.model_dump(mode="json", exclude_none=True), file.knowledge)
     lines = {path[1:]: line for path, line in file.source.lines.items() if path[0] == _KEY and len(path) > 1}
     return knowledge_of_source(

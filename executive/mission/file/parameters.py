@@ -22,7 +22,7 @@ from executive.mission.expression import Value
 from executive.mission.file.model import KeyPath
 from executive.mission.yaml_source import YamlSource
 
-__all__ = ["Given", "given_values", "round_source", "values_in_json", "with_parameters"]
+__all__ = ["Given", "given_values", "part_source", "round_source", "values_in_json", "with_parameters"]
 
 _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -36,6 +36,7 @@ _TYPES: Final[Mapping[str, tuple[type, ...]]] = {
     "object": (str,),
     "person": (str,),
 }
+_FOR_SEVERAL: Final = ("robots", "parts")
 _TEXTS: Final = frozenset(name for name, kinds in _TYPES.items() if str in kinds)
 
 Given = Mapping[str, Any]
@@ -149,6 +150,15 @@ def round_source(source: YamlSource, steps: KeyPath, name: str, value: Value) ->
     first = source.line(steps)
     below = replace(source, data={"steps": data}, lines=lines, first_line=first)
     return replace(below, data=_put_in(below.data, {name: value}, below, ()))
+
+
+def part_source(source: YamlSource, robot: str, part: str | None) -> YamlSource:
+    """The document for one robot alone: its part `part` (None: all steps) laid over what stands at the top."""
+    own = {} if part is None else {key: value for key, value in source.data["parts"][part].items() if key != "after"}
+    shared = {key: value for key, value in source.data.items() if key not in _FOR_SEVERAL}
+    lines = {path: line for path, line in source.lines.items() if path[0] not in {*_FOR_SEVERAL, *own}}
+    lines |= {path[2:]: line for path, line in source.lines.items() if len(path) > 2 and path[:2] == ("parts", part)}
+    return replace(source, data={**shared, **own, "robot": robot}, lines=lines)
 
 
 def _declared(source: YamlSource) -> dict[str, _Parameter]:

@@ -21,13 +21,13 @@ from executive.mission.file.condition_schema import ConditionFile
 from executive.mission.file.model import KeyPath, Mission, MissionStep, SkillCall
 from executive.mission.file.names import typed_command
 from executive.mission.file.overrides import overridden
-from executive.mission.file.parameters import Given, round_source, with_parameters
+from executive.mission.file.parameters import Given, part_source, round_source, with_parameters
 from executive.mission.file.schema import HandlerFile, MissionFile, ParameterFile, RoundFile, StepFile, with_source
 from executive.mission.file.scope import Scope
 from executive.mission.knowledge import Knowledge
 from executive.mission.yaml_source import read_yaml, validate
 
-__all__ = ["load_mission", "mission_from_file"]
+__all__ = ["for_robot", "load_mission", "mission_from_file"]
 
 MAX_STEPS: Final = 5000
 MAX_DEPTH: Final = 20
@@ -35,7 +35,7 @@ MAX_NESTING: Final = 25
 REASON_LETTERS: Final = 500
 _NOT_UNDERSTOOD: Final = "the sentence was not understood"
 _NONE_GIVEN: Final[Given] = MappingProxyType({})
-_ONLY_AT_THE_TOP: Final = ("imports", "knowledge", "objects", "people", "robot", "world")
+_ONLY_AT_THE_TOP: Final = ("imports", "knowledge", "objects", "people", "robot", "robots", "world")
 
 
 def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN) -> MissionFile:
@@ -45,6 +45,20 @@ def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN) -> MissionFi
         InputError: with file, line and hint, for broken YAML, unknown keys, wrong values and unknown parameters.
     """
     source = with_parameters(read_yaml(path), parameters)
+    return with_source(validate(MissionFile, source), source)
+
+
+def for_robot(file: MissionFile, robot: str, part: str | None = None) -> MissionFile:
+    """What a mission file has for one robot of several: the part that stands under the name `part`, or all its steps.
+
+    Raises:
+        InputError: with file and line, for a policy that a whole mission cannot have.
+    """
+    if file.source is None:
+        own = None if part is None or file.parts is None else file.parts[part]
+        laid_over = {} if own is None else {key: getattr(own, key) for key in own.model_fields_set - {"after"}}
+        return file.model_copy(update={**laid_over, "robot": robot, "robots": None, "parts": None})
+    source = part_source(file.source, robot, part)
     return with_source(validate(MissionFile, source), source)
 
 
@@ -85,6 +99,10 @@ class _Resolver:
 
     def mission(self, file: MissionFile, chain: tuple[Path, ...]) -> Mission:
         """The mission of a file that the files of `chain` led to, itself the last."""
+        if file.parts is not None:
+            what = "its parts are for several robots, and this is for one"
+            hint = "use `errand run`, and name them: 'robots: {alice: spot, bob: fetch}', or --robots"
+            raise file.error(("parts",), what, hint)
         scope, problems = Scope(file, file.source, chain), Problems()
         steps: tuple[MissionStep, ...] = ()
         whole: Group | None = None
@@ -96,7 +114,7 @@ class _Resolver:
             with problems:
                 self._refuse_unknown(scope, name, parameter)
         with problems:
-            steps = self.steps(scope, file.steps, ("steps",))
+            steps = self.steps(scope, file.steps or (), ("steps",))
         with problems:
             whole = self._whole(scope, file)
         problems.raise_any()

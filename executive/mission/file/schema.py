@@ -43,6 +43,7 @@ from executive.mission.file.model import (
 )
 from executive.mission.file.objects import ObjectFile
 from executive.mission.file.people import RouteFile
+from executive.mission.robots import RobotsFile
 from executive.mission.yaml_source import Name, Text, YamlSource
 from skills.quantities import Duration, bounds, without_range, without_unit
 
@@ -50,6 +51,7 @@ __all__ = [
     "GuardsFile",
     "HandlerFile",
     "MissionFile",
+    "PartFile",
     "PolicyFile",
     "QuestionFile",
     "RoundFile",
@@ -323,15 +325,43 @@ def _short_parameter(value: object) -> object:
 Parameter = Annotated[ParameterFile, BeforeValidator(_short_parameter, json_schema_input_type=ParameterFile | Scalar)]
 
 
+class PartFile(PolicyFile):
+    """What one of several robots does. Its policy, `always`, `while` and `when` replace those at the file's top."""
+
+    after: Name | Annotated[tuple[Name, ...], Field(min_length=1)] | None = Field(
+        None, description="The robot, or the robots, whose parts must be done before this one begins."
+    )
+    steps: Steps = Field(description="What it does, one after the other.")
+    always: Steps | None = Field(
+        None, description="Steps at the end of the part, whatever happened, also when the mission is cancelled."
+    )
+    while_: WhileFile | None = Field(None, alias="while", description="What must hold while the part runs.")
+    when: tuple[HandlerFile, ...] | None = Field(
+        None, description="What interrupts the part, the most important first."
+    )
+
+    @property
+    def first(self) -> tuple[str, ...]:
+        """The robots whose parts must be done before."""
+        return (self.after,) if isinstance(self.after, str) else self.after or ()
+
+
 class MissionFile(PolicyFile):
-    """A mission for one robot in one world. The policy keys at the top are for the whole of it."""
+    """A mission in one world, for one robot or with a part for each of several. The policy keys at the top are for
+    the whole of it, or for each part."""
 
     model_config = ConfigDict(title="Errand mission")
 
     name: Name = Field(description="The mission's name; part of all path ids.")
     description: str | None = Field(None, description="What it is for.")
     world: Name = Field(DEFAULT_WORLD, description="A world by its name or folder.")
-    robot: Name | None = Field(None, description="The robot's name; by default that of the world.")
+    robot: Name | None = Field(
+        None,
+        description="The robot's name; by default that of the world, or of several robots the one that is done first.",
+    )
+    robots: RobotsFile | None = Field(
+        None, description="The robots by name, each as its kind alone or with more; `--robots` replaces them."
+    )
     knowledge: dict[str, Any] | None = Field(
         None, description="Laid over the world's knowledge: what stands here replaces what stands there, key by key."
     )
@@ -358,7 +388,10 @@ class MissionFile(PolicyFile):
     variables: dict[Name, str | StrictBool | StrictInt | Annotated[float, Field(strict=True)]] | None = Field(
         None, description="Values by name, as they are at the beginning; steps change them with `set` and `gives`."
     )
-    steps: Steps = Field(description="What to do, one after the other.")
+    steps: Steps | None = Field(description="What to do, one after the other. Left out where there are `parts`.")
+    parts: Annotated[dict[Name, PartFile], Field(min_length=1)] | None = Field(
+        None, description="What each robot does, by its name, all at the same time."
+    )
     always: Steps | None = Field(
         None, description="Steps at the end, whatever happened, also when the mission is cancelled."
     )
@@ -367,6 +400,18 @@ class MissionFile(PolicyFile):
         None, description="What interrupts the mission, the most important first."
     )
     _source: YamlSource | None = PrivateAttr(default=None)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _parts_are_steps(cls, data: Any) -> Any:
+        """`parts` stand in the place of `steps`."""
+        return {"steps": None, **data} if isinstance(data, dict) and "parts" in data else data
+
+    @model_validator(mode="after")
+    def _steps_or_parts(self) -> MissionFile:
+        if (self.steps is None) == (self.parts is None):
+            raise ValueError("a mission has either 'steps', or 'parts' for several robots")
+        return self
 
     @field_validator("on_failure")
     @classmethod
@@ -414,6 +459,8 @@ def mission_json_schema(inputs: Mapping[str, type] = _NO_SKILLS) -> dict[str, An
     schema = MissionFile.model_json_schema(by_alias=True)
     described: dict[str, Any] = _open_to_parameters(schema)
     step = described["$defs"]["StepFile"]
+    described["required"] = [key for key in described["required"] if key != "steps"]
+    described["anyOf"] = [{"required": [key]} for key in ("steps", "parts")]
     step["anyOf"] = [{"required": [key]} for key in ("say", *COMMAND_KEYS, "skill", "use", *BLOCKS)]
     step["allOf"] = [
         {

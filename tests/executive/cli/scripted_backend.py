@@ -21,7 +21,7 @@ class ScriptedBackend:
     def show_live(self):
         return None
 
-    def judge(self, tree, result):
+    def judge(self, tree, result, *, before=(), since_s=0.0):
         self.asked.append((tree.mission_name, result.outcome))
 
     def attach(self, profile):

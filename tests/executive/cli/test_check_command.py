@@ -53,6 +53,33 @@ def test_values_of_parameters_and_the_start_are_checked(options, why):
     assert (result.exit_code, why in result.stderr) == (2 if why else 0, True)
 
 
+PARTS = """name: x
+robots: {alice: spot, bob: fetch}
+parts:
+  alice: {steps: [{to: kitchen}]}
+  bob: {steps: [{to: %s}]}
+"""
+
+
+def test_the_parts_of_all_robots_are_checked(write):
+    good = json.loads(invoke(write(PARTS % "office"), "--json").stdout)
+    assert [command.split()[3] for command in good["commands"]] == ["[kitchen]", "[office]"]
+    assert invoke(write(PARTS % "ofice")).stderr.count(":5: unknown place or person 'ofice'") == 1
+
+
+def test_robots_that_wait_for_each_other_take_as_long_as_one_after_the_other(write):
+    def estimate(text):
+        return check_command.Checker().check(write(text)).estimate
+
+    robots, _, alice, bob = PARTS.replace("%s", "office").split("\n")[1:5]
+    together = f"name: x\n{robots}\nparts:\n{alice}\n{bob}\n"
+    each = [estimate(f"name: x\n{robots}\nparts:\n{part}\n") for part in (alice, bob)]
+    at_once, in_turn = estimate(together), estimate(together.replace("bob: {steps", "bob: {after: alice, steps"))
+    assert at_once.duration_s == max(one.duration_s for one in each)
+    assert in_turn.duration_s == pytest.approx(sum(one.duration_s for one in each))
+    assert at_once.distance_m == in_turn.distance_m == pytest.approx(sum(one.distance_m for one in each))
+
+
 def test_the_plan_is_shown_on_demand():
     result = invoke(GOOD, "-v")
     assert result.exit_code == 0
@@ -160,3 +187,10 @@ def test_each_file_is_checked_on_its_own(write, monkeypatch):
     told = json.loads(result.stdout.splitlines()[-1])
     assert [(error["file"], "RecursionError" in error["message"]) for error in told["errors"]] == [(str(poison), True)]
     assert told["commands"]
+
+
+def test_a_file_is_checked_for_the_robots_that_are_given(write):
+    heavy = write("name: x\nsteps:\n  - {to: workshop, do: grasp, object: extinguisher}\n")
+    assert invoke(heavy, "--robots", "bob=fetch").exit_code == 0
+    unknown = invoke(heavy, "--robots", "bob=fatch")
+    assert (unknown.exit_code, "unknown kind of robot 'fatch'" in unknown.stderr) == (2, True)

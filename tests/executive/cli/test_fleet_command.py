@@ -27,7 +27,7 @@ def test_a_run_that_was_killed_goes_on_without_what_is_over_and_what_had_changed
     given.progress(begun, 2, None)
     given.progress(stuck, 0, "it was begun")
     assert [each.id for each in _to_do(store)] == [begun, waiting]
-    assert (given.all()[begun].done, given.all()[begun].reassigned) == (2, 1)
+    assert (given.all()[begun].done, given.all()[begun].reassigned) == (2, 0)
     assert store.mission(stuck).message == "the run was broken off, and Alice had begun it"
 
 
@@ -43,3 +43,27 @@ def test_a_fault_is_for_the_robot_named_before_it_else_for_all():
         "Alice": ["lidar: dropout 1 s at 2 s"],
         "Bob": ["robot dies at 20 s", "lidar: dropout 1 s at 2 s"],
     }
+
+
+def split_in_two(store):
+    whole, first, second = (store.add(REQUEST, queued=True).id for _ in range(3))
+    given = GivenMissions(store)
+    given.split(whole, [first, second])
+    store.begin(whole)
+    given.give(first, "Alice")
+    store.begin(first)
+    return whole, first, second
+
+
+def test_a_chain_whose_run_was_killed_goes_on_with_its_parts(store):
+    whole, first, second = split_in_two(store)
+    assert [each.id for each in _to_do(store)] == [first, second]
+    assert store.mission(whole).state is MissionState.RUNNING
+
+
+def test_a_chain_whose_first_part_was_broken_off_for_good_fails_as_a_whole(store):
+    whole, first, second = split_in_two(store)
+    GivenMissions(store).progress(first, 0, "it was begun")
+    with pytest.raises(InputError, match="nothing is queued"):
+        _to_do(store)
+    assert [store.mission(each).state for each in (whole, first, second)] == [MissionState.FAILURE] * 3

@@ -1,5 +1,6 @@
 """A fleet's run with scripted robots: who does what, and what becomes of the mission of a robot that dies."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -9,14 +10,15 @@ from executive.cli.fleet_missions import FleetMission
 from executive.cli.fleet_run import FleetDispatch, run_fleet, told
 from executive.cli.requests import Prepared
 from executive.fleet.auction import Bid
-from executive.mission.command import parse_command
+from executive.mission.command import Command, Task, parse_command
 from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
+from executive.mission.mission import lines_of
 from executive.mission.request import Request
 from executive.run.runner import RunEntry
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
-from skills.api import Running, Succeeded
+from skills.api import Cause, Failed, Running, Succeeded
 from skills.faults.faulty_robot import with_faults
 from skills.robot import Pose2D
 
@@ -33,9 +35,13 @@ class Fleet:
 
     def __init__(self, store, clock, knowledge, registry, make, script, monkeypatch, out):
         self.script = script
-        self.store, self.clock, self.knowledge, self.registry, self.out = store, clock, knowledge, registry, out
+        self.store, self.clock, self.registry, self.out = store, clock, registry, out
+        battery = knowledge.battery.model_copy(update={"low": 0.05})
+        self.knowledge = knowledge.model_copy(update={"battery": battery})
+        self.unable, self.cannot = set(), lambda name, command: False
         self.robots = {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
         self.faults, self.make, self.missions, self.judged = {}, make, {}, []
+        self.shares, self.since_s = [], []
         monkeypatch.setattr(fleet_run, "entry_for", lambda prepared, backend, durable, work: self._entry(prepared))
         monkeypatch.setattr(fleet_run, "bid_for", self._bid)
         monkeypatch.setattr(fleet_missions, "prepared_for", lambda r, mission, *_: self._prepared(r, mission))
@@ -46,12 +52,16 @@ class Fleet:
         return RunEntry(prepared.tree, robot, self.make.StillLocaliser(), self.make.EmptyCostmap())
 
     def _bid(self, mission, name, now):
-        return Bid(mission.stored.id, name, 0.0, 1.0 + 0.5 * ROBOTS.index(name))
+        prepared = mission.options.get(name)
+        commands = () if prepared is None else prepared.tree.commands
+        unable = name in self.unable or any(self.cannot(name, command) for command in commands)
+        problems = ("out of reach",) if unable else ()
+        return Bid(mission.stored.id, name, 0.0, 1.0 + 0.5 * ROBOTS.index(name), problems=problems)
 
     def _prepared(self, request, mission):
         tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
-        world = SimpleNamespace(name="scripted")
-        return Prepared(request, mission, world, self.knowledge, tree)
+        world = SimpleNamespace(name="scripted", dock=START)
+        return Prepared(replace(request, commands=lines_of(tree.steps)), mission, world, self.knowledge, tree)
 
     def queue(self, *lines):
         request = Request(commands=lines, name="work", world_name="scripted")
@@ -61,14 +71,22 @@ class Fleet:
         options = {name: self._prepared(request, mission) for name, mission in missions.items()}
         self.missions[stored.id] = FleetMission(stored, options)
 
-    def judge(self, tree, result):
+    def judge(self, tree, result, *, before, since_s):
         self.judged.append((tree.robot_name, result.outcome.value))
+        self.shares += [(share.tree.robot_name, share.done) for share in before]
+        self.since_s.append(since_s)
 
     def run(self):
         placed = {name: SimpleNamespace(start=START) for name in ROBOTS}
-        run_fleet(FleetDispatch(self.store, dict(self.missions), placed, self), out=self.out, seed=3)
-        rows = told(self.store, list(self.missions))
+        docks = {name: self._docking(name) for name in ROBOTS}
+        dispatch = FleetDispatch(self.store, dict(self.missions), placed, self, docks=docks)
+        run_fleet(dispatch, out=self.out, seed=3)
+        self.rows = rows = told(self.store, list(self.missions))
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
+
+    def _docking(self, name):
+        step = MissionStep((Command(task=Task.CHARGE),))
+        return self._prepared(Request(), Mission("charge", DEFAULT_WORLD, name, (step,)))
 
     def hold(self, skill):
         self.robots[skill.context.robot.name].holding = True
@@ -77,6 +95,10 @@ class Fleet:
     def put_down(self, skill):
         self.robots[skill.context.robot.name].let_go()
         return Succeeded("placed")
+
+    def charge(self, skill):
+        self.robots[skill.context.robot.name].charge = 0.9
+        return Succeeded("charged")
 
     def die_once_after(self, name, skill):
         """The way to a place is the last that a robot does when one has done what `name` says."""
@@ -122,6 +144,7 @@ def test_commands_that_are_done_are_not_done_again_by_the_other(fleet, script, r
     assert fleet.run() == [("Bob", "success", 1)]
     assert (script.begun.count("grasp"), script.begun.count("place")) == (1, 1)
     assert (fleet.robots["Alice"].holding, fleet.robots["Bob"].calls.count("drive")) == (False, script.steps)
+    assert (fleet.judged, fleet.shares, fleet.since_s) == ([("Bob", "success")], [("Alice", 2)], [0.0])
 
 
 def test_what_is_in_the_gripper_of_a_robot_that_dies_is_told_and_not_fetched_again(fleet, script, registry):
@@ -152,3 +175,118 @@ def test_whose_each_mission_is_stands_in_the_store(fleet):
     fleet.run()
     given = GivenMissions(fleet.store).all()[1]
     assert (given.robot, given.done, given.blocked) == ("Alice", 1, None)
+
+
+def test_each_mission_is_judged_from_its_own_beginning(fleet):
+    fleet.queue(KITCHEN)
+    fleet.queue(KITCHEN)
+    fleet.unable = {"Bob"}
+    fleet.run()
+    first_s, second_s = fleet.since_s
+    assert first_s == 0.0 < second_s
+
+
+def test_a_robot_that_is_low_gives_its_mission_back_and_charges(fleet, script):
+    fleet.queue(KITCHEN)
+    fleet.queue(BEDROOM)
+    fleet.robots["Alice"].charge, script.ends["charge"] = 0.1, fleet.charge
+    assert fleet.run() == [("Bob", "success", 1), ("Bob", "success", 0)]
+    assert script.begun.count("charge") == 1
+    assert [robot.holder for robot in fleet.robots.values()] == [None, None]
+
+
+def test_a_robot_that_is_low_puts_down_what_it_holds_before_it_gives_the_rest_back(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT, KITCHEN)
+
+    def hold(skill):
+        fleet.robots["Alice"].charge = 0.1
+        return fleet.hold(skill)
+
+    script.ends.update(grasp=hold, place=fleet.put_down, charge=fleet.charge)
+    assert fleet.run() == [("Bob", "success", 1)]
+    assert (script.begun.count("grasp"), script.begun.count("place")) == (1, 1)
+    assert fleet.shares == [("Alice", 2)]
+
+
+def test_a_mission_that_only_the_low_robot_can_do_goes_on_when_it_has_charged(fleet, script):
+    fleet.queue(KITCHEN)
+    fleet.unable = {"Bob"}
+    fleet.robots["Alice"].charge, script.ends["charge"] = 0.1, fleet.charge
+    assert fleet.run() == [("Alice", "success", 0)]
+    assert script.begun == ["navigate", "navigate", "charge", "navigate"]
+
+
+def test_a_robot_that_gets_no_current_at_its_dock_leaves_its_mission_to_the_other(fleet, script):
+    fleet.queue(KITCHEN)
+    fleet.robots["Alice"].charge = 0.1
+    script.ends["charge"] = lambda skill: Failed(Cause.EXECUTION, "no current")
+    assert fleet.run() == [("Bob", "success", 1)]
+
+
+def test_a_robot_that_is_lost_is_left_out_and_its_mission_done_by_the_other(fleet, script):
+    fleet.queue(KITCHEN)
+    lost = [True]
+
+    def lose(skill):
+        if skill.context.robot.name == "Alice" and lost:
+            skill.context.localiser.localised = False
+            return Failed(Cause.EXECUTION, "lost")
+        return Succeeded("there")
+
+    script.ends["navigate"] = lose
+    script.ends["relocalise"] = lambda skill: Failed(Cause.EXECUTION, "no match")
+    assert fleet.run() == [("Bob", "success", 1)]
+
+
+def only_alice_takes_and_only_bob_goes_to_the_bedroom(name, command):
+    takes_in_kitchen = command.task is Task.GRASP and command.goal == "kitchen"
+    return (name == "Bob" and takes_in_kitchen) or (name == "Alice" and command.goal == "bedroom")
+
+
+@pytest.fixture
+def chain(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    script.ends.update(grasp=fleet.hold, place=fleet.put_down)
+    fleet.cannot = only_alice_takes_and_only_bob_goes_to_the_bedroom
+    fleet.queue(TAKE, PUT)
+    return fleet
+
+
+def test_what_no_robot_can_do_alone_is_handed_over_by_a_table(chain, script):
+    assert chain.run() == [("Bob", "success", 0), ("Alice", "success", 0), ("Bob", "success", 0)]
+    assert [(row["id"], row["part_of"], row["after"]) for row in chain.rows] == [
+        (1, None, None),
+        (2, 1, None),
+        (3, 1, 2),
+    ]
+    first, second = (chain.store.mission(number).request.commands for number in (2, 3))
+    take = first[1].replace("[coke] to", "[Nothing] to").replace("do [Nothing] to [Nothing]", "do [grasp] to [coke]")
+    assert (first[0], second) == (TAKE, (take, PUT))
+    assert (script.begun.count("grasp"), script.begun.count("place")) == (2, 2)
+
+
+def test_a_chain_is_judged_as_a_whole_from_the_beginning_of_its_first_part(chain):
+    chain.run()
+    assert chain.judged == [("Alice", "success"), ("Bob", "success")]
+    assert (chain.shares, chain.since_s) == ([("Alice", 2)], [0.0, 0.0])
+
+
+def test_when_the_first_part_fails_the_second_is_not_begun(chain, script):
+    script.ends["place"] = lambda skill: Failed(Cause.EXECUTION, "slipped")
+    assert [outcome for _, outcome, _ in chain.run()] == ["failure"] * 3
+    assert chain.message(3) == "mission 2, which comes before it, was not done"
+    assert chain.message(1).startswith("mission 2: ")
+
+
+def test_what_no_two_robots_can_do_either_ends_with_the_reason_of_each(chain):
+    chain.cannot = lambda name, command: command.goal == "bedroom"
+    assert chain.run() == [(None, "failure", 0)]
+    assert chain.message(1) == "no robot can do it: Alice: out of reach; Bob: out of reach"
+
+
+def test_what_one_robot_can_do_alone_is_not_split(chain):
+    chain.cannot = lambda name, command: name == "Alice" and command.goal == "bedroom"
+    assert chain.run() == [("Bob", "success", 0)]

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import sys
+import threading
 import time
 from pathlib import Path
 
@@ -29,3 +31,13 @@ def always_die(number: int) -> int:
     if number == 3:
         os.kill(os.getpid(), signal.SIGKILL)
     return number
+
+
+def never_end(number: int) -> None:
+    sys.stdout.write("begun\n")
+    sys.stdout.flush()
+    threading.Event().wait()
+
+
+def divide(number: int) -> float:
+    return 1 / number

@@ -1,6 +1,7 @@
 """Work given out to processes that may die."""
 
 import importlib.util
+import subprocess
 import sys
 from pathlib import Path
 
@@ -37,3 +38,22 @@ def test_what_kills_each_worker_is_given_up_and_takes_nothing_along():
     finished = {one.item: one for one in LocalWorkers(2).give_out(cheap_run.always_die, range(6))}
     assert (finished[3].result, "3 worker processes have died" in finished[3].lost) == (None, True)
     assert [finished[number].result for number in (0, 1, 2, 4, 5)] == [0, 1, 2, 4, 5]
+
+
+ENDLESS = """
+import sys
+sys.path.insert(0, {folder!r})
+import cheap_run
+from executive.evaluation.workers import LocalWorkers
+if __name__ == "__main__":
+    list(LocalWorkers(2).give_out(cheap_run.never_end, range(4)))
+"""
+
+
+def test_workers_end_when_the_process_that_started_them_is_killed(tmp_path):
+    (tmp_path / "endless.py").write_text(ENDLESS.format(folder=str(Path(__file__).parent)))
+    command = [sys.executable, str(tmp_path / "endless.py")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as started:
+        assert started.stdout.readline() == "begun\n"
+        started.kill()
+        started.communicate(timeout=30)  # returns when none of them holds the pipe any more

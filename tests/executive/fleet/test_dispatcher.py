@@ -76,3 +76,17 @@ def test_without_a_robot_nothing_is_refused():
     dispatcher.lose("Alice")
     assert dispatcher.assign(bid_of([10.0])).refused == {}
     assert dispatcher.waiting == (1,)
+
+
+def test_a_mission_that_goes_to_a_robot_that_has_to_charge_waits_until_it_has():
+    dispatcher = Dispatcher([1], ["Alice", "Bob"])
+
+    def bid(mission, robot):
+        return Bid(mission, robot, 0.0, 10.0 if robot == "Alice" else 99.0, charges=robot == "Alice")
+
+    turn = dispatcher.assign(bid)
+    assert (turn.begun, turn.charging, dispatcher.waiting) == ([], ["Alice"], (1,))
+    assert not dispatcher.assign(bid).begun  # Bob is free, and Alice is still done before him
+    dispatcher.wake("Alice")
+    charged = dispatcher.assign(lambda mission, robot: Bid(mission, robot, 0.0, 10.0))
+    assert [(each.mission, each.robot) for each in charged.begun] == [(1, "Alice")]

@@ -215,7 +215,9 @@ def test_of_a_file_only_the_commands_are_lines():
     assert lines_of((MissionStep(block=Repeat((step,), times=2), source=step.source),)) == (str(step.commands[0]),)
 
 
-MISSIONS = sorted((Path(__file__).parents[3] / "missions").glob("*.yaml"))
+MISSIONS = [
+    path for path in sorted((Path(__file__).parents[3] / "missions").glob("*.yaml")) if path.stem != "two_robots"
+]
 
 
 @pytest.mark.parametrize("path", MISSIONS, ids=[path.stem for path in MISSIONS])

@@ -226,3 +226,30 @@ IN_GRIPPER = [
 @pytest.mark.parametrize(("steps", "lines"), IN_GRIPPER)
 def test_what_the_gripper_holds_is_followed_step_by_step(check, steps, lines):
     assert [line for line, _ in told(check(*steps))] == lines
+
+
+PUT = "Take [{}] to [{}] and do [Nothing] to [Nothing]"
+
+
+# what is done at the shelf, which is 1 m high; heights that the arm reaches -> what speaks against it
+@pytest.mark.parametrize(
+    ("commands", "reaches_m", "why"),
+    [
+        ((GET.format("coke"), PUT.format("coke", "shelf")), (0.0, 0.6), "up to 0.60 m"),
+        ((GET.format("coke"), PUT.format("coke", "shelf")), (1.1, 1.6), "down to 1.10 m"),
+        (("Take [Nothing] to [shelf] and do [grasp] to [coke]",), (0.0, 0.6), "up to 0.60 m"),
+        ((GET.format("coke"), PUT.format("coke", "shelf")), (0.0, 1.6), None),
+        ((GO.format("shelf"),), (0.0, 0.6), None),
+    ],
+)
+def test_a_surface_that_is_too_high_or_too_low_for_the_arm_is_told(check, commands, reaches_m, why):
+    messages = [message for _, message in told(check(*commands, abilities=replace(ABLE, reaches_m=reaches_m)))]
+    wanted = [] if why is None else [f"the shelf is 1 m high, and the arm reaches {why}"]
+    assert messages == wanted
+
+
+def test_what_is_wider_than_the_gripper_opens_is_told_unless_another_is_meant_as_well(check):
+    narrow = replace(ABLE, widths_m={"coke": 0.05, "beer": 0.10}, opens_m=0.09)
+    (told_of_beer,) = told(check(GET.format("beer"), abilities=narrow))
+    assert told_of_beer == (1, "'beer' is too wide: 0.1 m, and the gripper takes 0.09 m")
+    assert told(check(GET.format("drink"), abilities=narrow)) == []

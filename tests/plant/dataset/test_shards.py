@@ -5,10 +5,9 @@ from __future__ import annotations
 import errno
 import json
 import shutil
-import subprocess
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +36,7 @@ def no_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def run(out: Path, images: int = 130, seed: int = 4, progress: Callable[[int, int], None] | None = None) -> Summary:
-    return render(out, images=images, seed=seed, jobs=1, progress=progress or (lambda done, total: None))
+    return render(out, images=images, seed=seed, progress=progress or (lambda done, total: None))
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -147,32 +146,16 @@ def test_a_full_disk_is_told_and_leaves_whole_scenes_only(tmp_path: Path, monkey
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(shards, "_write_shot", full)
+    monkeypatch.setattr(shards, "_write_files", full)
     with pytest.raises(DatasetError, match="the disk is full; make room; the same command goes on"):
         run(tmp_path / "set", images=48)
     assert [path.name for path in (tmp_path / "set" / "scenes").iterdir()] == ["000000"]
 
 
-ENDLESS = """
-import sys, threading
-from pathlib import Path
-from plant.dataset import shards
+def test_a_scene_that_nobody_has_rendered_is_told_and_the_others_stay(tmp_path: Path) -> None:
+    def lose_the_second(function: Callable[[int], Mapping[str, bytes]], numbers: list[int]) -> Iterator[Any]:
+        return ((number, None if number == 1 else function(number)) for number in numbers)
 
-def endless(seed, index):
-    print("rendering", flush=True)
-    threading.Event().wait()
-
-shards.render_scene = endless  # in the workers, too: they import this file
-if __name__ == "__main__":
-    shards.render(Path(sys.argv[1]), images=48, seed=1, jobs=2, progress=lambda done, total: None)
-"""
-
-
-def test_processes_end_when_the_one_that_started_them_is_killed(tmp_path: Path) -> None:
-    (tmp_path / "endless.py").write_text(ENDLESS)
-    command = [sys.executable, str(tmp_path / "endless.py"), str(tmp_path / "set")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as started:
-        assert started.stdout is not None
-        assert started.stdout.readline() == "rendering\n"
-        started.kill()
-        started.communicate(timeout=30)  # returns when none of them holds the pipe any more
+    with pytest.raises(DatasetError, match=r"rendered scene 1 were killed; .*goes on where it stopped"):
+        render(tmp_path / "set", images=72, seed=4, progress=lambda done, total: None, give_out=lose_the_second)
+    assert [path.name for path in (tmp_path / "set" / "scenes").iterdir()] == ["000000"]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from plant.fetch.capabilities import fetch_capabilities
 from plant.spot.capabilities import spot_capabilities
 from skills.arm.collision import AROUND, ArmScene, Box
 from skills.arm.kinematics import arm_model
@@ -66,3 +67,26 @@ def test_checks_of_a_scene_do_not_depend_on_those_before(scene: ArmScene) -> Non
     scene.set_boxes(())
     scene.set_boxes([AT_HAND])
     assert [scene.free(q) for q in turns] == first
+
+
+def test_what_is_free_with_the_torso_up_may_touch_once_it_is_down() -> None:
+    fetch = fetch_capabilities()
+    raised_m = fetch.height_range_m[1] - fetch.standing_height_m
+    usual_lift_m = fetch.standing_height_m - fetch.height_range_m[0]
+    model = arm_model(fetch)
+    ahead = model.inverse(RigidTransform([0.6, 0.0, 0.6]))[0]
+    raised = ArmScene(fetch, model, {fetch.lift_joint: usual_lift_m + raised_m})
+    # a box below the hand, through which the arm would go as the torso comes down
+    below = Box(RigidTransform([0.6, 0.0, 0.6 - raised_m]), (0.1, 0.1, 0.1))
+    raised.set_boxes([below])
+    assert raised.free(ahead)
+    assert not raised.free_as_usual(ahead)
+    assert raised.free(ahead)  # asking changes nothing
+    usual = ArmScene(fetch, model, {fetch.lift_joint: usual_lift_m})
+    usual.set_boxes([below])
+    assert usual.free_as_usual(ahead)
+
+
+def test_without_a_lift_free_as_usual_says_nothing_against_it(scene: ArmScene) -> None:
+    scene.set_boxes([AT_HAND])
+    assert scene.free_as_usual(AHEAD)

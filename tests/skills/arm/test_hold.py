@@ -1,9 +1,12 @@
 """What becomes of the object in the gripper, told from readings."""
 
-from skills.arm.hold import Grip, HoldWatch, firmer_n, grip_again
+import pytest
+
+from plant.fetch.capabilities import fetch_capabilities
+from skills.arm.hold import Grip, HoldWatch, firmer_n, grip_again, hold_watch
 from skills.robot import Gripper
 from skills.testing.clock import VirtualClock
-from skills.testing.robot import ScriptedRobot, Start
+from skills.testing.robot import BASE_ONLY, ScriptedRobot, Start
 
 PERIOD_S = 0.05
 
@@ -71,3 +74,19 @@ def test_gripping_again_closes_more_firmly(spot):
     grip_again(robot, 40.0, clock=clock, lease=robot.acquire_lease("test"))
     clock.advance(0.5)
     assert (robot.gripper().force_n, robot.gripper().holding) == (60.0, True)
+
+
+# by how much (m) two fingers close about what they hold -> a slip: that of Spot's finger is 0.05 rad of 1.57
+@pytest.mark.parametrize(("closed_m", "grip"), [(0.002, Grip.HELD), (0.004, Grip.SLIPPING)])
+def test_two_fingers_that_slide_slip_by_millimetres(closed_m, grip):
+    watch = hold_watch(fetch_capabilities())
+    assert judged((0.06, 40.0, True), (0.06 - closed_m, 40.0, True), watch=watch)[-1] is grip
+
+
+def test_two_fingers_that_open_by_a_few_millimetres_let_go():
+    watch = hold_watch(fetch_capabilities())
+    assert judged((0.06, 40.0, True), (0.068, 0.0, False), watch=watch)[-1] is Grip.RELEASED
+
+
+def test_a_finger_that_turns_is_judged_as_usual(spot):
+    assert hold_watch(spot) == HoldWatch() == hold_watch(BASE_ONLY)

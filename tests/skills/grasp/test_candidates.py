@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+from plant.fetch.capabilities import fetch_capabilities
 from plant.spot.capabilities import spot_capabilities
 from skills.arm.kinematics import arm_model
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.grasp.planning import within_reach
 
 MODEL, GRIPPER = arm_model(spot_capabilities()), spot_capabilities().gripper
+TWO_FINGERS = fetch_capabilities().gripper
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -140,3 +142,32 @@ def test_a_can_ahead_is_within_reach_and_one_across_the_room_is_not():
     near, far = (_target(0.066, 0.066, 0.115, is_round=True, x=x) for x in (0.9, 2.0))
     assert any(within_reach(MODEL, candidate, UP) for candidate in grasp_candidates(near, MODEL.p_BS, GRIPPER))
     assert not any(within_reach(MODEL, candidate, UP) for candidate in grasp_candidates(far, MODEL.p_BS, GRIPPER))
+
+
+def _by_two_fingers(target):
+    return grasp_candidates(target, arm_model(fetch_capabilities()).p_BS, TWO_FINGERS)
+
+
+def test_two_fingers_close_about_the_middle_of_a_can():
+    can = _target(0.066, 0.066, 0.115, is_round=True)
+    best = _by_two_fingers(can)[0]
+    x, _, z = best.X_BH.inverse() @ np.array([0.85, 0.0, 0.2 + 0.06])
+    assert abs(best.X_BH.rotation().matrix()[2, 2]) < 1e-9  # the gripper closes level
+    assert z == pytest.approx(0.0, abs=1e-9)
+    assert TWO_FINGERS.palm_x_m + 0.033 < x < TWO_FINGERS.tip_x_m + 0.01
+
+
+# object -> both fingertips end as high over the surface, under the object's top
+@pytest.mark.parametrize("target", [_wrench(0.3), _hammer(0.6), _target(0.05, 0.05, 0.05)])
+def test_two_fingers_straight_from_above_end_level_at_what_lies(target):
+    straight = [each for each in _by_two_fingers(target) if each.X_BH.rotation().matrix()[2, 0] < -0.999]
+    assert straight
+    for each in straight:
+        half_m = 0.5 * each.width_m
+        one, other = ((each.X_BH @ [TWO_FINGERS.tip_x_m, 0.0, z])[2] - target.base_m for z in (half_m, -half_m))
+        assert one == pytest.approx(other, abs=1e-6)
+        assert 0.0 < one < target.height_m
+
+
+def test_what_is_as_wide_as_two_fingers_open_is_not_taken():
+    assert _by_two_fingers(_target(0.12, TWO_FINGERS.max_grasp_m + 0.01, 0.12)) == []

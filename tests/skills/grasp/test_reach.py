@@ -8,12 +8,12 @@ import pytest
 from pydrake.math import RigidTransform
 from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 
-from skills.api import ObjectObservation, Thing
+from skills.api import ObjectObservation, Surface, Thing
 from skills.arm.collision import ArmScene, Box
 from skills.grasp.candidates import hand_rotation
 from skills.grasp.in_hand import turned_in_hand
 from skills.grasp.planning import GeometricGraspPlanner
-from skills.grasp.reach import ReachCheck, body_heights_m, space_about
+from skills.grasp.reach import ReachCheck, body_heights_m, resting_on, space_about
 from skills.robot import Pose2D
 
 CANDIDATES = partial(GeometricGraspPlanner().candidates, p_BS=MODEL.p_BS, gripper=GRIPPER)
@@ -99,3 +99,15 @@ def test_the_arm_at_the_best_grasp_goes_from_the_shoulder_to_the_object():
 def test_without_a_grasp_the_arm_goes_nowhere():
     wall = Box(RigidTransform([0.7, 0.0, 0.2]), (0.04, 2.0, 2.0))
     assert len(_check([wall]).arm_W(HERE.transform, (USUAL_M,))) == 0
+
+
+# where a can of 0.115 m on a table of 0.70 m seems to stand -> where it does
+@pytest.mark.parametrize(("seen_m", "stands_m"), [(0.745, 0.7575), (0.7575, 0.7575), (0.78, 0.78)])
+def test_what_seems_to_be_sunk_into_its_surface_rests_on_it(seen_m, stands_m):
+    table = Surface("table", ((0.7, -0.5), (1.3, -0.5), (1.3, 0.5), (0.7, 0.5)), 0.70)
+    shelf = replace(table, name="shelf", height_m=1.5)
+    assert resting_on(replace(CAN, position_W=(0.9, 0.1, seen_m)), [table, shelf]).position_W == (0.9, 0.1, stands_m)
+
+
+def test_what_lies_on_no_surface_that_is_known_stays_where_it_was_seen():
+    assert resting_on(CAN, ()) == CAN

@@ -12,7 +12,7 @@ import pytest
 from executive.run.traffic import TrafficTable
 from skills.api import LocalisationEstimate, SkillContext
 from skills.navigate.footprint import Footprint
-from skills.navigate.giving_way import GivingWay, GivingWayOptions, first_that_suits, reachable, with_bodies
+from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions, first_that_suits, reachable, with_bodies
 from skills.robot import FloatArray, Pose2D, Robot
 from skills.stack import LocalController
 
@@ -75,10 +75,17 @@ def test_places_are_reached_through_a_door_and_nearest_first() -> None:
 
 def test_the_first_place_that_suits_is_taken() -> None:
     """None where none suits."""
-    cells = [(0, 0), (0, 3), (3, 3)]
-    found = first_that_suits(cells, lambda row, column: Pose2D(column, row, 0.0) if row else None)
-    assert found == Pose2D(3, 3, 0.0)
-    assert first_that_suits(cells, lambda row, column: None) is None
+    places = np.column_stack([np.arange(500.0), np.zeros(500)])
+
+    def beyond(x_m: float) -> Pose2D | None:
+        def suits(some: FloatArray) -> Pose2D | None:
+            good = some[some[:, 0] > x_m]
+            return Pose2D(float(good[0, 0]), 0.0, 0.0) if len(good) else None
+
+        return first_that_suits(places, suits)
+
+    assert beyond(298.5) == Pose2D(299.0, 0.0, 0.0)
+    assert beyond(600.0) is None
 
 
 class StraightOn:
@@ -103,7 +110,9 @@ def among(name: str) -> tuple[GivingWay, Footprint]:
     y = np.arange(-2.0, 2.0, 0.05)
     table.announce("alice", np.column_stack([np.full(80, 3.0), y, np.full(80, np.pi / 2.0)]), FOOTPRINT.discs)
     context = SimpleNamespace(traffic=table.view_of(name), clock=SimpleNamespace(now=lambda: 0.0))
-    return GivingWay(cast(SkillContext, context), GivingWayOptions()), FOOTPRINT
+    giving = GivingWay(cast(SkillContext, context), GivingWayOptions())
+    giving.begin()
+    return giving, FOOTPRINT
 
 
 def test_a_robot_stops_short_of_a_way_that_is_reserved() -> None:
@@ -120,10 +129,12 @@ def test_a_robot_in_a_reserved_way_finds_a_place_off_it() -> None:
     | (3, 0) | yes | at least 0.25 m off the way |
     | (0, 0) | no | - |"""
     giving, footprint = among("bob")
-    assert giving.stands_in_way(Pose2D(3.0, 0.0, 0.0), footprint)
-    assert not giving.stands_in_way(Pose2D(0.0, 0.0, 0.0), footprint)
+    assert giving.in_whose_way(Pose2D(3.0, 0.0, 0.0), footprint) == ["alice"]
+    assert giving.in_whose_way(Pose2D(0.0, 0.0, 0.0), footprint) == []
     place = giving.waiting_place(Open(), footprint, Pose2D(3.0, 0.0, 0.0))
-    assert place is not None and not giving.stands_in_way(place, footprint)
+    assert place is not None and not giving.in_whose_way(place, footprint)
+    other = giving.waiting_place(Open(), footprint, Pose2D(3.0, 0.0, 0.0), tried=(place,))
+    assert other is not None and np.hypot(other.x_m - place.x_m, other.y_m - place.y_m) > 0.6
 
 
 def test_a_goal_that_is_wished_for_is_reserved() -> None:
@@ -133,6 +144,41 @@ def test_a_goal_that_is_wished_for_is_reserved() -> None:
     table.heard("bob", Pose2D(6.0, 0.0, 0.0))
     views = [SimpleNamespace(traffic=table.view_of(name), clock=None) for name in ("alice", "bob")]
     alice, bob = (GivingWay(cast(SkillContext, view), GivingWayOptions()) for view in views)
+    alice.begin()
+    bob.begin()
     alice.wish(Pose2D(0.0, 0.0, 0.0), Pose2D(6.0, 0.0, 0.0), FOOTPRINT)
-    assert bob.stands_in_way(Pose2D(6.0, 0.0, 0.0), FOOTPRINT)
-    assert not bob.stands_in_way(Pose2D(9.0, 0.0, 0.0), FOOTPRINT)
+    assert bob.in_whose_way(Pose2D(6.0, 0.0, 0.0), FOOTPRINT)
+    assert not bob.in_whose_way(Pose2D(9.0, 0.0, 0.0), FOOTPRINT)
+
+
+@pytest.mark.parametrize(
+    ("bob_goes", "bob_idle", "less", "clearance_m"),
+    [(True, False, Avoided.WORKING, 5.0), (False, True, Avoided.WORKING, 5.0), (False, False, None, None)],
+)
+def test_who_clears_a_reserved_way_is_no_obstacle_to_a_plan_that_found_none(
+    bob_goes: bool, bob_idle: bool, less: Avoided | None, clearance_m: float | None
+) -> None:
+    """| bob | alice, who goes first, plans instead |
+    | goes later | through where he stands |
+    | has nothing to do | through where he stands |
+    | works where he stands | nothing else |"""
+    table = TrafficTable({"alice": FOOTPRINT.discs, "bob": FOOTPRINT.discs}, lambda: 0.0)
+    table.heard("alice", Pose2D(0.0, 0.0, 0.0))
+    table.heard("bob", Pose2D(2.0, 0.0, 0.0))
+    views = [SimpleNamespace(traffic=table.view_of(name), clock=None) for name in ("alice", "bob")]
+    alice, bob = (GivingWay(cast(SkillContext, view), GivingWayOptions()) for view in views)
+    alice.begin()
+    if bob_goes:
+        bob.begin()
+    table.rest("bob", idle=bob_idle)
+    assert alice.less(Avoided.WAYS) is less
+    at_bob = np.array([[2.0, 0.0]])
+    assert alice.costmap(Open(), Avoided.BODIES).clearance_m(at_bob)[0] < 0.0
+    if less is not None:
+        assert alice.costmap(Open(), less).clearance_m(at_bob) == pytest.approx([clearance_m])
+
+
+def test_a_body_is_covered_to_its_corners() -> None:
+    """The corner of an oblong lies beyond its round middle, and counts as well."""
+    costmap = with_bodies(Open(), [(FOOTPRINT.discs, np.zeros((1, 3)))])
+    assert costmap.clearance_m(np.array([[0.65, 0.25]])) == pytest.approx([0.1], abs=0.02)

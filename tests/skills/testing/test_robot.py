@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from plant.fetch.capabilities import HEAD_CAMERA, fetch_capabilities
 from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
 from skills.testing.blocks import ROOM, TABLE_CAN, Block, can_at
 from skills.testing.clock import VirtualClock
@@ -188,3 +189,26 @@ def test_it_starts_where_it_is_told(clock):
 def test_equal_seeds_give_equal_scans(clock):
     one, two = (ScriptedRobot(clock, blocks=[*ROOM, TABLE_CAN], seed=4) for _ in range(2))
     assert np.array_equal(one.scan().ranges_m, two.scan().ranges_m, equal_nan=True)
+
+
+def test_a_head_turns_its_camera(clock):
+    robot = ScriptedRobot(clock, capabilities=fetch_capabilities(), blocks=ROOM)
+    lease = robot.acquire_lease("test")
+    ahead = robot.image(HEAD_CAMERA)
+    command = robot.point_head(0.5, 0.3, until_s=2.0, lease=lease)
+    clock.advance(0.1)
+    assert robot.command_status(command).state is CommandState.DONE
+    turned = robot.image(HEAD_CAMERA)
+    axes = [each.frames.pose(each.camera_frame).rotation().matrix()[:, 2] for each in (ahead, turned)]
+    assert axes[0] == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
+    assert math.atan2(axes[1][1], axes[1][0]) == pytest.approx(0.5)
+    assert math.asin(-axes[1][2]) == pytest.approx(0.3)
+
+
+def test_a_head_does_not_turn_beyond_its_range_nor_where_there_is_none(clock, robot):
+    head = ScriptedRobot(clock, capabilities=fetch_capabilities())
+    refused = head.point_head(3.0, 0.0, until_s=2.0, lease=head.acquire_lease("test"))
+    assert "cannot turn to pan 3.00" in head.command_status(refused).reason
+    assert head.head_rad == (0.0, 0.0)
+    refused = robot.point_head(0.0, 0.0, until_s=2.0, lease=robot.acquire_lease("test"))
+    assert robot.command_status(refused).reason == "there is no head"

@@ -7,7 +7,7 @@ import pytest
 
 from executive.language import load_parser
 from executive.mission.file.overrides import overridden
-from executive.mission.file.resolve import load_mission, mission_from_file
+from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
 from executive.mission.knowledge import load_knowledge
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
@@ -43,8 +43,10 @@ def compile_file(parser, flat, skills):
     def compile_path(path):
         loaded = load_mission(path)
         knowledge = overridden(loaded, flat)
-        mission = mission_from_file(loaded, parser=parser, knowledge=knowledge)
-        return compile_mission(mission, knowledge=knowledge, registry=skills)
+        parts = [for_robot(loaded, name, name) for name in loaded.parts or ()] or [loaded]
+        missions = [mission_from_file(part, parser=parser, knowledge=knowledge) for part in parts]
+        trees = [compile_mission(mission, knowledge=knowledge, registry=skills) for mission in missions]
+        return trees[0]
 
     return compile_path
 

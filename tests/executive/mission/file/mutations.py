@@ -70,7 +70,9 @@ def rename_key(text, rng):
 
 
 def delete_required(text, rng):
-    return changed(text, rng, lambda p, v: p in (("name",), ("steps",)), lambda node, key, rng: node.pop(key))
+    return changed(
+        text, rng, lambda p, v: p in (("name",), ("steps",), ("parts",)), lambda node, key, rng: node.pop(key)
+    )
 
 
 def delete_half_of_a_pair(text, rng):
@@ -143,15 +145,21 @@ def unknown_parameter(text, rng):
     return changed(text, rng, lambda p, v: isinstance(v, str), replace)
 
 
+def steps_of(data):
+    """The steps of a file, or of its first part."""
+    return next(iter(data["parts"].values()))["steps"] if "parts" in data else data["steps"]
+
+
 def empty_step(text, rng):
     data = yaml.safe_load(text)
-    data["steps"].insert(int(rng.integers(len(data["steps"]) + 1)), chosen(rng, [{}, None, "go", 3, [], {"with": {}}]))
+    steps = steps_of(data)
+    steps.insert(int(rng.integers(len(steps) + 1)), chosen(rng, [{}, None, "go", 3, [], {"with": {}}]))
     return yaml.safe_dump(data, sort_keys=False).encode()
 
 
 def uses_itself(text, rng):
     data = yaml.safe_load(text)
-    data["steps"].append({"use": "mission.yaml"})
+    steps_of(data).append({"use": "mission.yaml"})
     data.pop("parameters", None)
     return yaml.safe_dump(data, sort_keys=False).encode()
 

@@ -3,7 +3,7 @@
 import pytest
 
 from executive.mission.file.overrides import overridden
-from executive.mission.file.resolve import load_mission, mission_from_file
+from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Succeeded
@@ -12,8 +12,8 @@ NAMES = (
     "beer_else_coke", "charge_then_go", "check_hammer", "clear_table", "count_drinks", "deliver", "fetch_drink",
     "find_hammer", "go_living_room", "go_to_pose", "guarded_delivery", "guarded_round", "hammer_to_kitchen",
     "look_and_approach", "patrol", "patrol_and_report", "retry_elsewhere", "speak_while_driving",
-    "take_beer_to_bedroom", "tea_or_coffee", "tidy_cube", "tidy_table", "timed_visit", "two_drinks", "visit_room",
-    "wait_for_button", "watch_the_door", "welcome",
+    "take_beer_to_bedroom", "tea_or_coffee", "tidy_cube", "tidy_table", "timed_visit", "two_drinks", "two_robots",
+    "visit_room", "wait_for_button", "watch_the_door", "welcome",
 )  # fmt: skip
 SURFACES_WITH_THINGS = ("kitchen counter", "kitchen table", "workbench", "tool trolley")
 
@@ -56,8 +56,9 @@ def run_mission(parser, flat, skills, run_tree, script, missions, make):
     script.ends["check_door"] = lambda skill: Succeeded("open", {"open": True, "free_m": 0.9})
     registry = {name: scripted(name, skill) for name, skill in skills.items()}
 
-    def run_file(name):
+    def run_file(name, part=None):
         loaded = load_mission(next(path for path in missions if path.stem == name))
+        loaded = loaded if part is None else for_robot(loaded, "Alice", part)
         knowledge = overridden(loaded, flat)
         mission = mission_from_file(loaded, parser=parser, knowledge=knowledge)
         return run_tree(compile_mission(mission, knowledge=knowledge, registry=registry)).robots[0]
@@ -65,16 +66,25 @@ def run_mission(parser, flat, skills, run_tree, script, missions, make):
     return run_file
 
 
-@pytest.mark.parametrize("name", NAMES)
+FOR_SEVERAL = ("two_robots",)
+FOR_ONE = tuple(name for name in NAMES if name not in FOR_SEVERAL)
+
+
+@pytest.mark.parametrize("name", FOR_ONE)
 def test_it_compiles_with_the_real_skills(compile_file, missions, name):
     tree = compile_file(next(path for path in missions if path.stem == name))
     assert tree.parts
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", FOR_ONE)
 def test_it_runs_to_success_with_scripted_skills(run_mission, name):
     result = run_mission(name)
     assert result.outcome is Outcome.SUCCESS, result.message
+
+
+@pytest.mark.parametrize("part", ["alice", "bob"])
+def test_a_part_for_one_of_two_robots_runs_to_success(run_mission, part):
+    assert run_mission("two_robots", part).outcome is Outcome.SUCCESS
 
 
 def test_a_look_comes_to_its_end_before_what_it_decides_is_done(run_mission, script):

@@ -1,0 +1,138 @@
+"""Robots without work in a run of several: each stands where it is, and clears ways that others reserve."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+
+from executive.run.session import Session
+from executive.run.traffic import TrafficTable
+from executive.run.watchdog import VerbHung, Watchdog
+from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
+from skills.api import Running, SkillContext
+from skills.navigate.giving_way import GivingWay
+from skills.navigate.skill import Navigate, NavigateInputs
+
+__all__ = ["Resting", "SteppingAside"]
+
+_LOOK_S = 0.5
+
+
+class SteppingAside:
+    """Drives one robot to a waiting place whenever it stands in a way that another has reserved. It stays there."""
+
+    def __init__(self, context: SkillContext) -> None:
+        self._context, self._skill = context, Navigate(context)
+        self._giving = GivingWay(context, self._skill.options.giving_way)
+        self._due_s = context.clock.now()
+        self._drives = False
+        self.moved = False
+
+    def step(self) -> None:
+        """One tick. Raises what the robot's verbs raise."""
+        if not self._drives:
+            self._begin_where_asked()
+        elif not isinstance(self._skill.step(), Running):
+            self.end()
+
+    def end(self) -> None:
+        """Stand. Idempotent; raises what the robot's verbs raise."""
+        if self._drives:
+            self._drives = False
+            self._due_s = self._context.clock.now() + _LOOK_S
+            self._skill.end()
+
+    def _begin_where_asked(self) -> None:
+        """Set off where somebody who goes first needs the place, and there is another to go to."""
+        if self._context.clock.now() < self._due_s or not self._context.localiser.estimate().localised:
+            return
+        self._due_s = self._context.clock.now() + _LOOK_S
+        here, footprint = self._context.pose(), self._skill.outline()
+        if not self._giving.in_whose_way(here, footprint):
+            return
+        place = self._giving.waiting_place(self._context.costmap, footprint, here)
+        if place is not None:
+            self._skill = Navigate(self._context)
+            self._skill.begin(NavigateInputs(place))
+            self._drives = self.moved = True
+
+
+@dataclass
+class _Robot:
+    session: Session
+    aside: SteppingAside
+    own_lease: bool
+
+
+@dataclass
+class Resting:
+    """The robots of a run that have no work now: they wait for their turn, or are done.
+
+    `sense` brings a robot's estimators up to date. A robot whose verbs fail is left alone from then on.
+    """
+
+    table: TrafficTable
+    watchdog: Watchdog
+    tick_limit_s: float
+    sense: Callable[[Session], None]
+    stepped_aside: set[str] = field(default_factory=set)
+    _robots: dict[str, _Robot] = field(default_factory=dict)
+
+    def wait(self, session: Session) -> None:
+        """A robot whose mission has not begun; the run senses for it."""
+        if session.name not in self._robots:
+            self._begin(session, session.context, own_lease=False)
+
+    def rest(self, session: Session) -> None:
+        """A robot whose mission is over, and whose lease was given back; it is sensed for as well."""
+        self._guarded(session, lambda: self._begin(session, session.rest(), own_lease=True))
+
+    def leave(self, name: str) -> None:
+        """The robot has work again, or the run is over. Idempotent; raises nothing."""
+        robot = self._robots.pop(name, None)
+        if robot is None:
+            return
+        self.table.rest(name, idle=False)
+        if robot.aside.moved and robot.own_lease:
+            self.stepped_aside.add(name)
+        self._guarded(robot.session, robot.aside.end)
+        if robot.own_lease:
+            self.table.release(name)
+            self._guarded(robot.session, robot.session.leave)
+
+    def close(self) -> None:
+        """The run is over."""
+        for name in tuple(self._robots):
+            self.leave(name)
+
+    def tick(self, held: Callable[[str], bool]) -> None:
+        """One tick of all, in the order of their names; those that are held stand."""
+        for name, robot in sorted(self._robots.items()):
+            step = partial(self._step, robot, hold=held(name))
+            with self.watchdog.over_tick(name, self.tick_limit_s):
+                if not self._guarded(robot.session, step):
+                    self.leave(name)
+
+    def _begin(self, session: Session, context: SkillContext, *, own_lease: bool) -> None:
+        self._robots[session.name] = _Robot(session, SteppingAside(context), own_lease)
+        self.table.rest(session.name, idle=True)
+
+    def _step(self, robot: _Robot, *, hold: bool) -> None:
+        if robot.own_lease:
+            self.sense(robot.session)
+        if hold:
+            robot.aside.end()
+        else:
+            robot.aside.step()
+
+    def _guarded(self, session: Session, call: Callable[[], None]) -> bool:
+        """Whether the call went well; what it raised goes to the log."""
+        try:
+            call()
+        except (Exception, VerbHung):
+            trace = traceback.format_exc()
+            session.context.publish(ERROR_TOPIC, {"node": session.name, "what": "resting", "traceback": trace})
+            return False
+        return True

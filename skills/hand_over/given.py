@@ -1,0 +1,103 @@
+"""Whether somebody has what was held out to them: what a camera shows where it was let go of, and below."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.perception.class_forms import PERSON
+from skills.perception.detection_3d import Detection3D
+from skills.perception.point_cloud import camera_pose_W
+from skills.robot import FloatArray, Image
+
+_TALL_M, _UPPER_PART, _ABOVE_TOP_M = 0.05, 0.5, 0.06
+_BESIDE_M, _LEAST_POINTS = 0.12, 12
+_TAKEN_WITHIN_M, _LOWER_M, _FLOOR_M, _FELL_WITHIN_M = 0.35, 0.35, 0.3, 1.0
+
+
+class Seen(enum.Enum):
+    """What a picture shows of an object that was let go of."""
+
+    GIVEN = "given"  # it is where it was let go of, or a little lower: somebody bears it
+    FELL = "fell"  # it lies near the floor
+    NOT_SEEN = "not seen"  # neither
+
+
+@dataclass(frozen=True)
+class Release:
+    """Where an object is let go of, in the world (m): its middle, its lowest and its highest point."""
+
+    x_m: float
+    y_m: float
+    low_m: float
+    top_m: float
+
+    @property
+    def p_W(self) -> FloatArray:
+        """The middle (3,)."""
+        return np.array([self.x_m, self.y_m, 0.5 * (self.low_m + self.top_m)])
+
+    def state(self) -> Mapping[str, float]:
+        """The same as JSON values."""
+        return asdict(self)
+
+
+def release_of(X_WH: RigidTransform, p_HT: FloatArray, corners_H: FloatArray | None) -> Release:
+    """Where a hand lets go of what it holds about p_HT (3,); corners_H (8, 3) are those of a box about it, if known."""
+    points_W = X_WH.rotation().matrix() @ (p_HT[None, :] if corners_H is None else corners_H).T
+    heights_m = points_W[2] + X_WH.translation()[2]
+    x_m, y_m, _ = X_WH @ p_HT
+    return Release(float(x_m), float(y_m), float(heights_m.min()), float(heights_m.max()))
+
+
+def seen_given(
+    image: Image, X_WO: RigidTransform, found: Iterable[Detection3D], names: Sequence[str], release: Release
+) -> Seen:
+    """What a picture without the robot's arm and the objects detected in it show of what was let go of.
+
+    An object counts as given when one of its class is near where it was let go of, or when something reaches as high
+    there as the upper half of it did; what is flat is known by its class only. Where `names` is empty, any class but
+    that of people is its own.
+    """
+    own = [each for each in found if (each.class_name in names if names else each.class_name != PERSON)]
+    off_m = [float(np.hypot(each.position_W[0] - release.x_m, each.position_W[1] - release.y_m)) for each in own]
+    heights_m = [float(each.position_W[2]) for each in own]
+    near = zip(off_m, heights_m, strict=True)
+    if any(off < _TAKEN_WITHIN_M and height > max(release.low_m - _LOWER_M, _FLOOR_M) for off, height in near):
+        return Seen.GIVEN
+    if stands_at(image, X_WO, release):
+        return Seen.GIVEN
+    low = zip(off_m, heights_m, strict=True)
+    return Seen.FELL if any(off < _FELL_WITHIN_M and height <= _FLOOR_M for off, height in low) else Seen.NOT_SEEN
+
+
+def stands_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
+    """Whether a picture's depth shows something as high as the upper half of a tall object where it was let go of."""
+    tall_m = release.top_m - release.low_m
+    if tall_m < _TALL_M:
+        return False
+    lens, depth = image.depth_intrinsics, image.depth_m
+    v, u = np.nonzero((depth > 0.0) & np.isfinite(depth))
+    z = depth[v, u].astype(np.float64)
+    points_C = np.column_stack([(u - lens.cx) / lens.fx * z, (v - lens.cy) / lens.fy * z, z])
+    X_WC = camera_pose_W(image, X_WO)
+    p_W = points_C @ X_WC.rotation().matrix().T + X_WC.translation()
+    beside_m = np.hypot(p_W[:, 0] - release.x_m, p_W[:, 1] - release.y_m)
+    high = (p_W[:, 2] > release.low_m + _UPPER_PART * tall_m) & (p_W[:, 2] < release.top_m + _ABOVE_TOP_M)
+    return int(np.count_nonzero((beside_m < _BESIDE_M) & high)) >= _LEAST_POINTS
+
+
+def names_in(thing: str, class_names: Iterable[str]) -> tuple[str, ...]:
+    """The classes that a text such as "red wrench" names."""
+    words = thing.split()
+    return tuple(name for name in class_names if name in words)
+
+
+def release_from(state: Mapping[str, Any]) -> Release:
+    """What `Release.state` gave."""
+    return Release(**{name: float(value) for name, value in state.items()})

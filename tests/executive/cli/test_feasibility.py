@@ -1,0 +1,29 @@
+"""What the kinds of robots are able to, as far as is known before a mission."""
+
+import pytest
+
+from executive.cli.feasibility import abilities_of, reached_heights_m
+from plant.kinds import robot_kind
+from skills.testing.robot import BASE_ONLY
+
+
+@pytest.mark.parametrize("kind", ["spot", "fetch"])
+def test_both_kinds_reach_the_floor_and_a_counter_but_not_the_ceiling(kind):
+    low_m, high_m = reached_heights_m(robot_kind(kind).capabilities())
+    assert low_m < 0.02
+    assert 0.9 < high_m < 2.2
+
+
+def test_a_torso_on_a_lift_reaches_higher_than_legs():
+    assert abilities_of("fetch").reaches_m[1] > abilities_of("spot").reaches_m[1] + 0.2
+
+
+def test_without_an_arm_no_height_is_said():
+    assert reached_heights_m(BASE_ONLY) == (float("-inf"), float("inf"))
+
+
+def test_the_payload_and_the_gripper_are_those_of_the_kind():
+    for kind in ("spot", "fetch"):
+        capabilities = robot_kind(kind).capabilities()
+        able = abilities_of(kind)
+        assert (able.lift_kg, able.opens_m) == (capabilities.arm.max_payload_kg, capabilities.gripper.max_grasp_m)

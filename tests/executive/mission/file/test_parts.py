@@ -1,0 +1,129 @@
+"""Mission files for several robots: what each of them is to do, and where the file says so."""
+
+import pytest
+
+from executive.mission.errors import InputError
+from executive.mission.file.overrides import overridden
+from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
+from executive.mission.robots import RobotSetup, robots_in
+from skills.robot import Pose2D
+
+KINDS = ("fetch", "spot")
+FILE = """name: two
+robots:
+  alice: spot
+  bob: {kind: fetch, at: [1, 2.5, 0], dock: office, stack: own.yaml}
+parameters: {room: kitchen}
+each: {retries: 2}
+timeout: 100
+always:
+  - speak: Done.
+parts:
+  alice:
+    steps:
+      - to: ${room}
+  bob:
+    after: alice
+    timeout: 50
+    always:
+      - to: hall
+    steps:
+      - repeat: {for_each: [office, bedroom], as: where}
+        steps:
+          - to: ${where}
+"""
+
+
+@pytest.fixture
+def load(tmp_path):
+    def of(text=FILE, **given):
+        (tmp_path / "mission.yaml").write_text(text, encoding="utf-8")
+        return load_mission(tmp_path / "mission.yaml", given)
+
+    return of
+
+
+@pytest.fixture
+def part(load, parser, flat):
+    """The mission of one robot."""
+
+    def of(name, text=FILE, **given):
+        return mission_from_file(for_robot(load(text, **given), name.title(), name), parser=parser, knowledge=flat)
+
+    return of
+
+
+def test_robots_stand_in_the_file_with_what_they_begin_with(load, tmp_path):
+    loaded = load()
+    setups = robots_in(loaded.robots, KINDS, loaded.source)
+    own = RobotSetup("fetch", Pose2D(1.0, 2.5, 0.0), "office", tmp_path / "own.yaml")
+    assert setups == {"alice": RobotSetup("spot"), "bob": own}
+    assert (setups["bob"].source.file.name, setups["bob"].source.line) == ("mission.yaml", 4)
+
+
+def test_each_robot_has_its_steps(part):
+    alice, bob = part("alice", room="hall"), part("bob")
+    assert (alice.robot_name, bob.robot_name) == ("Alice", "Bob")
+    assert [command.goal for command in alice.commands] == ["hall"]
+    assert [step.commands[0].goal for step in bob.walk() if step.commands] == ["office", "bedroom", "hall"]
+
+
+def test_what_stands_at_the_top_is_for_each_part_that_says_nothing_else(part):
+    alice, bob = part("alice"), part("bob")
+    assert (alice.policy.timeout_s, bob.policy.timeout_s) == (100.0, 50.0)
+    assert alice.steps[0].policy.retries == 2
+    assert [str(step.block) != "None" for step in alice.whole.always] == [True]
+    assert [step.commands[0].goal for step in bob.whole.always] == ["hall"]
+
+
+def test_an_error_in_a_part_has_its_own_line(part):
+    with pytest.raises(InputError) as error:
+        part("bob", FILE.replace("to: hall", "to: hal"))
+    assert (error.value.line, "'hal'" in str(error.value)) == (18, True)
+
+
+PARTS = "parts: {alice: {steps: [{to: hall}]}}\n"
+# The rest of a file with the name x; the line of the error, and what it says.
+REFUSED = [
+    ("robots: {}\nsteps: [{to: hall}]\n", 2, "robots: should not be empty"),
+    ("robots: {alice: {at: [1, 2, 0]}}\n" + PARTS, 2, "key 'kind' is missing in robots.alice"),
+    ("robots: {alice: {kind: spot, at: [1, 2]}}\n" + PARTS, 2, "robots.alice.at: it should have more parts than 2"),
+    ("robots: {alice: {kind: spot, speed: 1}}\n" + PARTS, 2, "unknown key 'speed'"),
+    ("steps: [{to: hall}]\n" + PARTS, 1, "either 'steps', or 'parts'"),
+    ("parts: {}\n", 2, "parts: should not be empty"),
+    ("parts: {alice: {after: bob}}\n", 2, "key 'steps' is missing in parts.alice"),
+    ("parts:\n  alice:\n    robot: bob\n    steps: [{to: hall}]\n", 4, "unknown key 'robot'"),
+]
+
+
+@pytest.mark.parametrize(("text", "line", "words"), REFUSED)
+def test_what_is_wrong_with_robots_and_parts_is_told_with_its_line(load, text, line, words):
+    with pytest.raises(InputError) as error:
+        load(f"name: x\n{text}")
+    assert (error.value.line, words in str(error.value)) == (line, True), str(error.value)
+
+
+NAMED = [
+    ("alice: spot\n  Alice: fetch", 4, "'alice' and 'Alice' are the same name"),
+    ("alice: spot\n  bob: ftch", 4, "unknown kind of robot 'ftch'; did you mean 'fetch'?"),
+    ("everyone: spot", 3, "calls all robots"),
+]
+
+
+@pytest.mark.parametrize(("robots", "line", "words"), NAMED)
+def test_robots_that_cannot_be_are_refused_with_their_line(load, robots, line, words):
+    loaded = load(f"name: x\nrobots:\n  {robots}\nsteps: [{{to: hall}}]\n")
+    with pytest.raises(InputError) as error:
+        robots_in(loaded.robots, KINDS, loaded.source)
+    assert (error.value.line, words in str(error.value)) == (line, True), str(error.value)
+
+
+def test_a_file_with_parts_is_no_mission_for_one_robot(load, parser, flat):
+    with pytest.raises(InputError, match="its parts are for several robots"):
+        mission_from_file(load(), parser=parser, knowledge=flat)
+
+
+def test_the_robots_do_not_stand_in_the_knowledge(load, flat):
+    loaded = load("name: x\nknowledge: {robots: {alice: spot}}\nsteps: [{to: hall}]\n")
+    with pytest.raises(InputError, match="write 'robots' at the top"):
+        overridden(loaded, flat)

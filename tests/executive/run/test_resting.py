@@ -1,0 +1,177 @@
+"""Tests of robots without work in a run of several: they clear ways, and are left alone when they do not answer."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import pytest
+
+from executive.run.outcome import Outcome, RunResult
+from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.worker import LockStepWorker
+from executive.tree.compiler import CompiledTree
+from executive.tree.node import NodeSpec
+from skills.api import Running, Skill, Step, Succeeded
+from skills.navigate.skill import Navigate, NavigateInputs
+from skills.robot import Imu, Pose2D
+from skills.testing.blocks import Block
+from skills.testing.clock import VirtualClock
+from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.robot import ScriptedRobot, Start
+
+LANE = (Block(-2.0, -1.0, 4.0, -0.5), Block(-2.0, 0.5, 4.0, 1.0), Block(6.0, -3.0, 6.5, 3.0))
+"""A lane 1 m wide from x = -2 to 4 m, and room before a wall at 6 m."""
+VERB_LIMIT_S = 1.0
+
+
+@dataclass(frozen=True)
+class Nothing:
+    """No inputs."""
+
+
+class Drives(Skill[Nothing]):
+    """Goes to the end of the lane, as `navigate` does."""
+
+    name: ClassVar[str] = "drives"
+    Inputs: ClassVar[type] = Nothing
+    goal: ClassVar[Pose2D] = Pose2D(3.2, 0.0, 0.0)
+
+    def begin(self, inputs: Nothing) -> None:
+        """Set off."""
+        self._navigate = Navigate(self.context)
+        self._navigate.begin(NavigateInputs(self.goal))
+
+    def step(self) -> Step:
+        """Drive."""
+        return self._navigate.step()
+
+    def end(self) -> None:
+        """Stand."""
+        self._navigate.end()
+
+
+class Finishes(Skill[Nothing]):
+    """Is done at once."""
+
+    name: ClassVar[str] = "finishes"
+    Inputs: ClassVar[type] = Nothing
+
+    def begin(self, inputs: Nothing) -> None:
+        """Nothing."""
+
+    def step(self) -> Step:
+        """Done."""
+        return Succeeded("done")
+
+
+class AsksTheImu(Finishes):
+    """Uses a verb after the first tick."""
+
+    name: ClassVar[str] = "asks_the_imu"
+
+    def begin(self, inputs: Nothing) -> None:
+        """Count from the start."""
+        self._ticks = 0
+
+    def step(self) -> Step:
+        """Ask in the third tick."""
+        self._ticks += 1
+        if self._ticks > 2:
+            self.context.robot.imu()
+        return Running("at work")
+
+
+class Hanging(ScriptedRobot):
+    """A robot whose IMU does not answer."""
+
+    def imu(self) -> Imu:
+        """Hangs."""
+        time.sleep(1.5 * VERB_LIMIT_S)
+        return super().imu()
+
+
+Published = list[tuple[str, Mapping[str, Any]]]
+
+
+@dataclass
+class Lane:
+    """Robots in a lane, each with one skill to do."""
+
+    clock: VirtualClock
+    published: Published
+
+    def entry(
+        self,
+        name: str,
+        skill: type[Skill[Any]],
+        x_m: float,
+        *,
+        after: tuple[str, ...] = (),
+        robot: Callable[..., ScriptedRobot] = ScriptedRobot,
+    ) -> RunEntry:
+        """A robot that begins at x_m in the lane's middle."""
+        start = Pose2D(x_m, 0.0, 0.0)
+        plan = NodeSpec("skill", f"{name.lower()}/test", "test", {"skill": skill, "limit_s": 100.0})
+        return RunEntry(
+            CompiledTree(name, "test", (), plan),
+            robot(self.clock, name=name, start=Start(start)),
+            KnownPlace(start),
+            BlockCostmap(LANE),
+            after=after,
+        )
+
+    def run(self, *entries: RunEntry) -> RunResult:
+        """Run them to their end."""
+        return run(
+            entries,
+            clock=self.clock,
+            worker=LockStepWorker(self.clock),
+            publish=lambda topic, message: self.published.append((topic, message)),
+            settings=RunSettings(verb_limit_s=VERB_LIMIT_S, time_limit_s=120.0),
+        )
+
+
+@pytest.fixture
+def lane() -> Lane:
+    """An empty lane."""
+    return Lane(VirtualClock(), [])
+
+
+def test_a_robot_whose_mission_is_over_clears_a_way_that_another_needs(lane: Lane) -> None:
+    """Bob is done at once and stands in the lane; Alice gets to its end, and Bob's lease is given back."""
+    alice, bob = lane.entry("Alice", Drives, 0.0), lane.entry("Bob", Finishes, 2.0)
+    result = lane.run(alice, bob)
+    assert result.outcome is Outcome.SUCCESS
+    assert {each.robot_name: each.stepped_aside for each in result.robots} == {"Alice": False, "Bob": True}
+    assert (alice.robot.lease_holder(), bob.robot.lease_holder()) == (None, None)
+    assert not any(topic == "errors" for topic, _ in lane.published)
+
+
+def test_a_robot_that_waits_for_another_clears_its_way(lane: Lane) -> None:
+    """Bob begins when Alice is done, and stands where she has to pass until then."""
+    bob = lane.entry("Bob", Finishes, 2.0, after=("Alice",))
+    result = lane.run(lane.entry("Alice", Drives, 0.0), bob)
+    assert result.outcome is Outcome.SUCCESS
+    assert bob.robot.odometry().pose.x_m + 2.0 > 3.7
+    assert [each.stepped_aside for each in result.robots] == [False, False]
+
+
+def test_a_robot_in_nobodys_way_stays_where_it_ended(lane: Lane) -> None:
+    """Bob stands behind Alice."""
+    bob = lane.entry("Bob", Finishes, -1.4)
+    result = lane.run(lane.entry("Alice", Drives, 0.0), bob)
+    assert result.outcome is Outcome.SUCCESS
+    assert math.hypot(bob.robot.odometry().pose.x_m, bob.robot.odometry().pose.y_m) < 0.01
+
+
+def test_a_verb_that_hangs_ends_the_mission_of_its_robot_only(lane: Lane) -> None:
+    """Bob stands aside and hangs; Alice goes on and arrives."""
+    bob = lane.entry("Bob", AsksTheImu, -1.4, robot=Hanging)
+    alice_result, bob_result = lane.run(lane.entry("Alice", Drives, 0.0), bob).robots
+    assert alice_result.outcome is Outcome.SUCCESS
+    assert bob_result.outcome is Outcome.ERROR and "'imu'" in bob_result.message
+    assert bob.robot.lease_holder() is None

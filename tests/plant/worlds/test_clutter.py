@@ -1,0 +1,59 @@
+"""Clutter and passers-by that a variation adds to the flat."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from plant.worlds.clutter import place_clutter, with_passers_by
+from plant.worlds.placement import outline_of, place_objects, place_people, polygon_distance
+from plant.worlds.world import World, load_world
+
+SEEDS = range(1, 8)
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return load_world("flat")
+
+
+def test_clutter_lies_on_surfaces_and_touches_nothing(world: World) -> None:
+    for seed in SEEDS:
+        things = place_objects(world, seed)
+        clutter = place_clutter(world, things, 12, seed)
+        assert len(clutter) > 6
+        assert {each.surface for each in clutter} <= set(world.surfaces)
+        outlines = [outline_of(each) for each in (*things, *clutter)]
+        assert min(polygon_distance(a, b) for a, b in itertools.combinations(outlines, 2)) > 0
+
+
+def test_clutter_is_of_no_class_that_the_mission_speaks_of(world: World) -> None:
+    for seed in SEEDS:
+        things = place_objects(world, seed)
+        clutter = place_clutter(world, things, 20, seed, spared=("coke", "beer"))
+        assert not {each.class_name for each in clutter} & {"coke", "beer", "person"}
+
+
+def test_clutter_moves_nothing_that_was_there_and_is_the_same_for_a_seed(world: World) -> None:
+    things = place_objects(world, 3)
+    first, second = place_clutter(world, things, 6, 3), place_clutter(world, things, 6, 3)
+    assert [(each.name, each.surface) for each in first] == [(each.name, each.surface) for each in second]
+    assert all(a.X_WO.IsExactlyEqualTo(b.X_WO) for a, b in zip(first, second, strict=True))
+    more = place_clutter(world, things, 9, 3)
+    assert all(a.X_WO.IsExactlyEqualTo(b.X_WO) for a, b in zip(first, more, strict=False))
+
+
+def test_passers_by_walk_between_places_of_the_world(world: World) -> None:
+    varied = with_passers_by(world, 2, 5)
+    routes = {each.name: each.route for each in place_people(varied, 5)}
+    for name in ("passer-by 1", "passer-by 2"):
+        assert routes[name] is not None
+    before = {each.name: each.X_WO.translation() for each in place_people(world, 5)}
+    after = {each.name: each.X_WO.translation() for each in place_people(varied, 5)}
+    assert all(np.array_equal(after[name], place) for name, place in before.items())
+
+
+def test_without_passers_by_the_world_stays_as_it_is(world: World) -> None:
+    assert with_passers_by(world, 0, 5) is world

@@ -1,0 +1,72 @@
+"""Tests of robots that meet where only one fits: who clears the way, who waits, and that both arrive."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from planar_robot import TWO_ROOMS
+from traffic_floor import Floor
+
+from skills.estimate.grid_map import GridMap
+from skills.robot import BaseKind, Pose2D
+from skills.testing.blocks import Block, grid_of
+
+UP, DOWN = math.pi / 2.0, -math.pi / 2.0
+ROUND, OBLONG = BaseKind.DIFFERENTIAL, BaseKind.OMNIDIRECTIONAL
+DEAD_END = (
+    Block(-0.1, -0.1, 8.1, 0.0),
+    Block(-0.1, 0.9, 5.0, 1.0),
+    Block(-0.1, 0.0, 0.0, 0.9),
+    Block(5.0, 0.9, 5.1, 4.0),
+    Block(5.0, 4.0, 8.1, 4.1),
+    Block(8.0, 0.0, 8.1, 4.0),
+)
+"""A corridor for one, 5 m long and closed at x = 0, that ends in a room of 3 m by 4 m."""
+
+
+@pytest.fixture(scope="module")
+def rooms() -> GridMap:
+    """Two rooms under a corridor, joined by doors of 0.9 m."""
+    return grid_of(TWO_ROOMS, (0.05, 1.0))
+
+
+@pytest.mark.parametrize("kinds", [(OBLONG, OBLONG), (ROUND, OBLONG)])
+def test_two_that_go_where_the_other_stands_behind_a_door_both_arrive(
+    rooms: GridMap, kinds: tuple[BaseKind, BaseKind]
+) -> None:
+    """One clears the way and the goal region, the other passes, then the first follows; they never touch."""
+    floor = Floor(rooms)
+    floor.send("alice", Pose2D(2.4, 5.0, DOWN), Pose2D(2.5, 2.6, DOWN), base_kind=kinds[0])
+    floor.send("bob", Pose2D(2.5, 2.6, UP), Pose2D(2.4, 5.0, UP), base_kind=kinds[1])
+    assert floor.run(until_s=120.0)
+    assert floor.apart_m > 0.05
+
+
+def test_one_in_a_dead_end_goes_first_after_all(rooms: GridMap) -> None:
+    """Alice claims first and wants in; Bob has no waiting place behind him, so turns are changed."""
+    floor = Floor(grid_of(DEAD_END, (0.05, 1.0)))
+    floor.send("alice", Pose2D(6.2, 0.45, math.pi), Pose2D(1.0, 0.45, math.pi))
+    floor.send("bob", Pose2D(1.0, 0.45, 0.0), Pose2D(6.5, 3.2, 0.0))
+    assert floor.run(until_s=120.0)
+    assert floor.apart_m > 0.05
+
+
+def test_one_that_has_nothing_to_do_clears_a_way_and_stays_there(rooms: GridMap) -> None:
+    """Bob arrives in a door first; Alice, who comes later, gets through it."""
+    floor = Floor(rooms)
+    floor.send("bob", Pose2D(7.4, 3.0, UP), Pose2D(7.45, 4.05, UP))
+    floor.send("alice", Pose2D(7.4, 5.8, DOWN), Pose2D(7.4, 2.2, DOWN), after_s=6.0)
+    assert floor.run(until_s=120.0)
+    bob = floor.robots["bob"].pose
+    assert math.hypot(bob.x_m - 7.45, bob.y_m - 4.05) > 0.5
+    assert floor.apart_m > 0.05
+
+
+def test_one_that_has_nothing_to_do_and_is_in_nobodys_way_stays(rooms: GridMap) -> None:
+    """Bob stands in the room; Alice passes above it."""
+    floor = Floor(rooms)
+    floor.send("bob", Pose2D(7.4, 1.5, UP), Pose2D(7.4, 1.5, UP))
+    floor.send("alice", Pose2D(1.5, 5.5, 0.0), Pose2D(7.4, 5.5, 0.0))
+    assert floor.run(until_s=60.0)
+    assert floor.robots["bob"].pose.y_m == pytest.approx(1.5, abs=0.1)

@@ -1,0 +1,159 @@
+"""Robots of any number on a floor, kinematic only: they know where they are, and see nothing but what is surveyed.
+
+What they do is what `navigate` makes of the others' ways; so a meeting takes a few seconds instead of minutes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from executive.run.resting import SteppingAside
+from executive.run.traffic import TrafficTable
+from executive.run.worker import LockStepWorker
+from skills.api import Failed, LocalisationEstimate, SkillContext, Step, Succeeded
+from skills.estimate.grid_map import GridMap
+from skills.navigate.footprint import Footprint, disc_centres, pose_array
+from skills.navigate.skill import Navigate, NavigateInputs
+from skills.robot import BaseKind, Capabilities, FloatArray, Pose2D, Robot
+from skills.testing.clock import VirtualClock
+from skills.testing.estimators import KnownPlace
+from skills.testing.robot import BASE_ONLY, ScriptedRobot, Start
+
+ROUND = tuple((0.28 * math.cos(a), 0.28 * math.sin(a)) for a in np.arange(12) * math.tau / 12)
+TICK_S = 0.05
+ATTEMPTS = 3
+
+
+def capabilities_of(base_kind: BaseKind) -> Capabilities:
+    """An oblong that can go sideways, or a round one that cannot; no arm, no camera."""
+    outline = ROUND if base_kind is BaseKind.DIFFERENTIAL else BASE_ONLY.footprint_m
+    return replace(BASE_ONLY, footprint_m=outline, base_kind=base_kind, cameras=())
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """A costmap of what was surveyed."""
+
+    grid: GridMap
+
+    def clearance_m(self, points_W: FloatArray) -> FloatArray:
+        """As the grid has it."""
+        return self.grid.distance_m(points_W)
+
+    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
+        """Nothing is seen."""
+
+    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
+        """Nothing is seen."""
+
+
+@dataclass
+class Trip:
+    """One robot's way to a goal: it begins after some time, and is tried again when it fails."""
+
+    context: SkillContext
+    goal: Pose2D
+    after_s: float = 0.0
+    skill: Navigate | None = None
+    attempts: int = 0
+    ended: Step | None = None
+    aside: SteppingAside | None = None
+
+    def step(self, table: TrafficTable) -> None:
+        """One tick; before and after its trip a robot steps aside where it is asked to."""
+        rests = self.ended is not None or self.context.clock.now() < self.after_s
+        table.rest(self.context.robot.name, idle=rests)
+        if rests:
+            self.aside = self.aside or SteppingAside(self.context)
+            self.aside.step()
+            return
+        if self.aside is not None:
+            self.aside.end()
+            self.aside = None
+        if self.skill is None:
+            self.skill, self.attempts = Navigate(self.context), self.attempts + 1
+            self.skill.begin(NavigateInputs(self.goal))
+        step = self.skill.step()
+        if isinstance(step, Succeeded | Failed):
+            self.skill.end()
+            self.skill = None
+            if isinstance(step, Succeeded) or self.attempts >= ATTEMPTS:
+                self.ended = step
+
+
+@dataclass
+class Floor:
+    """Robots on a surveyed floor. `apart_m` is the least distance between two outlines so far."""
+
+    grid: GridMap
+    clock: VirtualClock = field(default_factory=VirtualClock)
+    robots: dict[str, ScriptedRobot] = field(default_factory=dict)
+    trips: dict[str, Trip] = field(default_factory=dict)
+    apart_m: float = math.inf
+
+    def __post_init__(self) -> None:
+        self.table = TrafficTable({}, self.clock.now)
+        self.worker = LockStepWorker(self.clock)
+
+    def add(self, name: str, start: Pose2D, base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL) -> SkillContext:
+        """One more robot; what its skills may use."""
+        robot = ScriptedRobot(self.clock, name=name, capabilities=capabilities_of(base_kind), start=Start(start))
+        self.robots[name] = robot
+        self.table.join(name, Footprint.of(robot.capabilities()).discs)
+        self.table.heard(name, start)
+        return SkillContext(
+            robot,
+            robot.acquire_lease("test"),
+            self.clock,
+            self.worker,
+            KnownPlace(start),
+            Surveyed(self.grid),
+            lambda topic, message: None,
+            seed=0,
+            traffic=self.table.view_of(name),
+        )
+
+    def send(
+        self,
+        name: str,
+        start: Pose2D,
+        goal: Pose2D,
+        *,
+        base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL,
+        after_s: float = 0.0,
+    ) -> None:
+        """One more robot that goes somewhere."""
+        self.trips[name] = Trip(self.add(name, start, base_kind), goal, after_s)
+
+    def tick(self) -> None:
+        """One tick, robots in the order of their names."""
+        self.clock.advance(TICK_S)
+        for name, robot in sorted(self.robots.items()):
+            self.table.heard(name, robot.pose)
+        for _, trip in sorted(self.trips.items()):
+            trip.step(self.table)
+        self.apart_m = min(self.apart_m, least_apart_m(self.robots))
+
+    def run(self, until_s: float) -> bool:
+        """Tick until all have ended; whether all are there within the time."""
+        while self.clock.now() < until_s and any(trip.ended is None for trip in self.trips.values()):
+            self.tick()
+        return all(isinstance(trip.ended, Succeeded) for trip in self.trips.values())
+
+
+def least_apart_m(robots: Mapping[str, ScriptedRobot]) -> float:
+    """The least distance between the outlines of two robots; negative where they overlap."""
+    placed = []
+    for robot in robots.values():
+        footprint = Footprint.of(robot.capabilities())
+        placed.append((disc_centres(footprint, pose_array([robot.pose]))[0], footprint.discs[:, 2]))
+    least = math.inf
+    for number, (centres, radii) in enumerate(placed):
+        for others, other_radii in placed[number + 1 :]:
+            apart = np.linalg.norm(centres[:, None] - others[None], axis=2) - radii[:, None] - other_radii[None]
+            least = min(least, float(apart.min()))
+    return least

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,7 +14,7 @@ from executive.cli.report import VERDICTS
 from executive.cli.run_options import FAULT, TIME_LIMIT, robots_of, time_limit_s
 from executive.cli.serve_command import AsJson
 from executive.mission.errors import InputError
-from executive.mission.robots import robot_called
+from executive.mission.robots import display_name, robot_called
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
 
@@ -57,41 +56,14 @@ def run(
     console = console_for(as_json)
     store = _store(queue)
     with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
-        from executive.cli.fleet_missions import charging_missions, fleet_mission
-        from executive.cli.fleet_run import FleetDispatch, run_fleet, told
-        from executive.cli.simulated import SimulatedBackend
-        from executive.cli.starts import placed_robots
-        from executive.cli.worlds import knowledge_of, open_world
+        from executive.cli.fleet_run import run_fleet, told
+        from executive.cli.fleet_setup import simulated_fleet
 
-        setups = robots_of(robots)
-        queued = _to_do(missions)
-        where = open_world(world or queued[0].request.world or queued[0].request.world_name)
-        knowledge = knowledge_of(where)
-        placed = placed_robots(where, knowledge, setups)
-        faults, given = _faults(fault or (), tuple(placed)), GivenMissions(missions).all()
-        wanted = {
-            each.id: fleet_mission(
-                missions,
-                replace(each, request=replace(each.request, seed=seed)),
-                world=where,
-                knowledge=knowledge,
-                robots=placed,
-                done=given[each.id].done if each.id in given else 0,
-            )
-            for each in queued
-        }
-        backend = SimulatedBackend(where, placed, seed=seed, record=False)
+        setups, queued = robots_of(robots), _to_do(missions)
+        faults = _faults(fault or (), tuple(map(display_name, setups)))
+        lines = None if quiet else console
+        dispatch = simulated_fleet(missions, queued, setups, world=world, seed=seed, faults=faults, console=lines)
         folder = out or store.parent / "fleet"
-        dispatch = FleetDispatch(
-            missions,
-            wanted,
-            placed,
-            backend,
-            faults,
-            charging_missions(where, knowledge, placed),
-            knowledge.battery,
-            None if quiet else console,
-        )
         run_fleet(dispatch, out=folder, seed=seed, time_limit_s=time_limit_s(time_limit))
         results = told(missions, [each.id for each in queued])
     achieved = [_achieved(each) for each in results if each["part_of"] is None]

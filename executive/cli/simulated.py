@@ -24,6 +24,7 @@ from executive.run.control import Control
 from executive.run.outcome import RobotResult
 from executive.run.runner import Observer, RunEntry
 from executive.tree.compiler import CompiledTree
+from plant.referee import Referee
 from plant.variation import AS_IT_IS, Variation
 from plant.worlds.world import World
 from skills.robot import Clock
@@ -51,6 +52,11 @@ class SimulatedBackend:
     def clock(self) -> Clock:
         """The plant's clock, which steps it."""
         return self._simulation.clock
+
+    @property
+    def referee(self) -> Referee:
+        """The plant's referee."""
+        return self._simulation.referee
 
     def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
         """The robot with its estimators; the plant's state is taken up and kept where `durable` says so."""

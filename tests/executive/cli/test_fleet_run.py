@@ -1,11 +1,13 @@
 """A fleet's run with scripted robots: who does what, and what becomes of the mission of a robot that dies."""
 
+import json
 from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from typer.testing import CliRunner
 
-from executive.cli import fleet_missions, fleet_run
+from executive.cli import entry, fleet_missions, fleet_run
 from executive.cli.fleet_missions import FleetMission
 from executive.cli.fleet_run import FleetDispatch, run_fleet, told
 from executive.cli.requests import Prepared
@@ -168,6 +170,23 @@ def test_a_robot_whose_lease_is_anothers_is_left_out(fleet):
     fleet.queue(KITCHEN)
     fleet.robots["Alice"].holder = "the tablet"
     assert fleet.run() == [("Bob", "success", 1)]
+
+
+def test_status_shows_what_runs_and_what_waits_while_it_does(fleet, script):
+    for line in (KITCHEN, BEDROOM, KITCHEN):
+        fleet.queue(line)
+    told_then = []
+
+    def ask(skill):
+        told_then.append(CliRunner().invoke(entry.app, ["fleet", "status", str(fleet.store.path), "--json"]))
+        return Succeeded("there")
+
+    script.ends["navigate"] = ask
+    fleet.run()
+    first, *_, last = (json.loads(each.stdout.splitlines()[-1])["missions"] for each in told_then)
+    states = [[(row["robot"], row["outcome"]) for row in rows] for rows in (first, last)]
+    assert states[0] == [("Alice", "running"), ("Bob", "running"), (None, "queued")]
+    assert states[1] == [("Alice", "success"), ("Bob", "success"), ("Alice", "running")]
 
 
 def test_whose_each_mission_is_stands_in_the_store(fleet):

@@ -12,7 +12,7 @@ from executive.cli.found_out import with_found_out
 from executive.cli.happening_log import HappeningLog
 from executive.cli.page_view import PageView, log_map
 from executive.cli.profiling import profiled
-from executive.cli.report import RobotReport, RunReport
+from executive.cli.report import RefereeReport, RobotReport, RunReport
 from executive.cli.report_file import EndedTree, write_report
 from executive.cli.requests import Prepared
 from executive.cli.signals import HUNG_UP, cancelled_by_signals
@@ -163,17 +163,17 @@ def _judged(
 
 def _robot_report(ended: RobotResult, tree: CompiledTree, backend: Backend, prepared: Prepared) -> RobotReport:
     robot = prepared.robots.get(ended.robot_name)
-    return robot_report(ended, tree, backend, prepared.kind if robot is None else robot.kind)
+    return robot_report(ended, tree, prepared.kind if robot is None else robot.kind, backend.judge(tree, ended))
 
 
-def robot_report(ended: RobotResult, tree: CompiledTree, backend: Backend, kind: str) -> RobotReport:
-    """How a robot's mission ended, and what the referee saw of it."""
+def robot_report(ended: RobotResult, tree: CompiledTree, kind: str, seen: RefereeReport | None) -> RobotReport:
+    """How a robot's mission ended, and what the referee has seen of it."""
     return RobotReport(
         kind=kind,
         outcome=ended.outcome.value,
         cause=None if ended.cause is None else ended.cause.value,
         message=ended.message,
-        referee=backend.judge(tree, ended),
+        referee=seen,
         commands=tuple(map(str, tree.commands)),
     )
 

@@ -9,7 +9,8 @@ from typer.testing import CliRunner
 
 from executive.cli import entry, fleet_missions, fleet_run
 from executive.cli.fleet_missions import FleetMission
-from executive.cli.fleet_run import FleetDispatch, run_fleet, told
+from executive.cli.fleet_report import told
+from executive.cli.fleet_run import FleetDispatch, run_fleet
 from executive.cli.requests import Prepared
 from executive.fleet.auction import Bid
 from executive.mission.command import Command, Task, parse_command
@@ -73,13 +74,19 @@ class Fleet:
         options = {name: self._prepared(request, mission) for name, mission in missions.items()}
         self.missions[stored.id] = FleetMission(stored, options)
 
+    def show_live(self):
+        return None
+
+    def leave(self, artifacts, out):
+        return None
+
     def judge(self, tree, result, *, before, since_s):
         self.judged.append((tree.robot_name, result.outcome.value))
         self.shares += [(share.tree.robot_name, share.done) for share in before]
         self.since_s.append(since_s)
 
     def run(self):
-        placed = {name: SimpleNamespace(start=START) for name in ROBOTS}
+        placed = {name: SimpleNamespace(start=START, kind="spot") for name in ROBOTS}
         docks = {name: self._docking(name) for name in ROBOTS}
         dispatch = FleetDispatch(self.store, dict(self.missions), placed, self, docks=docks)
         run_fleet(dispatch, out=self.out, seed=3)

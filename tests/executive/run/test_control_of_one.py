@@ -147,3 +147,13 @@ def test_what_holds_all_robots_holds_each(control, compiled):
     assert (control.state.robots["Alice"].mode, control.state.robots["Alice"].reason) == (Mode.STOPPED, "fire")
     control.release_stop_button()
     assert control.state.robots["Alice"].mode is Mode.PAUSED
+
+
+def test_a_stopped_robot_does_not_even_do_what_missions_do_in_the_end(run_pair, control, registry):
+    def stop_and_cancel():
+        control.stop_button("too near", robot="Bob")
+        control.cancel("enough")
+
+    pair = run_pair(at({1: stop_and_cancel}))
+    assert set(pair.outcomes().values()) == {Outcome.CANCELLED}
+    assert pair.robots["Bob"].driving is False

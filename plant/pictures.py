@@ -159,15 +159,15 @@ def draw_map(
     return picture
 
 
-def draw_path(picture: Picture, pixels: FloatArray) -> None:
+def draw_path(picture: Picture, pixels: FloatArray, ink: Colour = PATH_COLOUR) -> None:
     """Draw a way given in pixels (N, 2): a light seam below the line, a dot at its start, an arrow at its end."""
     if len(pixels) < 1:
         return
     thick = max(3, picture.shape[1] // 320)
     line = [_fixed_point(pixels)]
-    for colour, width in ((PLATE, thick + 4), (PATH_COLOUR, thick)):
+    for colour, width in ((PLATE, thick + 4), (ink, thick)):
         cv2.polylines(picture, line, False, colour, width, cv2.LINE_AA, _SUBPIXEL_BITS)
-    _arrow_head(picture, pixels, 5.0 * thick)
+    _arrow_head(picture, pixels, 5.0 * thick, ink)
     _dot(picture, pixels[0], START_COLOUR)
 
 
@@ -231,17 +231,17 @@ def _fixed_point(pixels: FloatArray) -> NDArray[np.int32]:
     return np.asarray(np.round(pixels * 2.0**_SUBPIXEL_BITS), dtype=np.int32).reshape(-1, 1, 2)
 
 
-def _arrow_head(picture: Picture, pixels: FloatArray, length: float) -> None:
+def _arrow_head(picture: Picture, pixels: FloatArray, length: float, ink: Colour) -> None:
     """A filled triangle at the end of a way, pointing along its last stretch."""
     tip = pixels[-1]
     behind = pixels[np.linalg.norm(pixels - tip, axis=1) > length / 2.0]
     if not len(behind):
-        _dot(picture, tip, PATH_COLOUR)
+        _dot(picture, tip, ink)
         return
     along = (tip - behind[-1]) / np.linalg.norm(tip - behind[-1])
     across = np.array([-along[1], along[0]])
     head = np.array([tip + 0.6 * length * along, tip + 0.5 * length * across, tip - 0.5 * length * across])
-    cv2.fillPoly(picture, [_fixed_point(head)], PATH_COLOUR, cv2.LINE_AA, _SUBPIXEL_BITS)
+    cv2.fillPoly(picture, [_fixed_point(head)], ink, cv2.LINE_AA, _SUBPIXEL_BITS)
     cv2.polylines(picture, [_fixed_point(head)], True, PLATE, 2, cv2.LINE_AA, _SUBPIXEL_BITS)
 
 

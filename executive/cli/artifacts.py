@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -17,7 +18,19 @@ from executive.record.reader import Event
 from executive.record.schemas import TRANSITIONS
 from executive.store.resuming import told_before
 from executive.tree.behaviours.answer import ANSWER_TOPIC
-from plant.pictures import Bounds, best_view, draw_detection, draw_map, render_view, save_png, top_view
+from executive.tree.compiling.builder import slug
+from executive.view.styles import ROBOT_COLOURS, rgb_of
+from plant.pictures import (
+    Bounds,
+    best_view,
+    draw_detection,
+    draw_map,
+    draw_path,
+    label,
+    render_view,
+    save_png,
+    top_view,
+)
 from plant.simulation import Simulation
 from skills.api import Publish
 from skills.robot import Picture
@@ -35,8 +48,19 @@ _AHEAD_M: Final[Mapping[str, float]] = MappingProxyType({"hand_over": 0.4})
 """So far before the hand, which is drawn in by then, lies what the picture is of."""
 
 
+@dataclass
+class Looks:
+    """What one robot saw and did that is worth a picture: its first confirmed detection, and when (s) it did what."""
+
+    seen: Mapping[str, Any] | None = None
+    confirmed: Mapping[str, Any] | None = None
+    looked: list[Mapping[str, Any]] = field(default_factory=list)
+    detection: Mapping[str, Any] | None = None
+    moments: dict[str, float] = field(default_factory=dict)
+
+
 class Artifacts:
-    """Passes messages on to the log and remembers what is worth a picture.
+    """Passes messages on to the log and remembers what is worth a picture, apart for each robot.
 
     `pictures` are small JPEG files for the answers, and `numbers` says which goes with the answer of a node (path id)
     at a time (s); once they have `MOST_BYTES`, no more are kept. `drawn` are the files that were written, by name.
@@ -44,37 +68,40 @@ class Artifacts:
 
     def __init__(self, publish: Publish) -> None:
         self._publish = publish
-        self._seen: Mapping[str, Any] | None = None
-        self._confirmed: Mapping[str, Any] | None = None
-        self._looked: list[Mapping[str, Any]] = []
-        self.detection: Mapping[str, Any] | None = None
+        self._looks: dict[str, Looks] = {}
         self.answer: Picture | None = None
         self.pictures: list[bytes] = []
         self.numbers: dict[tuple[str, float], int] = {}
         self.drawn: dict[str, Path] = {}
-        self.moments: dict[str, float] = {}
+
+    def of(self, robot_name: str) -> Looks:
+        """What is known of a robot."""
+        return self._looks.setdefault(robot_name, Looks())
 
     def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
         """Take note of a message and pass it on."""
+        looks = self.of(str(message.get("robot", "")))
         if topic == DETECTIONS:
-            self._looked.append(message)
-            self._seen = message if message["detections"] else self._seen
+            looks.looked.append(message)
+            looks.seen = message if message["detections"] else looks.seen
         if topic == DESTINATION_TOPIC:
-            self._confirmed = self._seen
-            self.detection = self.detection or self._seen
+            looks.confirmed = looks.seen
+            looks.detection = looks.detection or looks.seen
         if topic == ANSWER_TOPIC:
-            message = self._shown(message)
+            message = self._shown(message, looks)
         if topic == TRANSITIONS and message["to"] == "SUCCESS" and not told_before(str(message["message"])):
-            self._note(str(message["node"]), float(message["t"]))
+            name = _MOMENTS.get(str(message["node"]).rsplit("/", 1)[-1])
+            if name is not None:
+                looks.moments[name] = float(message["t"])
         self._publish(topic, message)
 
-    def _shown(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _shown(self, message: Mapping[str, Any], looks: Looks) -> Mapping[str, Any]:
         """The answer with a picture: of what was found, or of all that was looked at in vain."""
-        looked, self._looked = self._looked, []
+        looked, looks.looked = looks.looked, []
         if not looked:
             return message
-        if message["answer"] and self._confirmed is not None:
-            self.answer = detection_picture(self._confirmed)
+        if message["answer"] and looks.confirmed is not None:
+            self.answer = detection_picture(looks.confirmed)
         else:
             self.answer = _sheet([detection_picture(each) for each in looked[-_MOST_LOOKS:]])
         self._keep(message, self.answer)
@@ -99,25 +126,27 @@ class Artifacts:
             self.numbers[key] = len(self.pictures)
             self.pictures.append(small)
 
-    def _note(self, path_id: str, time_s: float) -> None:
-        name = _MOMENTS.get(path_id.rsplit("/", 1)[-1])
-        if name is not None:
-            self.moments[name] = time_s
+
+def file_name(what: str, robot_name: str, robots: Sequence[str]) -> str:
+    """The name of a robot's file without its ending: among several robots it ends with the robot's."""
+    return f"{what}_{slug(robot_name)}" if len(robots) > 1 else what
 
 
-def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robot_name: str, folder: Path) -> Sequence[Path]:
+def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robots: Sequence[str], folder: Path) -> Sequence[Path]:
     """Write the pictures of a recorded run into `folder` as PNG; gives their paths.
 
     What happened before a restart was not recorded by this process, and is left out.
     """
-    pictures = {"map": _map(simulation, robot_name)}
-    if artifacts.detection is not None:
-        pictures["detection"] = detection_picture(artifacts.detection)
+    pictures = {"map": _map(simulation, robots)}
     begun_s = simulation.recorder.at(0.0).time_s if simulation.recorder is not None else 0.0
-    last = simulation.referee.lifts(robot_name)[-1:]
-    lifts = [("grasp", lift.time_s) for lift in last if lift.time_s >= begun_s]
-    for name, time_s in (*lifts, *artifacts.moments.items()):
-        pictures[name] = _view(simulation, robot_name, time_s, _AHEAD_M.get(name, 0.0))
+    for robot in robots:
+        looks = artifacts.of(robot)
+        if looks.detection is not None:
+            pictures[file_name("detection", robot, robots)] = detection_picture(looks.detection)
+        last = simulation.referee.lifts(robot)[-1:]
+        lifts = [("grasp", lift.time_s) for lift in last if lift.time_s >= begun_s]
+        for name, time_s in (*lifts, *looks.moments.items()):
+            pictures[file_name(name, robot, robots)] = _view(simulation, robot, time_s, _AHEAD_M.get(name, 0.0))
     paths = [folder / f"{name}.png" for name in pictures]
     artifacts.drawn.update(zip(pictures, paths, strict=True))
     for path, picture in zip(paths, pictures.values(), strict=True):
@@ -162,12 +191,23 @@ def detection_picture(message: Mapping[str, Any]) -> Picture:
     return picture
 
 
-def _map(simulation: Simulation, robot_name: str) -> Picture:
+def _map(simulation: Simulation, robots: Sequence[str]) -> Picture:
+    """The world from above with the way of each robot; among several in its colour, with its name at the end."""
     rooms = simulation.world.rooms
     view = top_view(simulation.query_at(simulation.clock.now()), _bounds(simulation.world.corners))
     centres = {name: tuple(np.mean(polygon, axis=0)) for name, polygon in rooms.items()}
     start = simulation.world.start
-    return draw_map(view, simulation.referee.path(robot_name), labels=centres, marks={"start": (start.x_m, start.y_m)})
+    ways = {name: simulation.referee.path(name) for name in robots}
+    marks = {"start": (start.x_m, start.y_m)}
+    if len(ways) == 1:
+        return draw_map(view, ways[robots[0]], labels=centres, marks=marks)
+    picture = draw_map(view, np.zeros((0, 2)), labels=centres)
+    for number, (name, way) in enumerate(sorted(ways.items())):
+        if len(way):
+            pixels = view.pixels(way)
+            draw_path(picture, pixels, rgb_of(ROBOT_COLOURS[number % len(ROBOT_COLOURS)]))
+            label(picture, name, (int(pixels[-1][0]) + 14, int(pixels[-1][1]) - 14))
+    return picture
 
 
 def _bounds(points: Sequence[tuple[float, float]]) -> Bounds:

@@ -11,7 +11,16 @@ import typer
 from executive.cli.durable import STORE
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.report import VERDICTS
-from executive.cli.run_options import FAULT, TIME_LIMIT, robots_of, time_limit_s
+from executive.cli.run_options import (
+    FAULT,
+    NO_RECORD,
+    TIME_LIMIT,
+    VIEW,
+    VIEW_FOR,
+    VIEW_PORT,
+    robots_of,
+    time_limit_s,
+)
 from executive.cli.serve_command import AsJson
 from executive.mission.errors import InputError
 from executive.mission.robots import display_name, robot_called
@@ -43,10 +52,16 @@ def run(
     ],
     world: Annotated[str | None, typer.Option(help="World by name or folder; that of the first mission.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
-    out: Annotated[Path | None, typer.Option(help="Folder for the log; `fleet` beside the store.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for log, report and recording; `fleet` beside the store.")
+    ] = None,
     fault: FAULT = None,
     time_limit: TIME_LIMIT = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="No lines while it runs.")] = False,
+    no_record: NO_RECORD = False,
+    view: VIEW = False,
+    view_for: VIEW_FOR = None,
+    view_port: VIEW_PORT = 0,
     as_json: AsJson = False,
 ) -> None:
     """Run all that is queued, in one world, with several robots.
@@ -56,20 +71,35 @@ def run(
     console = console_for(as_json)
     store = _store(queue)
     with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
-        from executive.cli.fleet_run import run_fleet, told
+        from executive.cli.fleet_report import told
+        from executive.cli.fleet_run import run_fleet
         from executive.cli.fleet_setup import simulated_fleet
+        from executive.cli.page_view import PageView
 
         setups, queued = robots_of(robots), _to_do(missions)
         faults = _faults(fault or (), tuple(map(display_name, setups)))
         lines = None if quiet else console
-        dispatch = simulated_fleet(missions, queued, setups, world=world, seed=seed, faults=faults, console=lines)
-        folder = out or store.parent / "fleet"
-        run_fleet(dispatch, out=folder, seed=seed, time_limit_s=time_limit_s(time_limit))
+        dispatch = simulated_fleet(
+            missions,
+            queued,
+            setups,
+            world=world,
+            seed=seed,
+            faults=faults,
+            console=lines,
+            record=not no_record,
+        )
+        folder, first = out or store.parent / "fleet", next(iter(dispatch.missions[queued[0].id].options.values()))
+        page = PageView(None, console, port=view_port) if view or view_for is not None else None
+        limit_s = time_limit_s(time_limit)
+        run_fleet(dispatch, out=folder, seed=seed, time_limit_s=limit_s, page=page, first=first)
         results = told(missions, [each.id for each in queued])
     achieved = [_achieved(each) for each in results if each["part_of"] is None]
     console.print(f"{sum(achieved)} of {len(achieved)} missions achieved")
     if as_json:
         print_json({"missions": results})
+    if page is not None:
+        page.stay(view_for)
     if not all(achieved):
         raise typer.Exit(NOT_ACHIEVED)
 
@@ -78,7 +108,7 @@ def run(
 def status(queue: Queue, as_json: AsJson = False) -> None:
     """Show which robot has which mission, also while they run."""
     with refusals(), MissionStore(_store(queue), create=False) as missions:
-        from executive.cli.fleet_run import told
+        from executive.cli.fleet_report import told
 
         results = told(missions, [each.id for each in missions.missions() if each.queued])
         names = {each.id: each.request.name for each in missions.missions()}

@@ -9,13 +9,17 @@ from typing import Any, Final
 
 from rich.console import Console
 
+from executive.cli.artifacts import Artifacts
 from executive.cli.backend import Backend
 from executive.cli.feasibility import route_planner_of
 from executive.cli.fleet_chain import chained
 from executive.cli.fleet_missions import FleetMission, RobotNow, bid_for, charging_time_s, rest_of
 from executive.cli.fleet_progress import Progress, ProgressJournal
+from executive.cli.fleet_report import EndedMission, mission_rows, missions_message, told, write_fleet_report
 from executive.cli.goal_conditions import Share
-from executive.cli.mission_run import entry_for
+from executive.cli.mission_run import entry_for, robot_report
+from executive.cli.page_view import PageView, log_map
+from executive.cli.report_file import EndedTree
 from executive.cli.requests import Prepared
 from executive.cli.signals import cancelled_by_signals
 from executive.cli.starts import PlacedRobot
@@ -26,15 +30,18 @@ from executive.mission.knowledge import BatteryFacts
 from executive.mission.scenario import Scenario
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
+from executive.record.reader import read_events
+from executive.record.schemas import MISSIONS
 from executive.record.work import Work
 from executive.run.control import Control
 from executive.run.dispatch import MissionEnd
 from executive.run.outcome import Outcome, RobotResult, RobotStatus
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
-from executive.store.given import GivenMission, GivenMissions
-from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.store.given import GivenMissions
+from executive.store.missions import MissionState, MissionStore
 from executive.tree.estimate import RoutePlanner
+from executive.tree.node_view import node_view
 from skills.robot import Pose2D
 
 __all__ = ["FleetDispatch", "run_fleet"]
@@ -96,6 +103,7 @@ class FleetDispatch:
         self._recalled: set[str] = set()
         self._to_dock: list[str] = []
         self._work = Work()
+        self.over: list[EndedMission] = []
 
     @property
     def waiting(self) -> tuple[int, ...]:
@@ -118,6 +126,8 @@ class FleetDispatch:
                 self.missions[award.mission] = replace(mission, since_s=self._now_s)
             self._tell(f"{award.robot} has mission {award.mission}: {mission.stored.request.name}")
             entries.append(self._entry(award.robot, mission))
+        if given.begun:
+            self._log_missions()
         self._to_dock += given.charging
         if self._dispatcher.waiting or self._dispatcher.under_way:
             entries += [self._dock_entry(name) for name in self._to_dock if name in self._dispatcher.resting]
@@ -281,7 +291,10 @@ class FleetDispatch:
     def _announce(self, prepared: Prepared) -> None:
         if self.log is not None:
             world, seed = prepared.world.name, prepared.request.seed
-            announce(self.log, self.backend.clock, prepared.tree, prepared.knowledge, world=world, seed=seed)
+            kinds = {name: robot.kind for name, robot in self.robots.items()}
+            announce(
+                self.log, self.backend.clock, prepared.tree, prepared.knowledge, world=world, seed=seed, robots=kinds
+            )
 
     def _stuck(self, name: str, *, holding: bool) -> str | None:
         """Why no other robot can go on with the mission of one that is gone; None: one can."""
@@ -305,6 +318,7 @@ class FleetDispatch:
             self.missions[number] = replace(mission, options=options, done=done, shares=shares)
         self._given.hand_back(number)
         self.store.finish(number, MissionState.QUEUED, "")
+        self._log_missions()
 
     def _over(self, name: str, result: RobotResult) -> None:
         """A mission has come to its end."""
@@ -314,6 +328,12 @@ class FleetDispatch:
         report = self.backend.judge(tree, result, before=mission.shares, since_s=since_s)
         seen = None if report is None else {key: value for key, value in vars(report).items() if key != "events"}
         self._given.judge(number, seen)
+        ended = EndedTree(
+            tree,
+            node_view(tree.root, result.states),
+            robot_report(result, tree, self.robots[name].kind, report),
+        )
+        self.over.append(EndedMission(number, ended, since_s, self._now_s))
         if number in self._parts:
             self._part_over(number, Share(tree, result, len(tree.parts)), seen)
         self._finish(number, MissionState(result.outcome.value), result.message)
@@ -336,6 +356,12 @@ class FleetDispatch:
         else:
             self._dispatcher.drop(number)
         self._given.settle()
+        self._log_missions()
+
+    def _log_missions(self) -> None:
+        """Log whose each mission is by now."""
+        if self.log is not None:
+            self.log(MISSIONS, missions_message(self.store, told(self.store, list(self.missions))))
 
     def _tell(self, line: str) -> None:
         if self.console is not None:
@@ -346,47 +372,51 @@ def _progress_of(robot: _Robot) -> Progress:
     return Progress(0, False) if robot.journal is None else robot.journal.progress
 
 
-def run_fleet(dispatch: FleetDispatch, *, out: Path, seed: int, time_limit_s: float | None = None) -> None:
-    """Run until no mission can be given out any more; the log is written into a folder. Raises InputError."""
-    clock = dispatch.backend.clock
-    dispatch.log = EventLog(out / "log.mcap", clock, apart=True)
+def run_fleet(
+    dispatch: FleetDispatch,
+    *,
+    out: Path,
+    seed: int,
+    time_limit_s: float | None = None,
+    page: PageView | None = None,
+    first: Prepared | None = None,
+) -> None:
+    """Run until no mission can be given out any more; log, recording and report are written into a folder.
+
+    `page` shows it; the log begins with the map that `first` knows. Raises InputError.
+    """
+    backend, clock = dispatch.backend, dispatch.backend.clock
+    dispatch.log = log = EventLog(out / "log.mcap", clock, apart=True)
+    artifacts, begun_s = Artifacts(log), clock.now()
     limit_s = TIME_LIMIT_S * max(1, len(dispatch.missions)) if time_limit_s is None else time_limit_s
+    asked = Control(pace=None) if page is None else page.control
     try:
-        with cancelled_by_signals(Control(pace=None)) as control, LockStepWorker(clock) as worker:
-            run(
+        if page is not None:
+            page.begin(log, backend.show_live())
+        if first is not None:
+            log_map(log, first)
+        with cancelled_by_signals(asked) as control, LockStepWorker(clock) as worker:
+            result = run(
                 (),
                 clock=clock,
                 worker=worker,
-                publish=dispatch.log,
+                publish=artifacts,
                 settings=RunSettings(seed=seed, time_limit_s=limit_s),
                 control=control,
+                observer=page,
                 dispatch=dispatch,
                 spare=dispatch.spare(),
             )
+        dispatch.close()
     finally:
-        dispatch.log.close()
-    dispatch.close()
-
-
-def told(store: MissionStore, numbers: Sequence[int]) -> list[dict[str, Any]]:
-    """Missions as JSON values, with their parts and what they are part of: whose each is or was, and how it ended."""
-    given = GivenMissions(store).all()
-    missions = {mission.id: mission for mission in store.missions()}
-    wanted = {*numbers, *(whole for number in numbers if (whole := given.get(number, GivenMission()).part_of))}
-    wanted |= {number for number, each in given.items() if each.part_of in wanted}
-    return [_told(missions[number], given) for number in sorted(wanted)]
-
-
-def _told(mission: StoredMission, given: Mapping[int, GivenMission]) -> dict[str, Any]:
-    known = given.get(mission.id, GivenMission())
-    parts = [each.robot for each in given.values() if each.part_of == mission.id and each.robot is not None]
-    return {
-        "id": mission.id,
-        "robot": parts[-1] if parts else known.robot,
-        "outcome": mission.state.value,
-        "referee": known.referee,
-        "reassigned": known.reassigned,
-        "message": mission.message,
-        "part_of": known.part_of,
-        "after": known.follows,
-    }
+        log.close()
+    recording = backend.leave(artifacts, out)
+    rows = mission_rows(dispatch.store, told(dispatch.store, list(dispatch.missions)))
+    kinds = {name: robot.kind for name, robot in dispatch.robots.items()}
+    lasted = f"{clock.now() - begun_s:.1f} s simulated in {result.wall_time_s:.1f} s"
+    facts = (("world and seed", f"{first.world.name}, seed {seed}"),) if first is not None else ()
+    write_fleet_report(
+        out, rows, dispatch.over, kinds, artifacts, read_events(log.path), (*facts, ("duration", lasted))
+    )
+    if page is not None:
+        page.end(recording)

@@ -28,8 +28,10 @@ def simulated_fleet(
     seed: int = 1,
     faults: Mapping[str, Sequence[str]] | None = None,
     console: Console | None = None,
+    record: bool = False,
 ) -> FleetDispatch:
-    """A fleet in the plant of a world (None: that of the first mission). `faults` are by the robots' names.
+    """A fleet in the plant of a world (None: that of the first mission). `faults` are by the robots' names; with
+    `record` it leaves a recording and pictures.
 
     Raises:
         InputError: the robots do not fit into the world, or a mission is for none of them or for another world.
@@ -53,7 +55,7 @@ def simulated_fleet(
         store,
         missions,
         robots,
-        SimulatedBackend(where, robots, seed=seed, record=False),
+        SimulatedBackend(where, robots, seed=seed, record=record),
         faults or {},
         charging_missions(where, knowledge, robots),
         knowledge.battery,

@@ -33,11 +33,13 @@ def log(
         Path | None, typer.Option("--map", help="Draw map, way, path and particles as PNG, and end.")
     ] = None,
     at: Annotated[float, typer.Option(min=0.0, help="When the map is drawn (s); else at the end.")] = math.inf,
+    robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
 ) -> None:
     """Print what happened in a run: what each node did and why, detections, the outcome, tracebacks of defects."""
     with refusals():
         history = read_history(file)
+        history = history if robot is None else history.of_robot(robot)
         if ros2 is not None:
             typer.echo(f"{write_ros2(history.events, ros2)} messages in {ros2}", err=True)
             return
@@ -64,7 +66,9 @@ def _show(history: History, console: Console, *, every_node: bool) -> None:
     """The timeline as a table, and the traceback of each defect below it."""
     entries = list(timeline(history.events, leaves_only=not every_node))
     prefix = _common([entry.about for entry in entries if entry.state is not None])
-    show_table(console, ("t (s)", "", "node or topic", "what"), (_row(entry, prefix) for entry in entries))
+    several = len(history.robots) > 1
+    rows = ((entry.robot, *_row(entry, prefix)) if several else _row(entry, prefix) for entry in entries)
+    show_table(console, (*(("robot",) if several else ()), "t (s)", "", "node or topic", "what"), rows)
     for event in history.events:
         if event.topic == ERRORS:
             head = f"{event.stamp_s:.2f} s, {event.data.get('node')}:"

@@ -12,8 +12,8 @@ from executive.cli.found_out import with_found_out
 from executive.cli.happening_log import HappeningLog
 from executive.cli.page_view import PageView, log_map
 from executive.cli.profiling import profiled
-from executive.cli.report import RobotReport, RunReport
-from executive.cli.report_file import TREE_FILE, write_report
+from executive.cli.report import RefereeReport, RobotReport, RunReport
+from executive.cli.report_file import EndedTree, write_report
 from executive.cli.requests import Prepared
 from executive.cli.signals import HUNG_UP, cancelled_by_signals
 from executive.cli.warm_up import warm_up
@@ -30,8 +30,6 @@ from executive.run.worker import LockStepWorker
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView, node_view
-from executive.view.collapse import DRAWN_NODES, folded_to, what_ran
-from executive.view.svg import to_svg
 from skills.faults.faulty_robot import with_faults
 from skills.faults.words import Fault, parse_fault
 
@@ -80,8 +78,10 @@ def run_request(
             page.begin(log, backend.show_live())
         log_map(log, prepared)
         world, seed = prepared.world.name, prepared.request.seed
+        kinds = {name: robot.kind for name, robot in prepared.robots.items()} if len(prepared.robots) > 1 else {}
         for each in prepared.all:
-            announce(log, clock, each.tree, each.knowledge, world=world, seed=seed, scenario=scenario.lines())
+            lines = scenario.lines()
+            announce(log, clock, each.tree, each.knowledge, world=world, seed=seed, scenario=lines, robots=kinds)
         watched = HappeningLog(log, entries[0].robot, backend.happened) if scenario else None
         with cancelled_by_signals(control or Control(pace=None)) as controlled, LockStepWorker(clock) as worker:
             begin = run if profile is None else profiled(profile, run, backend, entries, worker)
@@ -105,11 +105,11 @@ def run_request(
         log.close()
     events = mission_events(log.path)
     artifacts.recall(events)
-    finished, tree = _judged(prepared, backend, result, log)
+    finished, ended = _judged(prepared, backend, result, log)
     report = with_found_out(replace(finished.report, work=counts), prepared.knowledge, result, artifacts, events)
     draw_answer(artifacts, out)
     recording = backend.leave(artifacts, out)
-    write_report(prepared, report, tree, finished.tree, artifacts, events)
+    write_report(prepared, report, ended, artifacts, events)
     if page is not None:
         page.end(recording)
     return replace(finished, report=report)
@@ -157,27 +157,32 @@ def _keep(durable: Durable, log: EventLog, robot_name: str) -> None:
         log(ERROR_TOPIC, {"node": robot_name, "what": "keep the mission's state", "traceback": trouble})
 
 
-def _judged(prepared: Prepared, backend: Backend, result: RunResult, log: EventLog) -> tuple[Finished, CompiledTree]:
-    """The report of a run with what the referee saw, and the tree of the robot that ended worst, drawn as it ended."""
+def _judged(
+    prepared: Prepared, backend: Backend, result: RunResult, log: EventLog
+) -> tuple[Finished, Sequence[EndedTree]]:
+    """The report of a run with what the referee saw, and the tree of each robot as it ended."""
     trees = {each.tree.robot_name: result.trees.get(each.tree.robot_name, each.tree) for each in prepared.all}
     robots = {each.robot_name: _robot_report(each, trees[each.robot_name], backend, prepared) for each in result.robots}
     worst = min(robots, key=lambda name: (robots[name].achieved, name != result.worst.robot_name))
-    ended = next(each for each in result.robots if each.robot_name == worst)
-    view = node_view(trees[worst].root, ended.states)
-    picture = to_svg(folded_to(what_ran(view), DRAWN_NODES), title=trees[worst].mission_name)
-    (prepared.request.out / TREE_FILE).write_text(picture, encoding="utf-8")
+    views = {each.robot_name: node_view(trees[each.robot_name].root, each.states) for each in result.robots}
+    ended = [EndedTree(trees[name], view, robots[name]) for name, view in views.items()]
     report = _report(prepared, robots[worst], result, log=str(log.path))
-    return Finished(replace(report, robots=robots) if prepared.robots else report, view), trees[worst]
+    return Finished(replace(report, robots=robots) if prepared.robots else report, views[worst]), ended
 
 
 def _robot_report(ended: RobotResult, tree: CompiledTree, backend: Backend, prepared: Prepared) -> RobotReport:
     robot = prepared.robots.get(ended.robot_name)
+    return robot_report(ended, tree, prepared.kind if robot is None else robot.kind, backend.judge(tree, ended))
+
+
+def robot_report(ended: RobotResult, tree: CompiledTree, kind: str, seen: RefereeReport | None) -> RobotReport:
+    """How a robot's mission ended, and what the referee has seen of it."""
     return RobotReport(
-        kind=prepared.kind if robot is None else robot.kind,
+        kind=kind,
         outcome=ended.outcome.value,
         cause=None if ended.cause is None else ended.cause.value,
         message=ended.message,
-        referee=backend.judge(tree, ended),
+        referee=seen,
         commands=tuple(map(str, tree.commands)),
     )
 

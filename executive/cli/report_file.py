@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
@@ -12,23 +12,35 @@ import cv2
 import numpy as np
 from py_trees.common import Status
 
-from executive.cli.artifacts import Artifacts, detection_picture, to_jpeg
+from executive.cli.artifacts import Artifacts, detection_picture, file_name, to_jpeg
 from executive.cli.picture_files import read_picture
-from executive.cli.report import VERDICTS, RunReport, counts_text
+from executive.cli.report import VERDICTS, RobotReport, RunReport, counts_text
 from executive.cli.requests import Prepared
 from executive.mission.errors import InputError
 from executive.record.reader import Event
 from executive.record.schemas import TRANSITIONS
+from executive.run.outcome import Outcome
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView
+from executive.view.collapse import DRAWN_NODES, folded_to, what_ran
 from executive.view.map_picture import map_picture
-from executive.view.report_page import AnswerRow, PagePicture, ReportPage, SeenRow, StepRow, Verdict, to_report
-from executive.view.styles import Styles, style_of
+from executive.view.report_page import (
+    AnswerRow,
+    PagePicture,
+    ReportPage,
+    ReportPart,
+    SeenRow,
+    StepRow,
+    Verdict,
+    to_report,
+)
+from executive.view.styles import ROBOT_COLOURS, Styles, style_of
+from executive.view.svg import to_svg
 
-__all__ = ["REPORT", "step_rows", "write_report"]
+__all__ = ["REPORT", "EndedTree", "map_of", "part_of", "save_report", "step_rows", "write_report"]
 
 REPORT: Final = "report.html"
-TREE_FILE: Final = "tree.svg"
+TREE: Final = "tree"
 _CAPTIONS: Final = {
     "detection": "What was detected first",
     "grasp": "The grasp",
@@ -40,26 +52,46 @@ _SKIPPED: Final = "skipped"
 _SKIPS: Final = frozenset({"skip", "ask"})
 
 
+@dataclass(frozen=True)
+class EndedTree:
+    """A robot's tree as it ended, and what is said of that."""
+
+    tree: CompiledTree
+    view: NodeView
+    report: RobotReport
+
+    @property
+    def picture(self) -> str:
+        """What ran of the tree, as SVG."""
+        return to_svg(folded_to(what_ran(self.view), DRAWN_NODES), title=self.tree.mission_name)
+
+    def steps(self, events: Sequence[Event]) -> tuple[StepRow, ...]:
+        """The steps of its mission, with their times by a log."""
+        mission = _below(self.view, self.tree.mission.path_id) or self.view
+        return tuple(step_rows(mission, frozenset(part.path_id for part in self.tree.parts), _spans(events)))
+
+
 def write_report(
     prepared: Prepared,
     report: RunReport,
-    tree: CompiledTree,
-    view: NodeView,
+    ended: Sequence[EndedTree],
     artifacts: Artifacts,
     events: Sequence[Event],
 ) -> Path:
-    """Write the report of a run into its folder; its path.
+    """Write the report of a run and the picture of each tree into its folder; the report's path.
 
-    `view` is the tree as it ended, `events` are those of the run's log, `artifacts` has the run's pictures;
-    the picture of the tree stands in the folder.
+    `ended` are the robots' trees, `events` are those of the run's log, `artifacts` has the run's pictures.
     """
-    out, mission = prepared.request.out, _below(view, tree.mission.path_id) or view
+    out, several = prepared.request.out, len(prepared.robots) > 1
+    names = tuple(prepared.robots)
+    for each in ended:
+        (out / f"{file_name(TREE, each.tree.robot_name, names)}.svg").write_text(each.picture, encoding="utf-8")
     page = ReportPage(
         title=prepared.mission.name,
         request=_request(prepared),
-        commands=report.commands,
-        verdicts=tuple(_verdicts(report)),
-        facts=_facts(report, tree.robot_name),
+        commands=() if several else report.commands,
+        verdicts=() if several else tuple(_verdicts(report)),
+        facts=_facts(report, ", ".join(names) if several else ended[0].tree.robot_name),
         answers=[
             AnswerRow(
                 one.t_s,
@@ -73,12 +105,34 @@ def write_report(
         ],
         said=[(one.t_s, one.text) for one in report.said],
         seen=[SeenRow(each.t_s, each.name, _where(each.surface, each.place)) for each in report.seen_objects],
-        steps=tuple(step_rows(mission, frozenset(part.path_id for part in tree.parts), _spans(events))),
+        steps=() if several else ended[0].steps(events),
         events=() if report.referee is None else report.referee.events,
-        map=_map(artifacts, events),
-        pictures=tuple(_pictures(artifacts)),
-        tree_svg=(out / TREE_FILE).read_text(encoding="utf-8"),
+        map=map_of(artifacts, events),
+        pictures=() if several else tuple(_pictures(artifacts, ended[0].tree.robot_name, names)),
+        tree_svg="" if several else ended[0].picture,
+        parts=[part_of(each, names, artifacts, events) for each in ended] if several else (),
     )
+    return save_report(out, page)
+
+
+def part_of(
+    ended: EndedTree, robots: Sequence[str], artifacts: Artifacts, events: Sequence[Event], *, title: str | None = None
+) -> ReportPart:
+    """What one of several robots did, for the report; under its name and kind unless there is a title."""
+    name, report = ended.tree.robot_name, ended.report
+    return ReportPart(
+        title=title or f"{name} ({report.kind})",
+        colour=ROBOT_COLOURS[sorted(robots).index(name) % len(ROBOT_COLOURS)],
+        commands=report.commands,
+        verdicts=tuple(_verdicts(report)),
+        steps=ended.steps(events),
+        pictures=tuple(_pictures(artifacts, name, robots)) if title is None else (),
+        tree_svg=ended.picture,
+    )
+
+
+def save_report(out: Path, page: ReportPage) -> Path:
+    """Write a report's page into a folder; its path."""
     path = out / REPORT
     path.write_text(to_report(page), encoding="utf-8")
     return path
@@ -155,9 +209,11 @@ def _request(prepared: Prepared) -> str:
     return f"mission file {request.file.name}" if request.file is not None else "commands"
 
 
-def _verdicts(report: RunReport) -> Iterator[Verdict]:
+def _verdicts(report: RunReport | RobotReport) -> Iterator[Verdict]:
     cause = f" ({report.cause})" if report.cause else ""
-    yield Verdict("The tree claims", report.claimed, f"{report.outcome}{cause}", report.message)
+    yield Verdict(
+        "The tree claims", report.outcome == Outcome.SUCCESS.value, f"{report.outcome}{cause}", report.message
+    )
     if report.referee is not None:
         good = report.referee.success
         yield Verdict("The referee saw", good, VERDICTS[good], report.referee.why)
@@ -177,7 +233,7 @@ def _where(surface: str | None, place: str | None) -> str:
     return ", ".join(filter(None, (on, place))) or "somewhere else"
 
 
-def _map(artifacts: Artifacts, events: Sequence[Event]) -> PagePicture | None:
+def map_of(artifacts: Artifacts, events: Sequence[Event]) -> PagePicture | None:
     """The world from above where the run was recorded, else the robot's own map; None where there is neither."""
     if (drawn := _drawn(artifacts, "map")) is not None:
         return PagePicture(_MAP, drawn)
@@ -188,13 +244,14 @@ def _map(artifacts: Artifacts, events: Sequence[Event]) -> PagePicture | None:
     return PagePicture(_MAP, to_jpeg(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8)))
 
 
-def _pictures(artifacts: Artifacts) -> Iterator[PagePicture]:
-    """The pictures of a recorded run; of another, what was detected first."""
+def _pictures(artifacts: Artifacts, robot: str, robots: Sequence[str]) -> Iterator[PagePicture]:
+    """The pictures of a robot in a recorded run; of another, what was detected first."""
+    detection = artifacts.of(robot).detection
     for name, caption in _CAPTIONS.items():
-        if (drawn := _drawn(artifacts, name)) is not None:
+        if (drawn := _drawn(artifacts, file_name(name, robot, robots))) is not None:
             yield PagePicture(caption, drawn)
-        elif name == "detection" and artifacts.detection is not None and not artifacts.pictures:
-            yield PagePicture(caption, to_jpeg(detection_picture(artifacts.detection)))
+        elif name == "detection" and detection is not None and not artifacts.pictures:
+            yield PagePicture(caption, to_jpeg(detection_picture(detection)))
 
 
 def _drawn(artifacts: Artifacts, name: str) -> bytes | None:

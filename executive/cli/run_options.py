@@ -19,6 +19,7 @@ __all__ = [
     "FAULT",
     "FRICTION",
     "LIGHT",
+    "NO_RECORD",
     "PEOPLE",
     "RANDOM_FAULTS",
     "ROBOTS",
@@ -26,6 +27,9 @@ __all__ = [
     "SET",
     "START",
     "START_OR_UNKNOWN",
+    "VIEW",
+    "VIEW_FOR",
+    "VIEW_PORT",
     "StartCommand",
     "joined",
     "start_pose",
@@ -71,6 +75,10 @@ ROBOTS = Annotated[
         "--robots", metavar="NAME=KIND,...", help="The robots and their kinds, as in alice=spot,bob=fetch@1.0,2.0,0.0."
     ),
 ]
+NO_RECORD = Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")]
+VIEW = Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")]
+VIEW_FOR = Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")]
+VIEW_PORT = Annotated[int, typer.Option(min=0, max=65535, help="The page's port; 0 takes a free one.")]
 SET = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value for a parameter of the mission file.")
 ]

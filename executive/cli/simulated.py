@@ -116,7 +116,7 @@ class SimulatedBackend:
         if not self._record:
             return None
         self._simulation.save_recording(out / "recording.html")
-        draw_artifacts(artifacts, self._simulation, min(self._robots), out)
+        draw_artifacts(artifacts, self._simulation, sorted(self._robots), out)
         return out / "recording.html"
 
 

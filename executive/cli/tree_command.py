@@ -62,12 +62,13 @@ def tree(
     depth: Annotated[int | None, typer.Option(min=0, help="Show only so many levels below the root.")] = None,
     most: Annotated[int | None, typer.Option(min=1, help="Fold what is done or not begun above so many nodes.")] = None,
     at: Annotated[float | None, typer.Option(min=0.0, help="Of a log: at this time (s), not at its end.")] = None,
+    robot: Annotated[str | None, typer.Option(metavar="NAME", help="Of a log: of this one of several robots.")] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Write it to this file.")] = None,
     ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,
 ) -> None:
     """Show the tree of a sentence or a mission file before it runs, or of a log as it last was."""
     with refusals():
-        whole = _view(file, say, world, at)
+        whole = _view(file, say, world, at, robot)
         shown = whole if depth is None else folded_below(whole, depth)
         few = most or _MOST.get(form)
         text = _FORMS[form](shown if few is None else folded_to(shown, few), ascii_only)
@@ -77,12 +78,17 @@ def tree(
             _write(output, text)
 
 
-def _view(text: str | None, say: str | None, world: str | None, at_s: float | None) -> NodeView:
+def _view(text: str | None, say: str | None, world: str | None, at_s: float | None, robot: str | None) -> NodeView:
     """What ends in .mcap is a log, what ends in .yaml, exists or is shipped a mission file, and all else a sentence."""
     if text is not None and text.endswith(LOG_SUFFIX):
-        return read_history(Path(text)).trees(at_s)[-1]
-    if at_s is not None:
-        raise InputError("--at is for logs", hint="name a log.mcap that a run has written")
+        history = read_history(Path(text))
+        if robot is None and len(history.robots) > 1:
+            known = ", ".join(history.robots)
+            raise InputError("the log has several robots", hint=f"add --robot with one of: {known}", file=history.file)
+        return (history if robot is None else history.of_robot(robot)).trees(at_s)[-1]
+    if at_s is not None or robot is not None:
+        option = "--at" if robot is None else "--robot"
+        raise InputError(f"{option} is for logs", hint="name a log.mcap that a run has written")
     prepared = prepare(_request(text, say, world))
     for each in prepared.all:
         for note in each.mission.notes:

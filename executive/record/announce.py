@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
+from types import MappingProxyType
 
 from executive.mission.command import START, Command
 from executive.mission.knowledge import Knowledge
@@ -27,11 +28,15 @@ def announce(
     world: str,
     seed: int,
     scenario: Sequence[str] = (),
+    robots: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """Write the run's facts, then one message for each command. `scenario` tells what goes wrong and happens in it."""
+    """Write the run's facts, then one message for each command. `scenario` tells what goes wrong and happens in it,
+    `robots` the kind of each robot where there are several.
+    """
     texts = [str(command) for command in tree.commands]
     facts = {"world": world, "seed": seed, "commands": texts, "versions": versions(PACKAGES)}
-    publish(RUN, {**facts, "scenario": list(scenario)} if scenario else facts)
+    more = {"scenario": list(scenario), "robots": dict(robots)}
+    publish(RUN, {**facts, **{key: value for key, value in more.items() if value}})
     messages = task_messages(
         tree.commands,
         stamp=clock.now(),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from py_trees.common import Status
 
 from executive.mission.errors import InputError
+from executive.mission.robots import robot_called
 from executive.record.reader import Event, read_events
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.tree.node_view import NodeView, logged_view
@@ -32,6 +33,19 @@ class History:
             if event.topic == TRANSITIONS:
                 yield {"t": event.data.get("t", event.stamp_s), **_picked(event.data, TRANSITION_KEYS[1:])}
 
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The names of the robots, in order."""
+        return tuple(sorted({name for event in self.events if (name := robot_of(event))}))
+
+    def of_robot(self, name: str) -> History:
+        """What one robot did, with what is no robot's. Raises InputError: the log has no such robot."""
+        known = robot_called(name, self.robots)
+        if known is None:
+            hint = f"there are: {', '.join(self.robots)}" if self.robots else "no robot's messages are in it"
+            raise InputError(f"the log has no robot '{name[:60]}'", hint=hint, file=self.file)
+        return replace(self, events=tuple(event for event in self.events if robot_of(event) in ("", known)))
+
     def trees(self, until_s: float | None = None) -> tuple[NodeView, ...]:
         """The trees in the order of their beginning, in their state at a time (s) of the robot's clock, or the last.
 
@@ -51,6 +65,11 @@ class History:
             return tuple(logged_view(data["root"], states) for data, states in found)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"the log's tree is broken ({error})", hint="run it again", file=self.file) from error
+
+
+def robot_of(event: Event) -> str:
+    """The name of the robot whose message it is; empty where it is no robot's."""
+    return str(event.data.get("robot") or event.data.get("robot_name") or "")
 
 
 def read_history(path: Path) -> History:

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from executive.record.history import logged_activity, logged_state
+from executive.record.history import logged_activity, logged_state, robot_of
 from executive.record.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
 from executive.record.reader import Event
-from executive.record.schemas import ACTIVITY, CONTROL, ERRORS, OUTCOME, RUN, SPEECH, TRANSITIONS, TREE, WALL
+from executive.record.schemas import ACTIVITY, CONTROL, ERRORS, MISSIONS, OUTCOME, RUN, SPEECH, TRANSITIONS, TREE, WALL
 from executive.tree.snapshot import NodeState
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One line: time on the robot's clock (s), what it is about, and what happened; `state` of a node's change."""
+    """One line: time on the robot's clock (s), what it is about, and what happened; `state` of a node's change, `robot`
+    whose it is.
+    """
 
     t: float
     about: str
     text: str
     state: NodeState | None = None
+    robot: str = ""
 
 
 def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[Entry]:
@@ -28,6 +31,10 @@ def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[
 
     `leaves_only` leaves out the changes of inner nodes that did not fail, and single late ticks.
     """
+    return (replace(entry, robot=robot_of(event)) for event, entry in _entries(events, leaves_only))
+
+
+def _entries(events: Iterable[Event], leaves_only: bool) -> Iterator[tuple[Event, Entry]]:
     inner: set[str] = set()
     commands: Sequence[str] = ()
     for event in events:
@@ -38,16 +45,16 @@ def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[
         if event.topic == TRANSITIONS:
             entry = _transition(event)
             if not leaves_only or entry.about not in inner or (entry.state is not None and entry.state.cause):
-                yield entry
+                yield event, entry
         elif event.topic == ACTIVITY:
             state = logged_activity(event.data)
-            yield Entry(event.data.get("t", event.stamp_s), event.data["node"], state.message, state)
+            yield event, Entry(event.data.get("t", event.stamp_s), event.data["node"], state.message, state)
         elif event.topic == TASK_TOPIC:
-            yield Entry(event.stamp_s, event.topic, _task(event.data, commands))
+            yield event, Entry(event.stamp_s, event.topic, _task(event.data, commands))
         elif event.topic in _TEXTS and not (leaves_only and event.topic == WALL and "wall_time_s" not in event.data):
             text = _TEXTS[event.topic](event.data)
             if text:
-                yield Entry(event.stamp_s, event.topic, text)
+                yield event, Entry(event.stamp_s, event.topic, text)
 
 
 def _inner_nodes(structure: Mapping[str, Any]) -> set[str]:
@@ -66,6 +73,10 @@ def _run(data: Mapping[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in data.get("versions", {}).items())
     scenario = "".join(f"; {line}" for line in data.get("scenario", ()))
     return f"world {data.get('world')}, seed {data.get('seed')}; {versions}{scenario}"
+
+
+def _mission(data: Mapping[str, Any]) -> str:
+    return f"{data.get('id')} ({data.get('robot') or 'nobody'}): {data.get('outcome')}"
 
 
 def _outcome(data: Mapping[str, Any]) -> str:
@@ -96,6 +107,7 @@ _TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
     RUN: _run,
     OUTCOME: _outcome,
     SPEECH: lambda data: f'{data.get("robot")} says: "{data.get("text")}"',
+    MISSIONS: lambda data: "; ".join(_mission(each) for each in data.get("missions", ())),
     CONTROL: lambda data: f"{data.get('what')}: {data.get('message')}",
     DETECT_TOPIC: lambda data: f"look for {', '.join(data.get('class_name', ()))}",
     DESTINATION_TOPIC: _seen,

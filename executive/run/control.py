@@ -381,7 +381,8 @@ class Control:
 
     def _refuse_mission(self, tree: CompiledTree) -> None:
         self._refuse_stranger(tree.robot_name)
-        waiting = [other.mission_name for other in (*self._requests.preempts, *self._requests.later)]
+        others = (*self._requests.preempts, *self._requests.later)
+        waiting = [other.mission_name for other in others if other.robot_name == tree.robot_name]
         if tree.mission_name in (*self._missions.get(tree.robot_name, ()), *waiting):
             raise ValueError(f"the mission '{tree.mission_name}' is under way already")
 

@@ -250,7 +250,7 @@ class _Run:
                 for session in self._sessions:
                     if session.ends:
                         self._sense(session)
-                        if requests.hold is not None:
+                        if requests.held(session.name):
                             session.hold()
                         elif session.may_move():
                             session.tick_end()
@@ -319,15 +319,12 @@ class _Run:
         self._rest(live, turn, requests.held)
         self._tick(moving, requests.breakpoints)
         for session in live:
-            if session.result is not None:  # it was cancelled, or its lease was another's for too long
-                cancelled = session.result.outcome is Outcome.CANCELLED
+            if session.finished:
+                lost = session.result is not None and session.result.outcome is not Outcome.CANCELLED
+                result = session.close()
                 self._leave_way(session)
-                self._end_given(session, None if cancelled else session.result.message)
-            elif session.finished:
-                session.close()
-                self._leave_way(session)
-                self._end_given(session, None)
-                if self._resting is not None and self._others_go_on(session):
+                self._end_given(session, result.message if lost else None)  # its lease was another's for too long
+                if not lost and self._resting is not None and self._others_go_on(session):
                     self._resting.rest(session)
             elif self._given is not None:
                 self._for(session, partial(self._given.look, session), None)

@@ -10,7 +10,7 @@ from typing import Final
 
 from executive.mission.errors import InputError, disk_is_full
 
-VERSION: Final = 8
+VERSION: Final = 9
 APPLICATION_ID: Final = 0x45525244  # "ERRD"
 BUSY_S: Final = 2.0
 _DAMAGED: Final = "move it away (its missions are lost), or name another by --store"

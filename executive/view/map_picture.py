@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from executive.mission.errors import InputError
 from executive.record.reader import Event
-from executive.record.schemas import MAP, NAVIGATION, PATH, POSE
+from executive.record.schemas import MAP, NAVIGATION, PATH, POSE, WAY
+from executive.view.styles import ROBOT_COLOURS, rgb_of
 
 WIDTH_PX: Final = 1400
 FOOTPRINT_M: Final = (1.1, 0.5)
@@ -49,17 +50,19 @@ class _Frame:
 def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.uint8]:
     """The map (height, width, 3; blue, green, red) as it was known at a time on the robot's clock.
 
-    On it are the way walked, the planned path, the particles of the localiser, the cells of the costmap that something
-    unmapped blocks, and the footprint. Raises InputError: the log has no map.
+    On it are the way walked, the planned path, what is reserved of it, the particles of the localiser, the cells of the
+    costmap that something unmapped blocks, and the footprint; among several robots each has its colour.
+    Raises InputError: the log has no map.
     """
     known = [event for event in events if event.stamp_s <= at_s]
     maps = [event.data for event in events if event.topic == MAP]
     if not maps:
         raise InputError("the log has no map", hint="give the log.mcap of a run with a world that has one")
     picture, frame = _ground(maps[-1])
-    robots = {event.data["robot"] for event in known if event.topic == POSE}
-    for robot in sorted(robots):
-        _draw_robot(picture, frame, robot, [event for event in known if event.data.get("robot") == robot])
+    robots = sorted({event.data["robot"] for event in known if event.topic == POSE})
+    for number, robot in enumerate(robots):
+        colour = rgb_of(ROBOT_COLOURS[number % len(ROBOT_COLOURS)])[::-1] if len(robots) > 1 else None
+        _draw_robot(picture, frame, robot, [event for event in known if event.data.get("robot") == robot], colour)
     return picture
 
 
@@ -79,8 +82,10 @@ def _ground(data: Mapping[str, Any]) -> tuple[NDArray[np.uint8], _Frame]:
     return picture, frame
 
 
-def _draw_robot(picture: NDArray[np.uint8], frame: _Frame, name: str, events: Sequence[Event]) -> None:
-    """One robot: what is known of it by these events."""
+def _draw_robot(
+    picture: NDArray[np.uint8], frame: _Frame, name: str, events: Sequence[Event], colour: Colour | None
+) -> None:
+    """One robot: what is known of it by these events; in a colour of its own (blue, green, red) where it has one."""
     poses = [event.data for event in events if event.topic == POSE]
     paths = [event.data["poses"] for event in events if event.topic == PATH]
     views = [event.data for event in events if event.topic == NAVIGATION]
@@ -88,16 +93,19 @@ def _draw_robot(picture: NDArray[np.uint8], frame: _Frame, name: str, events: Se
         side = max(1, round(0.5 * _CELL_M * frame.pixels_per_m))
         for column, row in frame.pixels(_pairs(views[-1], "seen")).tolist():
             cv2.rectangle(picture, (column - side, row - side), (column + side, row + side), _SEEN, -1)
+    ways = [event.data for event in events if event.topic == WAY]
+    if ways and ways[-1]["turn"] is not None:
+        _draw_way(picture, frame.pixels(_pairs(ways[-1], "")), colour or _PLAN)
     places = [(pose["pose"]["position"]["x"], pose["pose"]["position"]["y"]) for pose in poses]
-    cv2.polylines(picture, [frame.pixels(places)], False, _TRAIL, 2, cv2.LINE_AA)
+    cv2.polylines(picture, [frame.pixels(places)], False, colour or _TRAIL, 2, cv2.LINE_AA)
     if paths:
         plan = [(pose["position"]["x"], pose["position"]["y"]) for pose in paths[-1]]
-        cv2.polylines(picture, [frame.pixels(plan)], False, _PLAN, 3, cv2.LINE_AA)
+        cv2.polylines(picture, [frame.pixels(plan)], False, colour or _PLAN, 3, cv2.LINE_AA)
     yaw = float(poses[-1]["yaw_rad"])
     corners = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)]) * FOOTPRINT_M / 2.0
     turned = corners @ np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]]) + places[-1]
     body = frame.pixels(turned.tolist())
-    cv2.fillPoly(picture, [body], _ROBOT, cv2.LINE_AA)
+    cv2.fillPoly(picture, [body], colour or _ROBOT, cv2.LINE_AA)
     cv2.polylines(picture, [body], True, _INK, 2, cv2.LINE_AA)
     cv2.line(picture, body[0].tolist(), body[1].tolist(), _INK, 5, cv2.LINE_AA)
     if views:
@@ -106,8 +114,16 @@ def _draw_robot(picture: NDArray[np.uint8], frame: _Frame, name: str, events: Se
     _write(picture, name, frame.pixels([places[-1]])[0] + [0, -round(0.6 * frame.pixels_per_m)])
 
 
+def _draw_way(picture: NDArray[np.uint8], pixels: NDArray[np.int32], colour: Colour) -> None:
+    """What is reserved: a broad pale band, and a ring where it ends."""
+    pale = tuple(round(0.35 * part + 0.65 * 255) for part in colour)
+    cv2.polylines(picture, [pixels], False, pale, 15, cv2.LINE_AA)
+    cv2.circle(picture, pixels[-1].tolist(), 9, colour, 3, cv2.LINE_AA)
+
+
 def _pairs(data: Mapping[str, Any], name: str) -> list[tuple[float, float]]:
-    return list(zip(data[f"{name}_x"], data[f"{name}_y"], strict=True))
+    x, y = (data[f"{name}_{axis}" if name else axis] for axis in "xy")
+    return list(zip(x, y, strict=True))
 
 
 def _write(picture: NDArray[np.uint8], text: str, middle: NDArray[np.int32]) -> None:

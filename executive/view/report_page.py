@@ -12,7 +12,17 @@ from executive.view.server import PAGE_FOLDER
 from executive.view.styles import NodeStyle, Styles
 from executive.view.text import printable
 
-__all__ = ["AnswerRow", "PagePicture", "ReportPage", "SeenRow", "StepRow", "Verdict", "to_report"]
+__all__ = [
+    "AnswerRow",
+    "MissionRow",
+    "PagePicture",
+    "ReportPage",
+    "ReportPart",
+    "SeenRow",
+    "StepRow",
+    "Verdict",
+    "to_report",
+]
 
 _STYLE_FILE: Final = "report.css"
 _GOOD: Final = {True: Styles.SUCCESS.value, False: Styles.FAILURE.value, None: Styles.CANCELLED.value}
@@ -71,8 +81,39 @@ class StepRow:
 
 
 @dataclass(frozen=True)
+class MissionRow:
+    """A mission that was given out: its number, what was asked for, whose it was, how it ended (`good`: None while it
+    has not), how often it was given to another robot, and the sentence of its end.
+    """
+
+    number: int
+    request: str
+    robot: str
+    good: bool | None
+    word: str
+    reassigned: int
+    message: str
+
+
+@dataclass(frozen=True)
+class ReportPart:
+    """What one of several robots did, or one mission of a fleet; `colour` is the robot's (hex)."""
+
+    title: str
+    colour: str
+    commands: Sequence[str]
+    verdicts: Sequence[Verdict]
+    steps: Sequence[StepRow]
+    pictures: Sequence[PagePicture] = ()
+    tree_svg: str = ""
+
+
+@dataclass(frozen=True)
 class ReportPage:
-    """All that the page says. `request` is the sentence or the file, `facts` are pairs of a name and a value."""
+    """All that the page says. `request` is the sentence or the file, `facts` are pairs of a name and a value.
+
+    With several robots, `parts` has what each did, and `missions` what was given out to them.
+    """
 
     title: str
     request: str
@@ -87,6 +128,8 @@ class ReportPage:
     map: PagePicture | None = None
     pictures: Sequence[PagePicture] = ()
     tree_svg: str = ""
+    parts: Sequence[ReportPart] = ()
+    missions: Sequence[MissionRow] = ()
 
 
 def to_report(page: ReportPage) -> str:
@@ -94,6 +137,8 @@ def to_report(page: ReportPage) -> str:
     style = (PAGE_FOLDER / _STYLE_FILE).read_text(encoding="utf-8")
     parts = (
         _head(page),
+        _section("Missions", _missions(page.missions)),
+        *(_part(part) for part in page.parts),
         _section("Answers", _answers(page.answers)),
         _section("Said", _said(page.said)),
         _section("Seen on the way", _seen(page.seen)),
@@ -120,13 +165,40 @@ def _section(title: str, body: str) -> str:
 
 def _head(page: ReportPage) -> str:
     facts = "".join(f"<div><dt>{_safe(name)}</dt><dd>{_safe(value)}</dd></div>" for name, value in page.facts)
-    commands = "".join(f"<li>{_safe(command)}</li>" for command in page.commands)
     return (
         f'<header>\n<h1>{_safe(page.title)}</h1>\n<p class="request">{_safe(page.request)}</p>\n</header>\n'
-        f'<div class="verdicts">\n{"".join(map(_verdict, page.verdicts))}</div>\n'
-        f'<dl class="facts">{facts}</dl>\n'
-        + (f'<details class="commands"><summary>Commands</summary><ul>{commands}</ul></details>\n' if commands else "")
+        f'{_verdicts(page.verdicts)}<dl class="facts">{facts}</dl>\n{_commands(page.commands)}'
     )
+
+
+def _part(part: ReportPart) -> str:
+    """What one robot did, one below another."""
+    return (
+        f'<section class="part" style="border-color:{part.colour}">\n<h2>{_safe(part.title)}</h2>\n'
+        f"{_verdicts(part.verdicts)}{_commands(part.commands)}{_steps(part.steps)}"
+        f"{_gallery(part.pictures)}{_tree(part.tree_svg)}</section>\n"
+    )
+
+
+def _missions(rows: Sequence[MissionRow]) -> str:
+    cells = (
+        f'<td class="t">{row.number}</td><td>{_safe(row.request)}</td><td>{_safe(row.robot)}</td>'
+        f'<td><span class="pill {_look(row.good)}">{_safe(row.word)}</span></td>'
+        f'<td class="t">{row.reassigned or ""}</td><td class="why">{_safe(row.message)}</td>'
+        for row in rows
+    )
+    return _table(
+        "<th></th><th>mission</th><th>robot</th><th>outcome</th><th>given anew</th><th>what came of it</th>", cells
+    )
+
+
+def _verdicts(verdicts: Sequence[Verdict]) -> str:
+    return f'<div class="verdicts">\n{"".join(map(_verdict, verdicts))}</div>\n' if verdicts else ""
+
+
+def _commands(commands: Sequence[str]) -> str:
+    items = "".join(f"<li>{_safe(command)}</li>" for command in commands)
+    return f'<details class="commands"><summary>Commands</summary><ul>{items}</ul></details>\n' if items else ""
 
 
 def _verdict(verdict: Verdict) -> str:
@@ -204,8 +276,12 @@ def _list(texts: Sequence[str]) -> str:
 
 def _pictures(page: ReportPage) -> str:
     whole = "" if page.map is None else f'<div class="map">{_image(page.map, caption=True)}</div>\n'
-    others = "".join(_image(picture, caption=True) for picture in page.pictures)
-    return whole + (f'<div class="pictures">{others}</div>\n' if others else "")
+    return whole + _gallery(page.pictures)
+
+
+def _gallery(pictures: Sequence[PagePicture]) -> str:
+    images = "".join(_image(picture, caption=True) for picture in pictures)
+    return f'<div class="pictures">{images}</div>\n' if images else ""
 
 
 def _image(picture: PagePicture, *, caption: bool = False) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import Final
 
 from py_trees.common import Status
 
@@ -38,6 +39,16 @@ class Styles(enum.Enum):
     SUCCESS = NodeStyle("success", "✓", "[+]", "#009e73", "#00573f", "#e6f6f1", "green")
     FAILURE = NodeStyle("failure", "✗", "[x]", "#d55e00", "#8f3f00", "#fdeee3", "bold red")
     CANCELLED = NodeStyle("cancelled", "⊘", "[/]", "#cc79a7", "#84305d", "#faeef5", "magenta", "9 3 2 3")
+
+
+ROBOT_COLOURS: Final = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
+"""One for each of several robots, in the order of their names; a name always stands beside it."""
+
+
+def rgb_of(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue, 0 to 255, of a hex colour."""
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+    return red, green, blue
 
 
 def style_of(state: NodeState) -> NodeStyle:

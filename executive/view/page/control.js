@@ -59,9 +59,18 @@
       this.clearing = setTimeout(() => { byId("said").textContent = ""; }, 6000 + 60 * text.length);
     }
 
-    async answer(text) {
+    // The robots of the run: with several, a sentence is for one of them or says itself whom it is for.
+    meet(robots) {
+      const choice = byId("whom");
+      choice.hidden = robots.length < 2;
+      if (choice.hidden || choice.children.length === robots.length + 1) return;
+      choice.replaceChildren(...["", ...robots].map((name) => Object.assign(document.createElement("option"), { value: name, textContent: name || "as said" })));
+      for (const [id, title] of [["pause", "Pause all robots, or let them go on (p or space)"], ["cancel", "End all missions (c)"], ["stop", "Stop all robots at once (x)"]]) byId(id).title = title;
+    }
+
+    async answer(text, robot) {
       this.saying = true;
-      if (await this.do("say", { text })) byId("sentence").value = "";
+      if (await this.do("say", robot ? { text, robot } : { text })) byId("sentence").value = "";
       this.saying = false;
     }
 
@@ -70,7 +79,8 @@
       if (!text) return;
       this.saying = true;
       this.tell("…", false);
-      if (await this.do(action, { text })) input.value = "";
+      const robot = byId("whom").value;
+      if (await this.do(action, robot ? { text, robot } : { text })) input.value = "";
       this.saying = false;
     }
 

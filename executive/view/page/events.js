@@ -8,6 +8,7 @@
     run: (data) => ["run", `world ${data.world}, seed ${data.seed}: ${(data.commands || []).join(" · ")}`],
     object_to_detect: (data) => ["look for", data.class_name.join(", ")],
     object_destination: (data) => ["found", data.class_name],
+    missions: (data) => ["missions", data.missions.map((each) => `${each.id} ${each.robot || "nobody"}: ${each.outcome}`).join(", ")],
     speech: (data) => [`${data.robot} says`, `“${data.text}”`],
     errors: (data) => ["defect", (data.traceback || "").trim().split("\n").pop()],
     control: (data) => [data.what || "control", data.message || ""],
@@ -37,7 +38,7 @@
       }
       if (!TEXTS[topic] || this.choice.value === "failures") return null;
       const [what, why] = TEXTS[topic](data);
-      return { t, look: topic === "errors" ? "failure" : "idle", symbol: "·", what, why };
+      return { t, look: topic === "errors" ? "failure" : "idle", symbol: "·", what: topic === "speech" ? what : this.whose(data) + what, why };
     }
 
     change(data, t) {
@@ -45,8 +46,11 @@
       const failed = look === "failure" || look === "cancelled";
       if (this.choice.value === "failures" ? !failed : this.choice.value === "leaves" && !known.leaf) return null;
       if (look === "idle") return null;
-      return { t, look, what: known.name || data.node, why: [data.cause, data.message].filter(Boolean).join(": ") };
+      return { t, look, what: this.whose(data) + (known.name || data.node), why: [data.cause, data.message].filter(Boolean).join(": ") };
     }
+
+    // Whose it is, where there are several robots.
+    whose(data) { return this.store.robots.length > 1 && data.robot ? `${data.robot}: ` : ""; }
 
     draw(t, following) {
       this.t = t;

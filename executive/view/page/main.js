@@ -1,7 +1,7 @@
 "use strict";
 // Puts the page together: messages come from the server while a run is under way, or stand in the page itself.
 (() => {
-  const { Store, TreePanel, MapPanel, Header, StatePanel, StepsPanel, decisive, CameraPanel, ScenePanel, QuestionPanel, EventPanel, Timeline, ControlPanel, TeleopPanel, drawsSlowly, byId } = window.errand;
+  const { Store, MapPanel, Header, ModePanel, modeOfAll, ScenePanel, EventPanel, Timeline, ControlPanel, TeleopPanel, RobotPanel, MissionsPanel, drawsSlowly, byId } = window.errand;
   const recorded = byId("recorded") ? JSON.parse(byId("recorded").textContent) : null;
   const token = new URLSearchParams(location.search).get("token") || "";
   const store = new Store();
@@ -14,16 +14,12 @@
   const control = new ControlPanel(token);
   const teleop = new TeleopPanel(control);
   const header = new Header();
-  const tree = new TreePanel(byId("tree"), {
-    follow: byId("follow"),
-    onBreakpoint: (node, wanted) => control.do(wanted ? "break" : "unbreak", { node }),
-  });
-  const state = new StatePanel(byId("state"));
-  const steps = new StepsPanel(byId("steps"), (node) => tree.goTo(node));
+  const parts = Object.fromEntries(["tree", "follow", "mode", "why", "state", "steps", "camera", "seen", "questions", "doing"].map((id) => [id, byId(id)]));
+  const one = new RobotPanel(parts, null, control, addressOf), all = new ModePanel(parts.mode, parts.why);
+  const panels = new Map(); // of each robot, where there are several
+  const missions = new MissionsPanel(byId("missions-panel"), byId("missions"));
   const map = new MapPanel(byId("map"), byId("where"));
-  const camera = new CameraPanel(byId("camera"), byId("seen"), addressOf);
   const scene = new ScenePanel(byId("scene"), byId("beside"));
-  const questions = new QuestionPanel(byId("questions"), (id, text) => (id === null ? control.answer(text) : control.do("answer", { id, text })));
   const timeline = new Timeline(store, () => schedule());
   const events = new EventPanel(byId("events"), byId("events-shown"), store, (t) => { timeline.hold(); timeline.go(t); });
 
@@ -45,32 +41,32 @@
     requestAnimationFrame(() => { planned = false; draw(); });
   }
 
+  // A panel for each robot as soon as there are several.
+  function meet(robots) {
+    if (robots.length < 2 || robots.length === panels.size) return;
+    panels.clear();
+    for (const name of robots) panels.set(name, RobotPanel.made(name, robots, control, addressOf));
+    byId("robots").replaceChildren(...[...panels.values()].map((panel) => panel.section));
+    document.querySelector("main").classList.add("several");
+    for (const id of ["tree-panel", "camera-panel", "state", "questions"]) byId(id).classList.add("of-one");
+    byId("camera-follows").lastChild.textContent = ` follow ${robots[0]}`;
+  }
+
   // The tree follows at once; what costs more is drawn a few times a second.
   function draw() {
-    const replaying = !timeline.following;
-    const view = replaying ? store.at(timeline.t) : store.now;
-    const told = store.live.control || null;
-    tree.progress = replaying ? null : store.live.progress;
-    tree.breakpoints = told && told.mode !== "ended" && control.actions.has("break") ? new Set(told.breakpoints) : null;
-    tree.at = told ? told.at : null;
-    tree.decisive = decisive(store, view);
-    steps.draw(store, view, replaying ? view.t : store.end);
-    state.draw(view);
+    const replaying = !timeline.following, view = replaying ? store.at(timeline.t) : store.now, told = store.live.control || null;
+    meet(store.robots);
+    control.meet(store.robots);
     header.draw(store, view, replaying);
-    tree.draw(view); // it scrolls, so all else has its place before
     teleop.draw(store.live.teleop, store.live.teleop_keys);
-    control.draw(told, store.now.outcomes.length > 0);
-    questions.draw(told ? [...told.questions, ...askedBack(told)] : [], store.end);
+    control.draw(told, !panels.size && store.now.outcomes.length > 0);
+    if (panels.size) all.draw(modeOfAll(replaying ? null : told, view, store.robots), true);
+    for (const panel of shown()) panel.draw(store, view, replaying);
     measure();
     slowly(view);
   }
 
-  // What the robot asks of a sentence, as long as it waits for the answer.
-  function askedBack(state) {
-    const asked = (store.live.asked || {}).question;
-    const waits = asked && state.mode !== "ended" && control.actions.has("say") && asked.until_s > store.end;
-    return waits ? [{ ...asked, id: null, default: null, options: asked.options.length ? [...asked.options, "never mind"] : [] }] : [];
-  }
+  function shown() { return panels.size ? panels.values() : [one]; }
 
   function seekScene() {
     const [robot] = latest ? latest.robots.values() : [];
@@ -90,8 +86,9 @@
     due = setTimeout(() => {
       due = null;
       drawn = performance.now();
-      map.draw(latest);
-      camera.draw(latest);
+      map.draw(latest, store.robots);
+      missions.draw(latest.missions, store.robots);
+      for (const panel of shown()) panel.camera.draw(panel.view);
       events.draw(timeline.t, timeline.following);
       timeline.drawMarks();
       seekScene();

@@ -3,6 +3,8 @@
 (() => {
   const LENGTH_M = 1.1, WIDTH_M = 0.5; // a standing Spot
   const SEEN_M = 0.05; // a cell
+  const DASHES = [[5, 4], [2, 3], [9, 4], [9, 3, 2, 3], [1, 4], [14, 4]]; // one for each colour of a robot
+  const RESERVED_PX = 9;
   const OCCUPIED_BELOW = 100, FREE_ABOVE = 230;
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -12,6 +14,7 @@
       this.canvas = canvas;
       this.where = where;
       this.image = null;
+      this.robots = [];
       new ResizeObserver(() => this.redraw()).observe(canvas);
     }
 
@@ -43,7 +46,15 @@
       this.coloured = canvas;
     }
 
-    draw(view) { this.view = view; this.redraw(); }
+    // `robots` are the names of all.
+    draw(view, robots) { Object.assign(this, { view, robots }); this.redraw(); }
+
+    // Among several robots each has a colour and dashes of its own.
+    styleOf(name) {
+      if (this.robots.length < 2) return { body: css("--accent"), trail: css("--success"), path: css("--accent"), dashes: DASHES[0] };
+      const colour = css(window.errand.colourOf(this.robots, name));
+      return { body: colour, trail: colour, path: colour, dashes: DASHES[Math.max(0, this.robots.indexOf(name)) % DASHES.length] };
+    }
 
     // World metres to canvas points.
     frame(width, height) {
@@ -71,11 +82,13 @@
       brush.fillRect(0, 0, width, height);
       const frame = this.frame(width, height);
       this.drawGrid(brush, frame);
-      for (const robot of this.view.robots.values()) {
+      for (const [name, robot] of this.view.robots) {
+        const style = this.styleOf(name);
+        if (robot.way) this.drawWay(brush, frame, robot.way, style);
         this.drawSeen(brush, frame, robot.seen);
         this.drawParticles(brush, frame, robot.particles);
-        this.line(brush, frame, robot.trail, css("--success"), []);
-        if (robot.path) this.line(brush, frame, robot.path, css("--accent"), [5, 4]);
+        this.line(brush, frame, robot.trail, style.trail, []);
+        if (robot.path) this.line(brush, frame, robot.path, style.path, style.dashes);
       }
       this.drawThings(brush, frame);
       const said = [];
@@ -108,6 +121,24 @@
       brush.setLineDash(dashes);
       brush.stroke();
       brush.setLineDash([]);
+    }
+
+    // What is reserved: a broad band below the path, to a dot where it ends.
+    drawWay(brush, frame, way, { body }) {
+      brush.save();
+      brush.globalAlpha = 0.3;
+      brush.lineCap = "round";
+      brush.beginPath();
+      way.forEach(([x, y], n) => brush[n ? "lineTo" : "moveTo"](...frame.at(x, y)));
+      brush.strokeStyle = body;
+      brush.lineWidth = RESERVED_PX;
+      brush.stroke();
+      brush.globalAlpha = 1;
+      brush.beginPath();
+      brush.arc(...frame.at(...way[way.length - 1]), 4, 0, 2 * Math.PI);
+      brush.fillStyle = body;
+      brush.fill();
+      brush.restore();
     }
 
     // Where the robot may be.
@@ -152,7 +183,7 @@
       brush.fillText(text, u, v);
     }
 
-    drawRobot(brush, { at, scale }, name, { pose: { x, y, yaw }, held }) {
+    drawRobot(brush, { at, scale }, name, { pose: { x, y, yaw }, held, way }) {
       const [u, v] = at(x, y), length = Math.max(LENGTH_M * scale, 16), width = Math.max(WIDTH_M * scale, 8);
       brush.save();
       brush.translate(u, v);
@@ -160,7 +191,7 @@
       brush.beginPath();
       brush.moveTo(length / 2, 0); brush.lineTo(length / 4, width / 2); brush.lineTo(-length / 2, width / 2);
       brush.lineTo(-length / 2, -width / 2); brush.lineTo(length / 4, -width / 2); brush.closePath();
-      brush.fillStyle = css("--accent");
+      brush.fillStyle = this.styleOf(name).body;
       brush.strokeStyle = css("--floor");
       brush.lineWidth = 1.5;
       brush.fill(); brush.stroke();
@@ -170,7 +201,7 @@
       this.halo(brush, held ? `${name}, holding ${held}` : name, u + 12, v - 10);
       if (held) this.mark(brush, ...at(x + (LENGTH_M / 2) * Math.cos(yaw), y + (LENGTH_M / 2) * Math.sin(yaw)));
       const degrees = Math.round((yaw * 180) / Math.PI);
-      return `${name} at x ${x.toFixed(2)} m, y ${y.toFixed(2)} m, ${degrees}°${held ? `, holding ${held}` : ""}`;
+      return `${name} at x ${x.toFixed(2)} m, y ${y.toFixed(2)} m, ${degrees}°${held ? `, holding ${held}` : ""}${way ? `, its way to x ${way[way.length - 1][0].toFixed(2)} m, y ${way[way.length - 1][1].toFixed(2)} m reserved` : ""}`;
     }
   }
 

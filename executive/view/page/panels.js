@@ -14,8 +14,8 @@
   const OUTCOMES = { success: "success", failure: "failure", cancelled: "cancelled", error: "failure" };
 
   // What the pill says: the outcome when there is one, else the mode of the control, else what the tree says.
-  function modeOf(store, view, replaying) {
-    const control = replaying ? null : store.live.control, outcome = view.outcomes[view.outcomes.length - 1];
+  function modeOf(control, view) {
+    const outcome = view.outcomes[view.outcomes.length - 1];
     if (outcome) {
       const look = OUTCOMES[outcome.outcome] || "failure";
       return [look, LOOKS[look].symbol, outcome.outcome + (look === "failure" && outcome.cause ? ` (${outcome.cause})` : ""), outcome.message];
@@ -23,6 +23,15 @@
     const mode = control && control.mode;
     if (mode && MODES[mode]) return [MODES[mode][0], MODE_SYMBOLS[mode] || LOOKS[MODES[mode][0]].symbol, MODES[mode][1], control.reason];
     return view.trees.length ? ["running", "▶", "running", ""] : ["idle", "○", "waiting", ""];
+  }
+
+  // The same for several robots, of which each says more itself.
+  function modeOfAll(control, view, robots) {
+    const ended = robots.map((name) => view.outcomes.filter((each) => each.robot === name).pop()).filter(Boolean);
+    if (ended.length < robots.length && !(control && control.mode === "ended")) return modeOf(control, { ...view, outcomes: [] });
+    const bad = ended.filter((each) => each.outcome !== "success");
+    const look = bad.length || !ended.length ? "failure" : "success", why = bad.map((each) => `${each.robot}: ${each.message}`).join("; ");
+    return [look, LOOKS[look].symbol, bad.length ? `${ended.length - bad.length} of ${ended.length} did it` : "success", why];
   }
 
   // The mission's own node, whose path id has two parts; what watches over it stands above it.
@@ -109,9 +118,9 @@
 
   class Header {
     draw(store, view, replaying) {
-      const tree = view.trees[view.trees.length - 1];
-      const mission = tree ? missionOf(tree.root).name : "";
-      byId("title").textContent = tree ? `${tree.robot}: ${mission}` : "Errand";
+      const tree = view.trees[view.trees.length - 1], several = store.robots.length > 1;
+      const mission = !tree ? "Errand" : several ? store.robots.join(", ") : missionOf(tree.root).name;
+      byId("title").textContent = tree && !several ? `${tree.robot}: ${mission}` : mission;
       document.title = tree ? `${mission} – Errand` : "Errand";
       byId("clock").textContent = `${(replaying ? view.t : store.end).toFixed(1)} s`;
       byId("late").textContent = view.late;
@@ -119,21 +128,24 @@
         byId("world").textContent = store.run.world;
         byId("seed").textContent = store.run.seed;
       }
-      const [look, symbol, text, why] = modeOf(store, view, replaying);
-      const pill = byId("mode");
-      pill.dataset.look = look;
-      pill.title = why || "";
-      const failed = view.outcomes.length > 0 && look === "failure";
-      byId("why").hidden = !failed;
-      byId("why").textContent = failed ? why : "";
-      pill.firstElementChild.textContent = symbol;
-      if (byId("mode-text").textContent !== text) {
-        byId("mode-text").textContent = text;
-        byId("announced").textContent = [text, why].filter(Boolean).join(": ");
+    }
+  }
+
+  // What a robot, or all of them, do: a pill, and the sentence of a failure.
+  class ModePanel {
+    constructor(pill, why) { Object.assign(this, { pill, why }); }
+
+    draw([look, symbol, text, why], over, who = "") {
+      const [mark, words] = this.pill.children, failed = over && look === "failure";
+      this.pill.dataset.look = look;
+      this.pill.title = why || "";
+      this.why.hidden = !failed;
+      this.why.textContent = failed ? why : "";
+      mark.textContent = symbol;
+      if (words.textContent !== text) {
+        words.textContent = text;
+        byId("announced").textContent = [who, text, why].filter(Boolean).join(": ");
       }
-      const progress = store.live.progress;
-      const over = view.outcomes.length > 0;
-      byId("doing").textContent = replaying || over || !progress ? "" : progress.message;
     }
   }
 
@@ -287,5 +299,5 @@
     }
   }
 
-  Object.assign(window.errand, { Header, StatePanel, StepsPanel, decisive, CameraPanel, ScenePanel, QuestionPanel, drawsSlowly, byId });
+  Object.assign(window.errand, { Header, ModePanel, modeOf, modeOfAll, missionOf, StatePanel, StepsPanel, decisive, CameraPanel, ScenePanel, QuestionPanel, drawsSlowly, byId });
 })();

@@ -16,17 +16,18 @@
   }
 
   function emptyView() {
-    return { t: 0, trees: [], spans: new Map(), states: new Map(), failures: new Map(), robots: new Map(), outcomes: [], late: 0, detections: null, destinations: [] };
+    return { t: 0, trees: [], spans: new Map(), states: new Map(), failures: new Map(), robots: new Map(), outcomes: [], late: 0, detections: null, destinations: [], missions: null };
   }
 
   function robotOf(view, name) {
-    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null, particles: [], seen: [] });
+    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null, particles: [], seen: [], way: null, detections: null });
     return view.robots.get(name);
   }
 
   const APPLY = {
     tree(view, data) {
       view.trees = view.trees.filter((tree) => tree.root.id !== data.root.id).concat([data]);
+      view.outcomes = view.outcomes.filter((outcome) => outcome.robot !== data.robot); // it has something to do again
       const forget = (node) => { view.states.delete(node.id); view.failures.delete(node.id); node.children.forEach(forget); };
       forget(data.root);
     },
@@ -50,7 +51,8 @@
     },
     // What is held is what was found last; it is no longer where it was found.
     state(view, data) {
-      const robot = robotOf(view, data.robot), found = view.destinations[view.destinations.length - 1];
+      const robot = robotOf(view, data.robot), own = view.destinations.filter((each) => !each.robot || each.robot === data.robot);
+      const found = own[own.length - 1];
       if (!data.holding) robot.held = null;
       else if (!robot.held) robot.held = found ? found.name : "something";
       if (robot.held) view.destinations = view.destinations.filter((each) => each.name !== robot.held);
@@ -59,8 +61,14 @@
     path(view, data) {
       robotOf(view, data.robot).path = data.poses.map((pose) => [pose.position.x, pose.position.y]);
     },
-    detections(view, data, t) { view.detections = { ...data, t }; },
-    object_destination(view, data) { view.destinations.push({ name: data.class_name, x: data.goal_x, y: data.goal_y }); },
+    // What a robot has reserved; a turn says that it has the right of way against all who came later.
+    way(view, data) { robotOf(view, data.robot).way = data.turn === null ? null : data.x.map((x, n) => [x, data.y[n]]); },
+    missions(view, data) { view.missions = data.missions; },
+    detections(view, data, t) {
+      view.detections = { ...data, t };
+      if (data.robot) robotOf(view, data.robot).detections = view.detections;
+    },
+    object_destination(view, data) { view.destinations.push({ robot: data.robot, name: data.class_name, x: data.goal_x, y: data.goal_y }); },
     navigation(view, data) {
       const pairs = (xs, ys) => xs.map((x, n) => [x, ys[n]]);
       Object.assign(robotOf(view, data.robot), { particles: pairs(data.particle_x, data.particle_y), seen: pairs(data.seen_x, data.seen_y) });
@@ -78,6 +86,7 @@
       this.live = {};
       this.now = emptyView();
       this.known = new Map();
+      this.robots = []; // their names, in order
     }
 
     // Take a message in: one of the log, or the newest word on something that is not logged.
@@ -85,10 +94,15 @@
       if (message.live) { this.live[message.live] = message.data; return; }
       this.messages.push(message);
       this.end = Math.max(this.end, message.t);
-      if (message.topic === "run") this.run = message.data;
+      if (message.topic === "run") this.meet(Object.keys((this.run = message.data).robots || {}));
+      if (message.topic === "tree" || message.topic === "pose") this.meet([message.data.robot]);
       if (message.topic === "map") this.map = message.data;
       if (message.topic === "tree") this.learn(message.data.root, 0);
       this.apply(this.now, message);
+    }
+
+    meet(names) {
+      if (names.some((name) => !this.robots.includes(name))) this.robots = [...new Set([...this.robots, ...names])].sort();
     }
 
     learn(node, depth) {

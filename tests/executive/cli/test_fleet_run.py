@@ -1,21 +1,26 @@
 """A fleet's run with scripted robots: who does what, and what becomes of the mission of a robot that dies."""
 
+import io
 import json
 from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from executive.cli import entry, fleet_missions, fleet_run
 from executive.cli.fleet_missions import FleetMission
-from executive.cli.fleet_run import FleetDispatch, run_fleet, told
+from executive.cli.fleet_report import told
+from executive.cli.fleet_run import FleetDispatch, run_fleet
+from executive.cli.page_view import PageView
 from executive.cli.requests import Prepared
 from executive.fleet.auction import Bid
 from executive.mission.command import Command, Task, parse_command
 from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.mission.mission import lines_of
 from executive.mission.request import Request
+from executive.record.reader import read_events
 from executive.run.runner import RunEntry
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionStore
@@ -73,16 +78,22 @@ class Fleet:
         options = {name: self._prepared(request, mission) for name, mission in missions.items()}
         self.missions[stored.id] = FleetMission(stored, options)
 
+    def show_live(self):
+        return None
+
+    def leave(self, artifacts, out):
+        return None
+
     def judge(self, tree, result, *, before, since_s):
         self.judged.append((tree.robot_name, result.outcome.value))
         self.shares += [(share.tree.robot_name, share.done) for share in before]
         self.since_s.append(since_s)
 
-    def run(self):
+    def run(self, page=None):
         placed = {name: SimpleNamespace(start=START, kind="spot") for name in ROBOTS}
         docks = {name: self._docking(name) for name in ROBOTS}
         dispatch = FleetDispatch(self.store, dict(self.missions), placed, self, docks=docks)
-        run_fleet(dispatch, out=self.out, seed=3)
+        run_fleet(dispatch, out=self.out, seed=3, page=page)
         self.rows = rows = told(self.store, list(self.missions))
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
 
@@ -309,3 +320,49 @@ def test_what_no_two_robots_can_do_either_ends_with_the_reason_of_each(chain):
 def test_what_one_robot_can_do_alone_is_not_split(chain):
     chain.cannot = lambda name, command: name == "Alice" and command.goal == "bedroom"
     assert chain.run() == [("Bob", "success", 0)]
+
+
+def test_the_log_has_whose_each_mission_is_whenever_that_changes(fleet):
+    fleet.queue(KITCHEN)
+    fleet.faults["Alice"] = ["robot dies at 0.08 s"]
+    fleet.run()
+    events = read_events(fleet.out / "log.mcap")
+    told = [event.data["missions"][0] for event in events if event.topic == "missions"]
+    assert [(each["robot"], each["outcome"], each["reassigned"]) for each in told] == [
+        ("Alice", "running", 0),
+        ("Alice", "queued", 0),
+        ("Bob", "running", 1),
+        ("Bob", "success", 1),
+    ]
+    assert {each["sentence"] for each in told} == {"work"}
+    assert {"Alice", "Bob"} <= {event.data.get("robot") for event in events if event.topic == "transitions"}
+
+
+def test_the_report_has_each_mission_and_the_steps_of_each_robot(fleet):
+    for line in (KITCHEN, BEDROOM):
+        fleet.queue(line)
+    fleet.run()
+    html = (fleet.out / "report.html").read_text(encoding="utf-8")
+    assert "2 of 2 missions done" in html
+    assert [title in html for title in ("Mission 1, Alice (spot): work", "Mission 2, Bob (spot): work")] == [True] * 2
+    assert html.count("<svg") == 2
+
+
+def test_a_mission_that_is_cancelled_on_its_robots_panel_is_over_and_the_robot_goes_on(fleet, script):
+    for line in (KITCHEN, BEDROOM, KITCHEN):
+        fleet.queue(line)
+    page = PageView(None, Console(file=io.StringIO()))
+    cancelled = []
+
+    def observe(progress):
+        if progress.ticks == 1 and not cancelled:
+            cancelled.append(page.control.cancel("not now", robot="Bob"))
+
+    page._progress = observe
+    try:
+        fleet.run(page)
+    finally:
+        page.close()
+    assert sorted(row["outcome"] for row in fleet.rows) == ["cancelled", "success", "success"]
+    assert fleet.message(2) == "not now"
+    assert [robot.holder for robot in fleet.robots.values()] == [None, None]

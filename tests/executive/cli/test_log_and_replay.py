@@ -174,3 +174,57 @@ def test_a_large_tree_is_folded_unless_told_otherwise():
     many = invoke("tree", sentence, "--most", "10000").stdout.splitlines()
     assert len(few) <= 30 < len(many)
     assert not [line for line in many if "nodes)" in line]
+
+
+@pytest.fixture
+def two_robots(tmp_path, clock) -> Path:
+    """The log of Alice and Bob, each with a tree of one node."""
+    log = EventLog(tmp_path / "log.mcap", clock, apart=True)
+    for name in ("Alice", "Bob"):
+        node = {"id": f"{name.lower()}/go", "type": "skill", "name": f"go as {name}", "children": []}
+        log("tree", {"robot": name, "root": node})
+        done = {"t": 1.0, "robot": name, "node": node["id"], "from": "RUNNING", "to": "SUCCESS", "cause": None}
+        log("transitions", {**done, "message": f"{name} is there"})
+    log("control", {"t": 1.0, "what": "pause", "message": "Bob: let me look"})
+    log.close()
+    return log.path
+
+
+def test_the_timeline_of_several_robots_says_whose_each_line_is(two_robots):
+    lines = [line.split() for line in invoke("log", two_robots).stdout.splitlines()]
+    assert lines[0][:3] == ["robot", "t", "(s)"]
+    assert {"Alice", "Bob"} <= {line[0] for line in lines if line}
+
+
+def test_the_timeline_of_one_of_several_robots(two_robots):
+    told = invoke("log", two_robots, "--robot", "bob").stdout
+    assert ("Bob is there" in told, "Alice is there" in told, "let me look" in told) == (True, False, True)
+    assert [each["node"] for each in json.loads(invoke("log", two_robots, "--robot", "bob", "--json").stdout)] == [
+        "bob/go"
+    ]
+
+
+def test_the_tree_of_one_of_several_robots(two_robots):
+    assert json.loads(invoke("tree", two_robots, "--robot", "Alice", "--format", "json").stdout)["id"] == "alice/go"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("log", "--robot", "carl"), "has no robot 'carl'; there are: Alice, Bob"),
+        (("tree", "--robot", "carl"), "has no robot 'carl'"),
+        (("tree",), "add --robot with one of: Alice, Bob"),
+    ],
+)
+def test_a_robot_that_is_not_in_the_log_or_not_said_is_refused_in_one_line(two_robots, arguments, words):
+    result = invoke(arguments[0], two_robots, *arguments[1:])
+    (line,) = result.stderr.splitlines()
+    assert (result.exit_code, words in line) == (2, True), line
+
+
+def test_a_replay_of_several_robots_holds_the_messages_of_each(two_robots, tmp_path):
+    html = tmp_path / "replay.html"
+    assert invoke("replay", two_robots, "--html", html).exit_code == 0
+    page = html.read_text()
+    assert "Alice is there" in page
+    assert "Bob is there" in page

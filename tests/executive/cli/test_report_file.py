@@ -1,6 +1,8 @@
 """`report.html` of a run: its steps, what was said and answered, and that it stays small."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,14 +15,18 @@ from executive.cli.durable import mission_events
 from executive.cli.mission_run import run_request
 from executive.cli.report import ReportedAnswer, ReportedObject, RunReport
 from executive.cli.report_file import step_rows
-from executive.cli.requests import prepare
+from executive.cli.requests import prepare, prepared_for
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.run.findings import Said
+from executive.run.runner import RunEntry
 from executive.tree.node_view import NodeView
 from executive.tree.snapshot import NodeState
+from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause
 from skills.testing.clock import VirtualClock
+from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.robot import ScriptedRobot
 
 TALK = """
 name: talk <b>
@@ -144,3 +150,27 @@ def test_pictures_of_answers_from_before_a_restart_are_found_in_the_log(tmp_path
         artifacts.recall(mission_events(tmp_path / "log.mcap"))
     assert artifacts.numbers == {("alice/q", 4.0): 0}
     assert len(artifacts.pictures) == 1
+
+
+class TwoRobots(ScriptedBackend):
+    """Two scripted robots, each at the origin."""
+
+    def entry(self, tree, durable):
+        robot = ScriptedRobot(self.clock, name=tree.robot_name, capabilities=spot_capabilities())
+        return RunEntry(tree, robot, KnownPlace(), BlockCostmap())
+
+
+def test_a_run_with_two_robots_leaves_the_tree_and_the_steps_of_each(talk):
+    def named(name):
+        mission = replace(talk.mission, robot_name=name)
+        return replace(prepared_for(talk.request, mission, talk.world, talk.knowledge), kind="spot", robots=robots)
+
+    robots = dict.fromkeys(("Alice", "Bob"), SimpleNamespace(kind="spot"))
+    run_request(replace(named("Alice"), others=(named("Bob"),)), TwoRobots())
+    out = talk.request.out
+    assert sorted(path.name for path in out.glob("*.svg")) == ["tree_alice.svg", "tree_bob.svg"]
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert (page.count('class="part"'), page.count("<svg")) == (2, 2)
+    assert ("Alice (spot)" in page, "Bob (spot)" in page) == (True, True)
+    told = [event.data["robots"] for event in mission_events(out / "log.mcap") if event.topic == "run"]
+    assert told == [{"Alice": "spot", "Bob": "spot"}] * 2

@@ -39,8 +39,8 @@ def modes(control):
 REMARKS = [
     ("Hey Bob, wait", None, {"Alice": "running", "Bob": "paused"}),
     ("wait", "Alice", {"Alice": "paused", "Bob": "running"}),
-    ("stop", None, {"Alice": "stop button", "Bob": "stop button"}),
-    ("Hey everyone, stop", None, {"Alice": "stop button", "Bob": "stop button"}),
+    ("stop", None, {"Alice": "stopped", "Bob": "stopped"}),
+    ("Hey everyone, stop", None, {"Alice": "stopped", "Bob": "stopped"}),
     ("Alice and Bob, wait", None, {"Alice": "paused", "Bob": "paused"}),
 ]
 

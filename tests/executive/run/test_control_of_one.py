@@ -6,6 +6,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.mission.command import parse_command
+from executive.mission.file.blocks import Group
 from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.run.control import Control, Mode
 from executive.run.outcome import Outcome
@@ -39,9 +40,11 @@ def control():
 
 @pytest.fixture
 def run_pair(clock, knowledge, registry, make, control):
-    def runner(observe=None, *, after=(), time_limit_s=1200.0):
+    def runner(observe=None, *, after=(), time_limit_s=1200.0, step=None):
         log, robots = [], {name: make.ScriptedRobot(clock, name) for name in ("Alice", "Bob")}
-        missions = {name: Mission("go", DEFAULT_WORLD, name, (MissionStep((parse_command(GO),)),)) for name in robots}
+        missions = {
+            name: Mission("go", DEFAULT_WORLD, name, (step or MissionStep((parse_command(GO),)),)) for name in robots
+        }
         trees = {n: compile_mission(m, knowledge=knowledge, registry=registry) for n, m in missions.items()}
         entries = [
             RunEntry(
@@ -54,7 +57,7 @@ def run_pair(clock, knowledge, registry, make, control):
             clock=clock,
             worker=LockStepWorker(clock),
             publish=lambda topic, message: log.append((topic, message)),
-            settings=RunSettings(seed=3, time_limit_s=time_limit_s),
+            settings=RunSettings(seed=3, time_limit_s=time_limit_s, endings_limit_s=5.0),
             control=control,
             observer=observe,
         )
@@ -147,3 +150,16 @@ def test_what_holds_all_robots_holds_each(control, compiled):
     assert (control.state.robots["Alice"].mode, control.state.robots["Alice"].reason) == (Mode.STOPPED, "fire")
     control.release_stop_button()
     assert control.state.robots["Alice"].mode is Mode.PAUSED
+
+
+def test_a_stopped_robot_does_not_even_do_what_missions_do_in_the_end(run_pair, control, script):
+    # Both are on the way when all is cancelled; in the end each goes to the kitchen as well, but Bob is stopped.
+    def stop_and_cancel():
+        control.stop_button("too near", robot="Bob")
+        control.cancel("enough")
+
+    going = MissionStep((parse_command(GO),))
+    pair = run_pair(at({2: stop_and_cancel}), step=MissionStep(block=Group((going,), always=(going,))))
+    assert set(pair.outcomes().values()) == {Outcome.CANCELLED}
+    drives = {name: robot.calls.count("drive") for name, robot in pair.robots.items()}
+    assert drives["Alice"] == drives["Bob"] + script.steps

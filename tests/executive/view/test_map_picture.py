@@ -10,6 +10,7 @@ import pytest
 from executive.mission.errors import InputError
 from executive.record.reader import Event
 from executive.view.map_picture import WIDTH_PX, map_picture
+from executive.view.styles import ROBOT_COLOURS, rgb_of
 
 SCALE = WIDTH_PX / 7.0
 """Pixels per metre of the map below, 7 m x 3.5 m from (-1, -1)."""
@@ -65,3 +66,20 @@ def test_the_footprint_is_where_the_robot_was_at_that_time():
 def test_a_log_without_a_map_is_refused():
     with pytest.raises(InputError, match="no map"):
         map_picture(EVENTS[1:], math.inf)
+
+
+def test_each_of_several_robots_is_drawn_in_its_own_colour_with_what_it_has_reserved():
+    bob = {"robot": "Bob", "pose": {"position": {"x": 1.0, "y": -0.5, "z": 0.5}}, "yaw_rad": 0.0}
+    way = {"robot": "Bob", "turn": 2, "x": [1.0, 5.0], "y": [-0.5, -0.5]}
+    given_back = Event("way", 4.0, {"robot": "Bob", "turn": None, "x": [], "y": []})
+    events = (*EVENTS, Event("pose", 2.0, bob), Event("way", 3.0, way), given_back)
+    blue, orange = (rgb_of(colour)[::-1] for colour in ROBOT_COLOURS[:2])
+    then = map_picture(events, 3.0)
+    assert (colour_at(then, 2.0, 0.0), colour_at(then, 0.9, -0.4)) == (blue, orange)
+    pale = colour_at(then, 3.0, -0.5)
+    assert pale == tuple(round(0.35 * part + 0.65 * 255) for part in orange)
+    assert colour_at(map_picture(events), 3.0, -0.5) == (255, 255, 255)
+
+
+def test_the_colours_of_robots_are_all_different():
+    assert len({rgb_of(colour) for colour in ROBOT_COLOURS}) == len(ROBOT_COLOURS) >= 4

@@ -15,12 +15,15 @@ import pytest
 from executive.conversation import Conversation, Speech
 from executive.language import Status, Understanding
 from executive.language.questions import ClarifyingQuestion, Slot
+from executive.mission.command import parse_command
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.record.event_log import EventLog
 from executive.record.history import read_history
 from executive.record.surroundings import map_message
 from executive.run.control import Control, Mode
 from executive.run.outcome import RobotStatus
 from executive.run.runner import Progress
+from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
 from executive.view.actions import RefusedError, asked_json, control_actions
 from executive.view.feed import Feed
@@ -640,3 +643,117 @@ def test_the_report_is_drawn_without_scripts_in_the_width_of_a_telephone(browser
     assert opened.locator(".answer").bounding_box()["width"] <= 390
     assert opened.locator("main").bounding_box()["width"] <= 390
     context.close()
+
+
+@pytest.fixture
+def two(knowledge, registry, control):
+    """A served page of Alice and Bob, each on the way to the kitchen: the feed, their trees and the page's address."""
+    step = MissionStep((parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"),))
+    missions = {name: Mission("go", DEFAULT_WORLD, name, (step,)) for name in ("Alice", "Bob")}
+    trees = {name: compile_mission(m, knowledge=knowledge, registry=registry) for name, m in missions.items()}
+    feed = Feed()
+    control.begin(trees)
+    watch = ControlWatch(control, feed)
+    feed("map", 0.0, map_message(GridMap(np.eye(40, dtype=bool), 0.25, (-5.0, -5.0)), knowledge, world="test"))
+    feed(
+        "run", 0.0, {"world": "test", "seed": 3, "commands": [], "versions": {}, "robots": dict.fromkeys(trees, "spot")}
+    )
+    for number, (name, tree) in enumerate(trees.items()):
+        feed("tree", 0.0, {"robot": name, "root": node_view(tree.root).structure()})
+        turn = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+        position = {"x": -2.0 + 3.0 * number, "y": 1.5 - 2.0 * number, "z": 0.0}
+        feed("pose", 0.5, {"robot": name, "pose": {"position": position, "orientation": turn}})
+        feed("state", 0.5, {**state(), "robot": name, "charge": 0.9 - 0.5 * number})
+    feed("way", 0.5, {"robot": "Bob", "turn": 1, "x": [1.0, 3.0], "y": [-0.5, -0.5]})
+    with PageServer(PageContent(feed, {**control_actions(control), "say": lambda values: str(dict(values))})) as server:
+        yield feed, trees, server.url
+    control.end()
+    watch.close()
+
+
+def panel(page, name: str):
+    return page.locator(f'.robot[data-robot="{name}"]')
+
+
+def test_each_of_several_robots_has_a_panel_of_its_own_and_all_stand_on_one_map(page, two):
+    feed, trees, url = two
+    page.goto(url)
+    playwright_api.expect(page.locator(".robot")).to_have_count(2)
+    node = leaf_ids(trees["Bob"])[-1]
+    feed("transitions", 1.0, {"t": 1.0, "robot": "Bob", "node": node, "to": "RUNNING", "cause": None, "message": ""})
+    playwright_api.expect(panel(page, "Bob").locator(f'li[data-id="{node}"] > .row')).to_have_attribute(
+        "data-look", "running"
+    )
+    assert panel(page, "Alice").locator(f'li[data-id="{node}"]').count() == 0
+    playwright_api.expect(panel(page, "Alice").locator(".state")).to_contain_text("battery90 %")
+    playwright_api.expect(panel(page, "Bob").locator(".state")).to_contain_text("battery40 %")
+    where = re.compile(r"Alice at x -2\.00 m.*; Bob at x 1\.00 m.*its way to x 3\.00 m, y -0\.50 m reserved")
+    playwright_api.expect(page.locator("#map")).to_have_attribute("aria-label", where)
+    assert (page.locator("#tree-panel").is_hidden(), page.locator("#camera-panel").is_hidden()) == (True, True)
+    colours = page.evaluate(
+        "() => [...document.querySelectorAll('.robot .swatch')].map((each) => getComputedStyle(each).backgroundColor)"
+    )
+    assert len(set(colours)) == 2
+
+
+def test_the_buttons_of_a_panel_are_for_its_robot_and_those_above_for_all(page, two, control):
+    _, _, url = two
+    page.goto(url)
+    panel(page, "Bob").locator(".pause").click()
+    playwright_api.expect(panel(page, "Bob").locator(".mode")).to_contain_text("paused")
+    playwright_api.expect(panel(page, "Alice").locator(".mode")).to_contain_text("running")
+    assert {name: each.mode for name, each in control.state.robots.items()} == {
+        "Alice": Mode.RUNNING,
+        "Bob": Mode.PAUSED,
+    }
+    panel(page, "Bob").locator(".pause").click()
+    playwright_api.expect(panel(page, "Bob").locator(".mode")).to_contain_text("running")
+    page.click("#stop")
+    for name in ("Alice", "Bob"):
+        playwright_api.expect(panel(page, name).locator(".mode")).to_contain_text("stop button")
+        assert panel(page, name).locator(".stop").is_disabled()
+
+
+def test_a_question_stands_on_the_panel_of_the_robot_that_asks(page, two, control, clock):
+    _, _, url = two
+    page.goto(url)
+    asked = control.ask(Question("q1", "Is it open?", options=("yes", "no"), default="no", limit_s=60.0), clock, "Bob")
+    playwright_api.expect(panel(page, "Bob").locator(".question")).to_have_count(1)
+    assert panel(page, "Alice").locator(".question").count() == 0
+    panel(page, "Bob").get_by_role("button", name="yes").click()
+    playwright_api.expect(page.locator(".question")).to_have_count(0)
+    assert (asked.done(), asked.result()) == (True, "yes")
+
+
+def test_a_sentence_is_said_to_the_robot_that_is_chosen(page, two):
+    _, _, url = two
+    page.goto(url)
+    page.locator("#whom").select_option("Bob")
+    page.fill("#sentence", "wait")
+    page.press("#sentence", "Enter")
+    playwright_api.expect(page.locator("#said")).to_have_text("{'text': 'wait', 'robot': 'Bob'}")
+
+
+def test_the_missions_of_a_fleet_are_listed_with_the_robot_and_what_came_of_them(page, two):
+    feed, _, url = two
+    page.goto(url)
+    playwright_api.expect(page.locator(".robot")).to_have_count(2)
+    assert page.locator("#missions-panel").is_hidden()
+    rows = [
+        {"id": 1, "sentence": "Go <b>there", "robot": "Bob", "outcome": "success", "reassigned": 1, "message": "done"},
+        {"id": 2, "sentence": "Wait", "robot": None, "outcome": "queued", "reassigned": 0, "message": ""},
+    ]
+    feed("missions", 2.0, {"missions": rows})
+    lines = page.locator("#missions tr")
+    playwright_api.expect(lines).to_have_text(["1Go <b>there Bob✓ successgiven anew 1 x", "2Wait○ queued"])
+
+
+def test_how_several_robots_ended_is_told_for_each_and_for_all(page, two, control):
+    feed, _, url = two
+    page.goto(url)
+    feed("outcome", 3.0, {"robot": "Alice", "outcome": "failure", "cause": "PLANNING", "message": "no way"})
+    feed("outcome", 3.0, {"robot": "Bob", "outcome": "success", "cause": None, "message": "there"})
+    control.end()
+    playwright_api.expect(page.locator("#mode-text")).to_have_text("1 of 2 did it")
+    playwright_api.expect(panel(page, "Alice").locator(".why")).to_have_text("no way")
+    playwright_api.expect(panel(page, "Bob").locator(".mode")).to_contain_text("success")

@@ -5,7 +5,17 @@ from html.parser import HTMLParser
 
 import pytest
 
-from executive.view.report_page import AnswerRow, PagePicture, ReportPage, SeenRow, StepRow, Verdict, to_report
+from executive.view.report_page import (
+    AnswerRow,
+    MissionRow,
+    PagePicture,
+    ReportPage,
+    ReportPart,
+    SeenRow,
+    StepRow,
+    Verdict,
+    to_report,
+)
 from executive.view.styles import Styles
 
 NASTY = "<script>alert(\"1\")</script> & 'x' \x1b[31m"
@@ -99,3 +109,41 @@ def test_a_step_tells_status_cause_and_time():
     steps = (StepRow("go to the hall", Styles.FAILURE.value, "failure (PLANNING)", 1, (61.0, 75.5), "no way"),)
     text = Reader(to_report(page(steps=steps))).text
     assert "go to the hall failure (PLANNING) 1:01.0–1:15.5 no way" in text
+
+
+def test_each_of_several_robots_has_a_part_with_its_verdicts_steps_pictures_and_tree():
+    parts = [
+        ReportPart(
+            title=f"{name} (spot)",
+            colour=colour,
+            commands=(f"Take {NASTY}",),
+            verdicts=(Verdict("The tree claims", True, "success", f"{name} is there"),),
+            steps=(StepRow(f"go as {name}", Styles.SUCCESS.value, "success"),),
+            pictures=(PagePicture(f"the grasp of {name}", JPEG),),
+            tree_svg=f"<svg><title>{name}</title></svg>",
+        )
+        for name, colour in (("Alice", "#0072b2"), ("Bob", "#e69f00"))
+    ]
+    read = Reader(to_report(page(commands=(), verdicts=(), parts=parts)))
+    assert [dict(attrs)["style"] for tag, attrs in read.tags if attrs.get("class") == "part"] == [
+        "border-color:#0072b2",
+        "border-color:#e69f00",
+    ]
+    for name in ("Alice", "Bob"):
+        for text in (f"{name} (spot)", f"{name} is there", f"go as {name}", f"the grasp of {name}"):
+            assert text in read.text
+    assert [tag for tag, _ in read.tags].count("svg") == 2
+    assert "script" not in {tag for tag, _ in read.tags}
+
+
+def test_the_missions_of_a_fleet_stand_in_a_table():
+    rows = (
+        MissionRow(1, "go <b>", "Bob", True, "success, fulfilled", 1, "there"),
+        MissionRow(2, "wait", "", None, "queued", 0, ""),
+    )
+    read = Reader(to_report(page(missions=rows)))
+    assert "1 go <b> Bob success, fulfilled 1 there" in read.text
+    assert [attrs["class"] for tag, attrs in read.tags if attrs.get("class", "").startswith("pill")] == [
+        "pill success",
+        "pill open",
+    ]

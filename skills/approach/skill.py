@@ -72,6 +72,7 @@ class Approach(ArmSkill[ApproachInputs]):
             raise SkillFailure(Cause.PLANNING, self._why_none(seen))
         if places[0].pose != self.context.pose():
             yield from self.stow()
+            yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
             tolerances = (self.options.position_tolerance_m, self.options.yaw_tolerance_rad, self.options.speed_m_s)
             goals = [NavigateInputs(place.pose, *tolerances) for place in places[: self.options.tries]]
             yield from go_to_one(self, goals)

@@ -210,7 +210,10 @@ class Detect(ArmSkill[DetectInputs]):
                 yield from self._look_and_confirm(inputs, p_BT, [], shift_rad=shift_rad)
 
     def _look_from_above(self, inputs: DetectInputs, targets_W: Sequence[FloatArray]) -> Routine[None]:
-        """Look from a body that stands as high as it can, where the camera is on a head: it looks flat over tables."""
+        """Look from a body that stands as high as it can, where the camera is on a head: it looks flat over tables.
+
+        It stays there when that shows what is looked for, which may not be seen from lower down.
+        """
         capabilities = self.context.robot.capabilities()
         raised_m = capabilities.height_range_m[1] - capabilities.standing_height_m - _BELOW_TOP_M
         if self.object_camera.on_hand or raised_m < _RAISED_M or self._has_enough(inputs):
@@ -219,7 +222,7 @@ class Detect(ArmSkill[DetectInputs]):
             p_BT = self.X_WB().inverse() @ p_WT
             yield from self._look_and_confirm(inputs, p_BT, [], raised_m=raised_m)
             if self._has_enough(inputs):
-                break
+                return
         yield from self.stand_at(capabilities.standing_height_m, "standing as usual")
 
     def _refresh(self, inputs: DetectInputs) -> Routine[None]:

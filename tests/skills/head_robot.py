@@ -30,6 +30,7 @@ class HeadRobot(ScriptedRobot):
     head_rad: tuple[float, float] = (0.0, 0.0)
     head_refuses: bool = False
     looked_at: list[tuple[float, float]] = field(default_factory=list)
+    stood_m: list[float] = field(default_factory=list)
 
     def capabilities(self):
         return HEAD_CAPABILITIES
@@ -48,6 +49,10 @@ class HeadRobot(ScriptedRobot):
         colour, depth_m = taken(frames.pose("head_camera"), () if self.holding else self.things or ())
         grey = colour.mean(axis=-1).astype(np.uint8)
         return Image(self.now_s, HEAD_CAMERA, "head_camera", LENS, LENS, colour, grey, depth_m, frames)
+
+    def stand(self, height_m, pitch_rad, *, until_s, lease):
+        self.stood_m.append(height_m)
+        return super().stand(height_m, pitch_rad, until_s=until_s, lease=lease)
 
     def point_head(self, pan_rad, tilt_rad, *, until_s, lease):
         if self.head_refuses:

@@ -40,7 +40,7 @@ _ROUND_UP_M = 0.02
 _AT_ONCE = 200
 _ANEW_M = 0.6
 _ABOUT_M = 1.2
-_BODY_M = 0.6
+_BODY_M = 0.3
 
 
 @dataclass(frozen=True)
@@ -228,8 +228,9 @@ class GivingWay:
         return any(one.way is not None for one in self._traffic.others())
 
     def is_robot(self, place_W: tuple[float, float]) -> bool:
-        """Whether another robot covers a place (x, y)."""
-        return any(math.dist(place_W, one.pose[:2].tolist()) < _BODY_M for one in self._traffic.others())
+        """Whether another robot covers a place (x, y), or ends just before it."""
+        bodies = self.costmap(_Nothing(), Avoided.BODIES)
+        return bool(bodies.clearance_m(np.array([place_W]))[0] < _BODY_M)
 
     def name_at(self, place_W: tuple[float, float] | None) -> str | None:
         """The robot that stands about a place (x, y); None: nobody."""

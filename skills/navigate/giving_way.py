@@ -39,8 +39,9 @@ _UNSURE_M = 0.04
 _ROUND_UP_M = 0.02
 _AT_ONCE = 200
 _ANEW_M = 0.6
+_FAR_M = 1.5
 _ABOUT_M = 1.2
-_BODY_M = 0.6
+_BODY_M = 0.3
 
 
 @dataclass(frozen=True)
@@ -83,10 +84,14 @@ class WithBodies:
     radius_m: float
 
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
-        """Distance from each (x, y) row to the nearest obstacle or disc."""
+        """Distance from each (x, y) row to the nearest obstacle or disc; discs farther than 1.5 m do not count."""
         points = np.asarray(points_W, dtype=np.float64)[:, :2]
-        nearest, _ = self.tree.query(points)
-        return np.asarray(np.minimum(self.costmap.clearance_m(points), nearest - self.radius_m))
+        clearance, most_m = self.costmap.clearance_m(points), self.radius_m + _FAR_M
+        near = np.all((points > self.tree.mins - most_m) & (points < self.tree.maxes + most_m), axis=1)
+        nearest, _ = self.tree.query(points[near], distance_upper_bound=most_m)
+        clearance = np.array(clearance, dtype=np.float64)
+        clearance[near] = np.minimum(clearance[near], nearest - self.radius_m)
+        return clearance
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
         """As the costmap does."""
@@ -228,8 +233,9 @@ class GivingWay:
         return any(one.way is not None for one in self._traffic.others())
 
     def is_robot(self, place_W: tuple[float, float]) -> bool:
-        """Whether another robot covers a place (x, y)."""
-        return any(math.dist(place_W, one.pose[:2].tolist()) < _BODY_M for one in self._traffic.others())
+        """Whether another robot covers a place (x, y), or ends just before it."""
+        bodies = self.costmap(_Nothing(), Avoided.BODIES)
+        return bool(bodies.clearance_m(np.array([place_W]))[0] < _BODY_M)
 
     def name_at(self, place_W: tuple[float, float] | None) -> str | None:
         """The robot that stands about a place (x, y); None: nobody."""

@@ -182,3 +182,12 @@ def test_a_body_is_covered_to_its_corners() -> None:
     """The corner of an oblong lies beyond its round middle, and counts as well."""
     costmap = with_bodies(Open(), [(FOOTPRINT.discs, np.zeros((1, 3)))])
     assert costmap.clearance_m(np.array([[0.65, 0.25]])) == pytest.approx([0.1], abs=0.02)
+
+
+@pytest.mark.parametrize(("place_W", "is_robot"), [((3.0, -1.2), True), ((3.5, -2.0), True), ((3.0, -0.8), False)])
+def test_what_a_camera_takes_for_a_person_where_a_robot_stands_is_that_robot(
+    place_W: tuple[float, float], is_robot: bool
+) -> None:
+    """Alice, 1.1 m by 0.5 m, stands at (3, -2) along y."""
+    giving, _ = among("bob")
+    assert giving.is_robot(place_W) is is_robot

@@ -174,3 +174,11 @@ def test_a_large_tree_is_folded_unless_told_otherwise():
     many = invoke("tree", sentence, "--most", "10000").stdout.splitlines()
     assert len(few) <= 30 < len(many)
     assert not [line for line in many if "nodes)" in line]
+
+
+def test_the_trees_of_several_robots_stand_side_by_side():
+    root = json.loads(invoke("tree", "two_robots", "--format", "json").stdout)
+    assert (root["type"], [child["id"].partition("/")[0] for child in root["children"]]) == (
+        "together",
+        ["alice", "bob"],
+    )

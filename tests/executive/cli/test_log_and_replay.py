@@ -228,3 +228,11 @@ def test_a_replay_of_several_robots_holds_the_messages_of_each(two_robots, tmp_p
     page = html.read_text()
     assert "Alice is there" in page
     assert "Bob is there" in page
+
+
+def test_the_trees_of_several_robots_stand_side_by_side():
+    root = json.loads(invoke("tree", "two_robots", "--format", "json").stdout)
+    assert (root["type"], [child["id"].partition("/")[0] for child in root["children"]]) == (
+        "together",
+        ["alice", "bob"],
+    )

@@ -208,9 +208,9 @@ def test_another_programs_database_is_refused(path):
 def test_a_store_of_another_version_is_refused(path):
     MissionStore(path).close()
     with sqlite3.connect(path) as other:
-        other.execute("PRAGMA user_version = 9")
+        other.execute(f"PRAGMA user_version = {VERSION + 1}")
     other.close()
-    with pytest.raises(InputError, match=f"version 9, and this errand reads {VERSION}"):
+    with pytest.raises(InputError, match=f"version {VERSION + 1}, and this errand reads {VERSION}"):
         MissionStore(path)
 
 

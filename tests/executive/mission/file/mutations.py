@@ -222,7 +222,7 @@ def huge(text, rng):
 
 def cut_off(text, rng):
     lines = [line for line in text.splitlines(keepends=True) if not line.startswith("#")]
-    at = next(n for n, line in enumerate(lines) if line.startswith("steps:"))
+    at = next(n for n, line in enumerate(lines) if line.startswith(("steps:", "parts:")))
     return "".join(lines[: int(rng.integers(at + 1))]).encode()
 
 

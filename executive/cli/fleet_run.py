@@ -186,8 +186,12 @@ class FleetDispatch:
         self._go_on_later(number, robot, end.result)
         self._tell(f"Mission {number} waits for another robot")
         if gone is None:
-            self._dispatcher.rest(name)
-            self._to_dock.append(name)
+            self._leave_for_dock(name)
+
+    def _leave_for_dock(self, name: str) -> None:
+        """A robot is to go to its dock."""
+        self._dispatcher.rest(name)
+        self._to_dock.append(name)
 
     def _look(self, robot: _Robot, end: MissionEnd) -> str | None:
         """See where a robot is at the end of a mission; why nothing more can be asked of it (None: it can)."""
@@ -313,12 +317,16 @@ class FleetDispatch:
         self._finish(number, MissionState(result.outcome.value), result.message)
 
     def _part_over(self, number: int, share: Share, seen: Mapping[str, Any] | None) -> None:
-        """The next part goes on from what this one did; after the last, all are judged together."""
+        """The next part goes on from what this one did, and its robot leaves the table to the other; after the last,
+        all are judged together."""
         mission, whole = self.missions[number], self._parts[number].part_of
         following = [part for part, each in self._parts.items() if each.follows == number]
         for part in following:
             shares = (*mission.shares, share)
             self.missions[part] = replace(self.missions[part], since_s=mission.since_s, shares=shares)
+        name = share.tree.robot_name
+        if following and name in self._dispatcher.robots and self._robots[name].dock is not None:
+            self._leave_for_dock(name)
         if whole is not None and not following:
             self._given.judge(whole, seen)
 

@@ -293,6 +293,13 @@ def test_a_chain_is_judged_as_a_whole_from_the_beginning_of_its_first_part(chain
     assert (chain.shares, chain.since_s) == ([("Alice", 2)], [0.0, 0.0])
 
 
+def test_the_first_robot_leaves_the_table_to_the_second_and_goes_to_its_dock(chain, script):
+    script.ends["charge"] = chain.charge
+    chain.run()
+    assert script.begun.count("charge") == 1
+    assert [robot.holder for robot in chain.robots.values()] == [None, None]
+
+
 def test_when_the_first_part_fails_the_second_is_not_begun(chain, script):
     script.ends["place"] = lambda skill: Failed(Cause.EXECUTION, "slipped")
     assert [outcome for _, outcome, _ in chain.run()] == ["failure"] * 3

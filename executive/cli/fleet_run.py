@@ -13,7 +13,7 @@ from executive.cli.backend import Backend
 from executive.cli.feasibility import route_planner_of
 from executive.cli.fleet_chain import chained
 from executive.cli.fleet_missions import FleetMission, RobotNow, bid_for, charging_time_s, rest_of
-from executive.cli.fleet_progress import Progress, ProgressJournal
+from executive.cli.fleet_progress import Progress, ProgressJournal, is_lost
 from executive.cli.goal_conditions import Share
 from executive.cli.mission_run import entry_for
 from executive.cli.requests import Prepared
@@ -200,9 +200,15 @@ class FleetDispatch:
             return end.gone
         robot.pose = end.seen.pose or robot.pose
         robot.charge = robot.charge if end.seen.charge is None else end.seen.charge
-        if end.seen.pose is None and end.gone is None and end.result.outcome is not Outcome.SUCCESS:
-            return "it does not know where it is"
-        return end.gone
+        if end.gone is not None or end.result.outcome is Outcome.SUCCESS:
+            return end.gone
+        states = end.result.states
+        number = self._dispatcher.under_way.get(end.result.robot_name)
+        prepared = robot.dock if number is None else self.missions[number].options[end.result.robot_name]
+        lost = prepared is not None and is_lost(
+            prepared.tree, lambda path: states[path].status if path in states else None
+        )
+        return "it does not know where it is" if lost or end.seen.pose is None else None
 
     def _charged(self, name: str, result: RobotResult, *, recalled: bool) -> None:
         """A robot's way to its dock is over. Where it could not charge, it is not sent there again."""

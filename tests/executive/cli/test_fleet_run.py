@@ -316,3 +316,20 @@ def test_what_no_two_robots_can_do_either_ends_with_the_reason_of_each(chain):
 def test_what_one_robot_can_do_alone_is_not_split(chain):
     chain.cannot = lambda name, command: name == "Alice" and command.goal == "bedroom"
     assert chain.run() == [("Bob", "success", 0)]
+
+
+def test_a_robot_that_gave_up_finding_its_place_is_lost_whatever_it_believes_afterwards(fleet, script):
+    fleet.queue(KITCHEN)
+
+    def lose(skill):
+        if skill.context.robot.name == "Alice":
+            skill.context.localiser.localised = False
+            return Running("turning")
+        return Succeeded("there")
+
+    def give_up(skill):
+        skill.context.localiser.localised = True
+        return Failed(Cause.EXECUTION, "no place on the map fits")
+
+    script.ends.update(navigate=lose, relocalise=give_up)
+    assert fleet.run() == [("Bob", "success", 1)]

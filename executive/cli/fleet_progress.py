@@ -9,10 +9,11 @@ from typing import Final
 from py_trees.common import Status
 
 from executive.run.journal import TickNote
+from executive.tree.behaviours.conditions import KnowsPlace
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
 
-__all__ = ["Progress", "ProgressJournal", "is_plain", "progress_of"]
+__all__ = ["Progress", "ProgressJournal", "is_lost", "is_plain", "progress_of"]
 
 _TOUCHED: Final = (Status.RUNNING, Status.SUCCESS)
 
@@ -48,6 +49,13 @@ def progress_of(tree: CompiledTree, statuses: Callable[[str], Status | None]) ->
     over = {part.path_id for part in tree.parts[:done]}
     begun = any(statuses(leaf.path_id) in _TOUCHED for leaf in _changing(tree.mission, over))
     return Progress(done, begun)
+
+
+def is_lost(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> bool:
+    """Whether a mission ended because its robot did not find out where it is."""
+    watches = (node for node in tree.root.walk() if node.kind == "interrupt")
+    lost = (node.path_id for node in watches if isinstance(node.options["condition"], KnowsPlace))
+    return any(statuses(path_id) is Status.FAILURE for path_id in lost)
 
 
 def _changing(node: NodeSpec, over: set[str]) -> list[NodeSpec]:

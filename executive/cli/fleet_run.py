@@ -14,7 +14,7 @@ from executive.cli.backend import Backend
 from executive.cli.feasibility import route_planner_of
 from executive.cli.fleet_chain import chained
 from executive.cli.fleet_missions import FleetMission, RobotNow, bid_for, charging_time_s, rest_of
-from executive.cli.fleet_progress import Progress, ProgressJournal
+from executive.cli.fleet_progress import Progress, ProgressJournal, is_lost
 from executive.cli.fleet_report import EndedMission, mission_rows, missions_message, told, write_fleet_report
 from executive.cli.goal_conditions import Share
 from executive.cli.mission_run import entry_for, robot_report
@@ -196,8 +196,12 @@ class FleetDispatch:
         self._go_on_later(number, robot, end.result)
         self._tell(f"Mission {number} waits for another robot")
         if gone is None:
-            self._dispatcher.rest(name)
-            self._to_dock.append(name)
+            self._leave_for_dock(name)
+
+    def _leave_for_dock(self, name: str) -> None:
+        """A robot is to go to its dock."""
+        self._dispatcher.rest(name)
+        self._to_dock.append(name)
 
     def _look(self, robot: _Robot, end: MissionEnd) -> str | None:
         """See where a robot is at the end of a mission; why nothing more can be asked of it (None: it can)."""
@@ -206,9 +210,15 @@ class FleetDispatch:
             return end.gone
         robot.pose = end.seen.pose or robot.pose
         robot.charge = robot.charge if end.seen.charge is None else end.seen.charge
-        if end.seen.pose is None and end.gone is None and end.result.outcome is not Outcome.SUCCESS:
-            return "it does not know where it is"
-        return end.gone
+        if end.gone is not None or end.result.outcome is Outcome.SUCCESS:
+            return end.gone
+        states = end.result.states
+        number = self._dispatcher.under_way.get(end.result.robot_name)
+        prepared = robot.dock if number is None else self.missions[number].options[end.result.robot_name]
+        lost = prepared is not None and is_lost(
+            prepared.tree, lambda path: states[path].status if path in states else None
+        )
+        return "it does not know where it is" if lost or end.seen.pose is None else None
 
     def _charged(self, name: str, result: RobotResult, *, recalled: bool) -> None:
         """A robot's way to its dock is over. Where it could not charge, it is not sent there again."""
@@ -339,12 +349,16 @@ class FleetDispatch:
         self._finish(number, MissionState(result.outcome.value), result.message)
 
     def _part_over(self, number: int, share: Share, seen: Mapping[str, Any] | None) -> None:
-        """The next part goes on from what this one did; after the last, all are judged together."""
+        """The next part goes on from what this one did, and its robot leaves the table to the other; after the last,
+        all are judged together."""
         mission, whole = self.missions[number], self._parts[number].part_of
         following = [part for part, each in self._parts.items() if each.follows == number]
         for part in following:
             shares = (*mission.shares, share)
             self.missions[part] = replace(self.missions[part], since_s=mission.since_s, shares=shares)
+        name = share.tree.robot_name
+        if following and name in self._dispatcher.robots and self._robots[name].dock is not None:
+            self._leave_for_dock(name)
         if whole is not None and not following:
             self._given.judge(whole, seen)
 

@@ -304,6 +304,13 @@ def test_a_chain_is_judged_as_a_whole_from_the_beginning_of_its_first_part(chain
     assert (chain.shares, chain.since_s) == ([("Alice", 2)], [0.0, 0.0])
 
 
+def test_the_first_robot_leaves_the_table_to_the_second_and_goes_to_its_dock(chain, script):
+    script.ends["charge"] = chain.charge
+    chain.run()
+    assert script.begun.count("charge") == 1
+    assert [robot.holder for robot in chain.robots.values()] == [None, None]
+
+
 def test_when_the_first_part_fails_the_second_is_not_begun(chain, script):
     script.ends["place"] = lambda skill: Failed(Cause.EXECUTION, "slipped")
     assert [outcome for _, outcome, _ in chain.run()] == ["failure"] * 3
@@ -366,3 +373,20 @@ def test_a_mission_that_is_cancelled_on_its_robots_panel_is_over_and_the_robot_g
     assert sorted(row["outcome"] for row in fleet.rows) == ["cancelled", "success", "success"]
     assert fleet.message(2) == "not now"
     assert [robot.holder for robot in fleet.robots.values()] == [None, None]
+
+
+def test_a_robot_that_gave_up_finding_its_place_is_lost_whatever_it_believes_afterwards(fleet, script):
+    fleet.queue(KITCHEN)
+
+    def lose(skill):
+        if skill.context.robot.name == "Alice":
+            skill.context.localiser.localised = False
+            return Running("turning")
+        return Succeeded("there")
+
+    def give_up(skill):
+        skill.context.localiser.localised = True
+        return Failed(Cause.EXECUTION, "no place on the map fits")
+
+    script.ends.update(navigate=lose, relocalise=give_up)
+    assert fleet.run() == [("Bob", "success", 1)]

@@ -71,7 +71,8 @@ class ArmCapabilities:
 
     `standing_m` are the distances of the body's origin from something to take or to put down, the best first, and
     `nearer_m` those for what is held from above; `carry_x_m` and `carry_z_m` are where in B the hand carries, best at
-    `carry_best_x_m` and low.
+    `carry_best_x_m` and low. Where what is carried so sticks out over furniture, the hand is drawn in to the first of
+    `tuck_x_m`, turned to a side; none for an arm that carries within the body's outline.
     Joints that turn without end are `continuous` in the description. `inverse` solves its inverse kinematics; None for
     the families whose closed form `skills.arm.kinematics` reads from the description.
     """
@@ -86,6 +87,7 @@ class ArmCapabilities:
     carry_x_m: tuple[float, ...] = (0.3, 0.35, 0.4, 0.45, 0.5)
     carry_z_m: tuple[float, ...] = (0.26, 0.29, 0.32, 0.36, 0.41, 0.46, 0.54)
     carry_best_x_m: float = 0.35
+    tuck_x_m: tuple[float, ...] = ()
 
     @property
     def comfortable_m(self) -> tuple[float, float]:

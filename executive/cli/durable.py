@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 from executive.cli.report import RunReport
-from executive.cli.requests import Prepared, prepare, replacing
+from executive.cli.requests import Prepared, commanded, prepare, prepared_for, replacing
 from executive.mission.errors import InputError, disk_is_full
 from executive.mission.request import Request
 from executive.record.reader import Event, read_events
@@ -19,7 +19,8 @@ from executive.store.database import full_disk
 from executive.store.journal import StoreJournal
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.recollection import Recollection
-from executive.store.resuming import resumed_tree
+from executive.store.records import Replacement
+from executive.store.resuming import ended_tree, resumed_tree
 from skills.robot import Pose2D
 
 STORE: Final = "missions.sqlite"
@@ -53,16 +54,22 @@ class Durable:
     """What a run needs to be taken up later, or to take up an earlier one.
 
     `plant` is the name of the file in which the plant keeps its state for the mission `label`. With `take_up` it
-    begins from what was kept for `take_up_label` (None: for any). `pose` is where the robot last believed to be.
+    begins from what was kept for `take_up_label` (None: for any). `journals` are those of the robots by their names,
+    `poses` where each last believed to be.
     """
 
     plant: Path
-    journal: StoreJournal
+    journals: Mapping[str, StoreJournal]
     label: str
     take_up: bool = False
     take_up_label: str | None = None
-    pose: Pose2D | None = None
+    poses: Mapping[str, Pose2D] = field(default_factory=dict)
     log: str = "log.mcap"
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What could not be kept."""
+        return tuple(dict.fromkeys(trouble for each in self.journals.values() for trouble in each.troubles))
 
 
 def plant_file(store: MissionStore) -> Path:
@@ -70,55 +77,106 @@ def plant_file(store: MissionStore) -> Path:
     return store.path.with_suffix(".plant")
 
 
-def new_run(store: MissionStore, mission: StoredMission) -> Durable:
+def new_run(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Durable:
     """A mission that begins in a fresh world."""
-    return Durable(plant_file(store), _journal(store, mission), str(mission.id))
+    if prepared.robots:
+        store.place(mission.id, {name: robot.start for name, robot in prepared.robots.items()})
+    return Durable(plant_file(store), _journals(store, mission, prepared), str(mission.id))
 
 
-def _journal(store: MissionStore, mission: StoredMission) -> StoreJournal:
-    """The journal of a mission; what takes its place by a correction is kept in its stead."""
-    return store.journal(mission.id).replaceable(lambda tree: replacing(mission.request, tree))
+def _journals(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Mapping[str, StoreJournal]:
+    """The journals of a mission's robots; what takes the place of one's part by a correction is kept in its stead."""
+    return {
+        each.mission.robot_name: store.journal(mission.id, _part_of(each)).replaceable(
+            lambda tree: replacing(mission.request, tree)
+        )
+        for each in prepared.all
+    }
 
 
-def next_run(store: MissionStore, mission: StoredMission, before: StoredMission) -> Durable:
+def _part_of(prepared: Prepared) -> str | None:
+    """The robot under whose name the store keeps a part of a mission; None for the only robot of a run."""
+    return prepared.mission.robot_name if prepared.robots else None
+
+
+def next_run(store: MissionStore, mission: StoredMission, prepared: Prepared, before: StoredMission) -> Durable:
     """A mission that begins in the world as another has left it."""
-    return replace(new_run(store, mission), take_up=True, pose=before.pose)
+    poses = store.poses(before.id) if prepared.robots else {}
+    if before.pose is not None:
+        poses = {**poses, prepared.mission.robot_name: before.pose}
+    if prepared.robots:
+        store.place(mission.id, poses)
+    return replace(new_run(store, mission, prepared), take_up=True, poses=poses)
 
 
 def same_world(one: StoredMission, other: StoredMission) -> bool:
-    """Whether two missions are to be done by one robot in one world."""
+    """Whether two missions are to be done by the same robots in one world."""
     a, b = one.request, other.request
-    same = (a.world, a.world_name, a.seed, a.robot) == (b.world, b.world_name, b.seed, b.robot)
-    return same and (a.scenario, a.variation) == (b.scenario, b.variation)
+    same = (a.world, a.world_name, a.seed, dict(a.robots)) == (b.world, b.world_name, b.seed, dict(b.robots))
+    return same and (a.robots or a.robot == b.robot) and (a.scenario, a.variation) == (b.scenario, b.variation)
 
 
 @dataclass(frozen=True)
 class TakenUp:
-    """A mission that was broken off, ready to go on."""
+    """A mission that was broken off, ready to go on; a recollection for each robot."""
 
     prepared: Prepared
     durable: Durable
-    recollection: Recollection
+    recollections: Sequence[Recollection]
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What became of its past so far."""
+        return tuple(line for each in self.recollections for line in each.told)
 
 
 def take_up(store: MissionStore, mission: StoredMission) -> TakenUp:
-    """All that is needed to go on with a mission.
+    """All that is needed to go on with a mission, each robot from where it was.
 
     Raises:
         InputError: what the store knows of it cannot be read, or its tree is no longer the one that was begun.
     """
     prepared = prepare(as_it_was(mission, store.path))
     if prepared.request.fingerprint != mission.request.fingerprint:
-        hint = f"go back to the version that began it, or `errand queue remove {mission.id}` and give it again"
-        what = f"mission {mission.id} was begun with another version of errand, of the world or of the skills"
-        raise InputError(what, hint=hint, file=store.path)
-    memory = store.memory(mission.id)
-    resumed, recollection = resumed_tree(prepared.tree, memory)
-    journal = _journal(store, mission).remembering(recollection)
-    log = _log_name(mission.starts + 1)
-    label = str(mission.id)
-    durable = Durable(plant_file(store), journal, label, True, label, memory.pose, log)
-    return TakenUp(replace(prepared, tree=resumed), durable, recollection)
+        raise _other_version(store, mission)
+    replaced = store.replacements(mission.id)
+    every = [_with_replacement(store, mission, each, replaced) for each in prepared.all]
+    memories = [store.memory(mission.id, _part_of(each)) for each in every]
+    resumed = [
+        (ended_tree(each.tree, memory) if prepared.robots else None) or resumed_tree(each.tree, memory)
+        for each, memory in zip(every, memories, strict=True)
+    ]
+    journals = _journals(store, mission, prepared)
+    for each, (_, recollection) in zip(every, resumed, strict=True):
+        journals[each.mission.robot_name].remembering(recollection)
+    names = [each.mission.robot_name for each in every]
+    poses = {name: memory.pose for name, memory in zip(names, memories, strict=True) if memory.pose is not None}
+    label, log = str(mission.id), _log_name(mission.starts + 1)
+    durable = Durable(plant_file(store), journals, label, True, label, poses, log)
+    first, *others = (replace(each, tree=tree) for each, (tree, _) in zip(every, resumed, strict=True))
+    together = replace(first, request=prepared.request, others=tuple(others))
+    return TakenUp(together, durable, [recollection for _, recollection in resumed])
+
+
+def _with_replacement(
+    store: MissionStore, mission: StoredMission, prepared: Prepared, replaced: Mapping[str, Replacement]
+) -> Prepared:
+    """What a robot is to do, or what has taken its place by a correction. Raises InputError: its tree is another."""
+    instead = replaced.get(prepared.mission.robot_name)
+    if instead is None:
+        return prepared
+    name = prepared.mission.robot_name
+    asked = replace(prepared.request, name=instead.name, commands=instead.commands, robot=name)
+    own = prepared_for(asked, commanded(asked, prepared.world), prepared.world, prepared.knowledge)
+    if own.request.fingerprint != instead.fingerprint:
+        raise _other_version(store, mission)
+    return replace(prepared, mission=own.mission, tree=own.tree)
+
+
+def _other_version(store: MissionStore, mission: StoredMission) -> InputError:
+    hint = f"go back to the version that began it, or `errand queue remove {mission.id}` and give it again"
+    what = f"mission {mission.id} was begun with another version of errand, of the world or of the skills"
+    return InputError(what, hint=hint, file=store.path)
 
 
 def _log_name(start: int) -> str:

@@ -8,7 +8,7 @@ from functools import cache, cached_property
 from pathlib import Path
 
 from executive.cli.requests import Prepared
-from executive.cli.route_cache import RouteCache, route_cache_of
+from executive.cli.route_cache import route_cache_of
 from executive.cli.starts import DEFAULT_KIND
 from executive.mission.errors import InputError, Problems
 from executive.mission.stack_file import load_stack
@@ -53,10 +53,13 @@ class _RoutesOnMap(RoutePlanner):
         return self._routes.route(start, goal)
 
 
-def route_planner_of(world: World, stack_file: Path | None = None, kind: str = DEFAULT_KIND) -> RouteCache:
+def route_planner_of(
+    world: World, stack_file: Path | None = None, kind: str = DEFAULT_KIND, *, kept: bool = True
+) -> RoutePlanner:
     """Routes of a kind of robot on its map of a world, as a stack file has them planned (None: the kind's own stack).
 
-    When there is no such map, the first route raises InputError.
+    They are `kept` for later processes, or only as long as the planner. When there is no such map, the first route
+    raises InputError.
 
     Raises:
         InputError: with file and line where the stack file cannot be used.
@@ -65,7 +68,8 @@ def route_planner_of(world: World, stack_file: Path | None = None, kind: str = D
     stack = None if stack_file is None else load_stack(stack_file)
     facts = robot_kind(kind).facts
     files = (facts,) if stack_file is None else (facts, stack_file)
-    return route_cache_of(world, _RoutesOnMap(world, stack, kind), *files)
+    planned = _RoutesOnMap(world, stack, kind)
+    return route_cache_of(world, planned, *files) if kept else planned
 
 
 def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> Checked:

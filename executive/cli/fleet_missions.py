@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -17,12 +17,12 @@ from executive.language.robots import Part, Whom
 from executive.mission.command import Command, Task
 from executive.mission.errors import InputError
 from executive.mission.file.model import Mission
-from executive.mission.knowledge import Knowledge
+from executive.mission.knowledge import Knowledge, Pose
 from executive.mission.mission import mission_from_lines
 from executive.mission.request import Request
 from executive.store.missions import MissionStore, StoredMission
 from executive.tree.check import Checked
-from executive.tree.estimate import load_estimates
+from executive.tree.estimate import RoutePlanner, load_estimates
 from plant.worlds.world import World
 from skills.robot import Pose2D
 
@@ -58,11 +58,12 @@ class FleetMission:
 @dataclass(frozen=True)
 class RobotNow:
     """A robot as the auction sees it: where it is free next (world frame), with which charge, its mission to `dock`
-    (None: it cannot), and below which charge it is `low`."""
+    (None: it cannot), below which charge it is `low`, and what plans its routes."""
 
     pose: Pose2D
     charge: float
     low: float
+    planner: RoutePlanner
     dock: Prepared | None = None
 
 
@@ -168,16 +169,17 @@ def bid_for(mission: FleetMission, robot: str, now: RobotNow) -> Bid:
     if prepared is None:
         other = next(iter(mission.options))
         return Bid(mission.stored.id, robot, 0.0, 0.0, problems=(f"it is for {other}",))
-    checked = _checked_from(now.pose, prepared)
+    checked = _checked_from(now.pose, prepared, now.planner)
     taken, left = checked.estimate, now.charge - checked.estimate.charge
-    problems = tuple(error.message for error in checked.errors)
+    problems = (*(error.message for error in checked.errors), *_out_of_reach(prepared, now))
     bid = Bid(mission.stored.id, robot, 0.0, taken.duration_s, left, problems=problems)
     if left >= now.low or problems:
         return bid
     charged = prepared.knowledge.battery.charged
     if now.dock is None or now.dock.world.dock is None or charged - taken.charge < now.low:
         return replace(bid, problems=(f"its battery has {now.charge:.0%}, and {taken.charge:.0%} would be used",))
-    to_dock, again = _checked_from(now.pose, now.dock), _checked_from(now.dock.world.dock, prepared)
+    to_dock = _checked_from(now.pose, now.dock, now.planner)
+    again = _checked_from(now.dock.world.dock, prepared, now.planner)
     problems = tuple(error.message for error in (*to_dock.errors, *again.errors))
     full_s = charging_time_s(now.charge, charged)
     duration_s = to_dock.estimate.duration_s + full_s + again.estimate.duration_s
@@ -189,5 +191,28 @@ def charging_time_s(charge: float, charged: float) -> float:
     return max(0.0, charged - charge) / load_estimates().battery.charging_per_s
 
 
-def _checked_from(pose: Pose2D, prepared: Prepared) -> Checked:
-    return check_prepared(replace(prepared, world=replace(prepared.world, start=pose)))
+def _checked_from(pose: Pose2D, prepared: Prepared, planner: RoutePlanner) -> Checked:
+    return check_prepared(replace(prepared, world=replace(prepared.world, start=pose)), planner)
+
+
+def _out_of_reach(prepared: Prepared, now: RobotNow) -> Iterator[str]:
+    """What a robot is to take from where it cannot come. Alone it would look elsewhere; of a fleet another one can."""
+    knowledge = prepared.knowledge
+    for command in prepared.tree.commands:
+        if command.task is not Task.GRASP or command.object is None:
+            continue
+        place = None if command.goal is None else knowledge.place(command.goal)
+        usual = knowledge.usual_surfaces(command.object.name) if place is None else (place,)
+        surfaces = [name for spot in usual for name in knowledge.surfaces_in(spot)]
+        if surfaces and not any(
+            _is_way(now, view) for name in surfaces for view in knowledge.surfaces[name].viewpoints
+        ):
+            yield f"there is no way to the {place or surfaces[0]}, where the {command.object} is to be taken"
+
+
+def _is_way(now: RobotNow, pose: Pose) -> bool:
+    try:
+        now.planner.route(now.pose, Pose2D(pose.x, pose.y, pose.yaw))
+    except ValueError:
+        return False
+    return True

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from executive.cli.artifacts import Artifacts
 from executive.cli.backend import Backend
+from executive.cli.feasibility import route_planner_of
 from executive.cli.fleet_chain import chained
 from executive.cli.fleet_missions import FleetMission, RobotNow, bid_for, charging_time_s, rest_of
 from executive.cli.fleet_progress import Progress, ProgressJournal
@@ -39,6 +40,7 @@ from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore
+from executive.tree.estimate import RoutePlanner
 from executive.tree.node_view import node_view
 from skills.robot import Pose2D
 
@@ -62,6 +64,7 @@ class _Robot:
     entry: RunEntry | None = None
     journal: ProgressJournal | None = None
     dock: Prepared | None = None
+    planner: RoutePlanner | None = None
     faults: tuple[str, ...] = ()
 
 
@@ -242,7 +245,10 @@ class FleetDispatch:
     def _offer(self, wanted: FleetMission, name: str) -> Bid:
         """What a robot offers from where it is free next."""
         robot = self._robots[name]
-        now = RobotNow(robot.pose, robot.charge, self.battery.low, robot.dock)
+        if robot.planner is None:
+            some = wanted.options.get(name, next(iter(wanted.options.values())))
+            robot.planner = route_planner_of(some.world, some.request.stack, self.robots[name].kind, kept=False)
+        now = RobotNow(robot.pose, robot.charge, self.battery.low, robot.planner, robot.dock)
         if name in self._dispatcher.resting and robot.dock is not None:
             now = replace(now, pose=robot.dock.world.dock or robot.pose, charge=self.battery.charged)
         return replace(bid_for(wanted, name, now), ready_s=self._ready_s(robot))
@@ -254,6 +260,7 @@ class FleetDispatch:
         robot.free_at_s = self._now_s + charging_time_s(robot.charge, self.battery.charged)
         robot.journal = None
         self._tell(f"{name} goes to its dock: its battery is at {robot.charge:.0%}")
+        self._announce(robot.dock)
         return replace(self._robot_entry(name, robot.dock), tree=robot.dock.tree)
 
     def _entry(self, name: str, mission: FleetMission) -> RunEntry:
@@ -261,15 +268,20 @@ class FleetDispatch:
         robot.journal = ProgressJournal(prepared.tree, lambda progress: self._progress(mission, progress))
         speaker_W = next(iter(self.robots.values())).start
         entry = self._robot_entry(name, prepared)
+        self._announce(prepared)
         return replace(entry, tree=prepared.tree, journal=robot.journal, speaker_W=speaker_W)
 
+    def spare(self) -> Sequence[RunEntry]:
+        """The robots before they have a mission."""
+        options = next((mission.options for mission in self.missions.values()), {})
+        return [self._robot_entry(name, options[name]) for name in self.robots if name in options]
+
     def _robot_entry(self, name: str, prepared: Prepared) -> RunEntry:
-        """The robot, with its estimators as they were in its last mission."""
+        """The robot with its faults and estimators, which stay the same from mission to mission."""
         robot = self._robots[name]
         if robot.entry is None:
             disturbed = replace(prepared.request, scenario=Scenario(robot.faults))
             robot.entry = entry_for(replace(prepared, request=disturbed), self.backend, None, self._work)
-        self._announce(prepared)
         return robot.entry
 
     def _progress(self, mission: FleetMission, progress: Progress) -> None:
@@ -393,6 +405,7 @@ def run_fleet(
                 control=control,
                 observer=page,
                 dispatch=dispatch,
+                spare=dispatch.spare(),
             )
         dispatch.close()
     finally:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import Annotated, Any
+from types import MappingProxyType
+from typing import Annotated, Any, Final
 
 import typer
 from rich.console import Console
@@ -14,22 +15,26 @@ from rich.live import Live
 from rich.text import Text
 
 from executive.cli.output import BAD_INPUT, console_for, refusals
+from executive.cli.run_options import ROBOTS, robots_of
 from executive.cli.signals import interrupted_by_hang_up
 from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Status, Understanding, load_parser
-from executive.mission.errors import InputError
+from executive.language.robots import Part
+from executive.mission.errors import InputError, listing
 from executive.mission.file.model import DEFAULT_WORLD
 from executive.mission.knowledge import Knowledge
+from executive.mission.robots import RobotSetup, display_name
 from executive.speech.activity import load_detector
-from executive.speech.hearing import SpeechReader, spoken_phrases
+from executive.speech.hearing import SpeechReader, TeamReader, refuse_alike, spoken_phrases
 from executive.speech.listener import HeardUtterance, Listener, Recording
 from executive.speech.microphone import Hearing, follow, microphone_blocks
 from executive.speech.vocabulary import Vocabulary, of_world, read_vocabulary
 from executive.speech.voice import Voice, installed_voice
 from executive.speech.whisper import load_whisper
 
-__all__ = ["answer_line", "hear_request", "heard_sentence", "listen", "listener_for", "show_hearing"]
+__all__ = ["answer_line", "called_robots", "hear_request", "heard_sentence", "listen", "listener_for", "show_hearing"]
 
+NO_ROBOTS: Final[Mapping[str, RobotSetup]] = MappingProxyType({})
 _METER_WIDTH = 24
 _QUIETEST_DB = -60.0
 
@@ -44,6 +49,7 @@ def listen(
         Path | None, typer.Option(help="A text file with one name on each line, in place of the world's names.")
     ] = None,
     robot: Annotated[str | None, typer.Option(help="The robot's name; the world's robot unless said.")] = None,
+    robots: ROBOTS = None,
     jsonl: Annotated[bool, typer.Option("--jsonl", help="One JSON object for each file.")] = False,
 ) -> None:
     """Recognise what is said in wav files or at the microphone, and show the commands that it means."""
@@ -51,8 +57,17 @@ def listen(
         if mic == bool(files):
             raise InputError("errand listen takes wav files or --mic", hint="try: errand listen request.wav")
         knowledge = knowledge_of(open_world(world or DEFAULT_WORLD))
+        several = called_robots(robots_of(robots), knowledge) if robot is None else ()
+        if (robot is not None and robots is not None) or (open_words and several):
+            what = "--robots stands without --robot and --open"
+            raise InputError(what, hint="what is said to several robots is understood in a world")
         listener = listener_for(
-            knowledge, open_words=open_words, require_wake=not no_wake, vocabulary=vocabulary, robot_name=robot
+            knowledge,
+            open_words=open_words,
+            require_wake=not no_wake,
+            vocabulary=vocabulary,
+            robot_name=robot,
+            robots=several,
         )
         if mic:
             _follow_microphone(listener)
@@ -69,8 +84,9 @@ def listener_for(
     require_wake: bool = True,
     vocabulary: Path | None = None,
     robot_name: str | None = None,
+    robots: Sequence[str] = (),
 ) -> Listener:
-    """A listener for the robot of a world, with the recogniser loaded.
+    """A listener for the robot of a world, or for several, with the recogniser loaded.
 
     Args:
         knowledge: what is known of the world: its names, and the robot's own.
@@ -78,10 +94,19 @@ def listener_for(
         require_wake: whether the robot must be called by its name.
         vocabulary: a file of names, in place of those of the world.
         robot_name: the robot's name, in place of the one in `knowledge`.
+        robots: the names of several robots, in its place.
 
     Raises:
-        InputError: the extra `speech` is not installed, or the vocabulary cannot be read.
+        InputError: the extra `speech` is not installed, the vocabulary cannot be read, or robots cannot be told apart.
     """
+    if robots:
+        refuse_alike(robots)
+        first, *others = robots
+        names = of_world(knowledge, called=False) if vocabulary is None else read_vocabulary(vocabulary, None)
+        called_by = (first, tuple(others)) if require_wake else (None, ())
+        words = Vocabulary((*names.names, *robots), *called_by)
+        team = TeamReader(load_parser(), knowledge, words, tuple(robots), require_wake)
+        return Listener(load_whisper(), load_detector, team, spoken_phrases(words))
     name = robot_name or knowledge.robot.name
     called = name if require_wake else None
     words = of_world(knowledge, called=require_wake) if vocabulary is None else read_vocabulary(vocabulary, called)
@@ -89,6 +114,11 @@ def listener_for(
     world = None if open_words else knowledge
     reader = SpeechReader(load_parser(), world, heard, name, require_wake, knowledge.robot.others)
     return Listener(load_whisper(), load_detector, reader, spoken_phrases(heard))
+
+
+def called_robots(robots: Mapping[str, RobotSetup], knowledge: Knowledge) -> tuple[str, ...]:
+    """The names of several robots as people say them: those that are given, else those that the world names."""
+    return tuple(map(display_name, robots or knowledge.robots or ()))
 
 
 def heard_sentence(wav: Path, listener: Listener) -> str:
@@ -104,16 +134,25 @@ def heard_sentence(wav: Path, listener: Listener) -> str:
 
 
 def hear_request(
-    wav: Path, other: Path | str | None, *, world: str | None, require_wake: bool, console: Console
+    wav: Path,
+    other: Path | str | None,
+    *,
+    world: str | None,
+    require_wake: bool,
+    console: Console,
+    robots: Mapping[str, RobotSetup] = NO_ROBOTS,
 ) -> str:
     """The sentence in a recording, shown on the console; `other` is what else was asked for, which must be nothing.
+
+    It may call any of the `robots`.
 
     Raises:
         InputError: there is another request, the extra `speech` is not installed, or see `heard_sentence`.
     """
     if other is not None:
         raise InputError("--listen stands alone", hint="leave out --say and the mission file")
-    listener = listener_for(knowledge_of(open_world(world or DEFAULT_WORLD)), require_wake=require_wake)
+    knowledge = knowledge_of(open_world(world or DEFAULT_WORLD))
+    listener = listener_for(knowledge, require_wake=require_wake, robots=called_robots(robots, knowledge))
     sentence = heard_sentence(wav, listener)
     console.print(Text(f"heard: {sentence}"))
     return sentence
@@ -158,7 +197,8 @@ def _meter(hearing: Hearing) -> Text:
 
 def _follow_microphone(listener: Listener) -> None:
     console = console_for(as_json=False)
-    called = f'"Hey {listener.reader.robot_name}, ..."' if listener.reader.require_wake else "your request"
+    calls = listing((f'"Hey {name}, ..."' for name in listener.reader.robots), last="or")
+    called = calls if listener.reader.require_wake else "your request"
     console.print(f"Listening; say {called}. Ctrl-C ends.", markup=False)
     with suppress(KeyboardInterrupt), interrupted_by_hang_up(), closing(microphone_blocks()) as blocks:
         show_hearing(follow(blocks, listener), console, installed_voice())
@@ -187,8 +227,16 @@ def _show_recording(recording: Recording) -> None:
         typer.echo(f"  {note}")
     if recording.status is not Status.OK:
         typer.echo(f"errand: {recording.file}: {recording.reason}", err=True)
-    for command in recording.commands:
+    for part in recording.parts:
+        for command in part.meaning.commands:
+            typer.echo(f"  {_who(part)}: {command}")
+    for command in () if recording.parts else recording.commands:
         typer.echo(f"  {command}")
+
+
+def _who(part: Part) -> str:
+    """Which of several robots does a part."""
+    return part.robot if isinstance(part.robot, str) else f"{part.robot.value} of the robots"
 
 
 def _unheard(file: Path, error: InputError) -> dict[str, Any]:

@@ -141,13 +141,15 @@ def run(
         return PageView(prepared, console, port=view_port, later=later) if wants_page else None
 
     with refusals(), voice_for(aloud) as voice:
+        setups = robots_of(robots)
         if listen_to is not None:
-            say = hear_request(listen_to, file or say, world=world, require_wake=wake is not False, console=console)
+            must = wake is not False
+            say = hear_request(listen_to, file or say, world=world, require_wake=must, console=console, robots=setups)
         at = None if start is None else Start.of(start)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
         asked = replace(asked, given=given_values(given or ()), start=at, map=own_map)
         asked = replace(asked, time_of_day=time_of_day(day_time), time_limit_s=time_limit_s(time_limit))
-        asked = replace(asked, robots=robots_of(robots))
+        asked = replace(asked, robots=setups)
         asked = _disturbed(asked, fault, random_faults, scenario)
         asked = replace(asked, variation=Variation(light, clutter, people, friction))
         finished, page = _run_kept(
@@ -295,7 +297,7 @@ def _run_kept(
             )
         with kept(missions, mission) as ended:
             control = control_for(console, quiet=quiet) if shown is None else shown.control
-            durable = None if prepared.robots else new_run(missions, mission)
+            durable = new_run(missions, mission, prepared)
             start = partial(run_simulated, prepared, page=shown, durable=durable, profile=profile)
             talk = None if shown is None else shown.talk
             finished = show_run(

@@ -68,6 +68,7 @@ def run_request(
     out, clock, work = prepared.request.out, backend.clock, Work()
     scenario = prepared.request.scenario
     entries = [entry_for(each, backend, durable, work) for each in prepared.all]
+    spare = _spare(prepared, backend)
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock, apart=len(prepared.robots) > 1)
     if listener is not None:
         log.listen(listener)
@@ -94,6 +95,7 @@ def run_request(
                 observer=both(observer, page, watched),
                 work=work,
                 profile=profile,
+                spare=spare,
             )
         if durable is not None:
             _keep(durable, log, prepared.tree.robot_name)
@@ -127,6 +129,13 @@ def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None, wor
     )
 
 
+def _spare(prepared: Prepared, backend: Backend) -> Sequence[RunEntry]:
+    """The robots of a request that have nothing to do in it."""
+    busy = {each.tree.robot_name for each in prepared.all}
+    names = [name for name in prepared.robots if name not in busy]
+    return [backend.entry(replace(prepared.tree, robot_name=name), None) for name in names]
+
+
 def _settings(request: Request) -> RunSettings:
     """The settings of a run: seed, time of day, and time limit."""
     usual = RunSettings(seed=request.seed)
@@ -143,8 +152,8 @@ def _to_come(faults: Sequence[str], now_s: float) -> list[Fault]:
 
 def _keep(durable: Durable, log: EventLog, robot_name: str) -> None:
     """Keep the world for the next mission, which begins where this one ended, and log what could not be kept."""
-    durable.journal.keep_world()
-    for trouble in durable.journal.troubles:
+    next(iter(durable.journals.values())).keep_world()
+    for trouble in durable.troubles:
         log(ERROR_TOPIC, {"node": robot_name, "what": "keep the mission's state", "traceback": trouble})
 
 

@@ -117,7 +117,7 @@ def said(do: Callable[[str, str | None], str]) -> Action:
 
 
 def queueing(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], str]:
-    """Keeps a sentence in a store, as `errand queue add` does, for the world and the seed of a request.
+    """Keeps a sentence in a store, as `errand queue add` does, for the world, the seed and the robots of a request.
 
     The name of a mission, as `errand missions` lists it, may stand in its place, with NAME=VALUE for its parameters.
     """
@@ -126,7 +126,8 @@ def queueing(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], s
     def later(text: str) -> str:
         """Queue it, and say so."""
         named, *settings = text.split()
-        asked = Request(text, world=before.world or before.world_name, seed=before.seed, out=out)
+        world = before.world or before.world_name
+        asked = Request(text, world=world, seed=before.seed, out=out, robots=before.robots)
         if named in shipped_missions():
             asked = replace(asked, sentence=None, file=Path(named), given=given_values(settings))
         prepared = prepare(asked)

@@ -64,7 +64,7 @@ def go_on(
     console.print(f"Mission {mission.id} ({name}) goes on.", markup=False)
     prepared = _in_its_folder(mission, taken.prepared)
     result = run_kept(missions, mission, prepared, taken.durable, console, quiet=quiet, control=control)
-    told = list(taken.recollection.told)
+    told = list(taken.told)
     console.print("\n  ".join(["What became of its past:", *told]), markup=False)
     show_files(prepared.request.out, console)
     return {**result, "resumed": told}
@@ -80,7 +80,7 @@ def start_of(
     """
     prepared = _in_its_folder(mission, prepare(as_it_was(mission, missions.path)))
     before = _before(missions, mission) if mission.queued else None
-    durable = new_run(missions, mission) if before is None else next_run(missions, mission, before)
+    durable = new_run(missions, mission, prepared) if before is None else next_run(missions, mission, prepared, before)
     console.print(f"Mission {mission.id}: {mission.request.name}", markup=False, style="bold")
     result = run_kept(missions, mission, prepared, durable, console, quiet=quiet, control=control)
     show_files(prepared.request.out, console)

@@ -118,13 +118,14 @@ def understood_for_robots(
     request: Request, robots: Collection[str], knowledge: Knowledge, ask: Answerer | None
 ) -> Addressed:
     """What a request's sentence asks of each robot. Raises InputError: it is not understood."""
+    asked = request.require_wake
     meant = understand_for_robots_asking(
         request.sentence or "",
         answer=answerer(request.answers, request.questions, ask),
         robots=tuple(robots),
         parser=load_parser(),
         knowledge=knowledge,
-        require_wake=bool(request.require_wake),
+        require_wake=knowledge.robot.require_wake if asked is None else asked,
     )
     if meant.status is not Status.OK:
         raise InputError(meant.reason or "the sentence was not understood")

@@ -84,7 +84,7 @@ def show_run(
     What the robot says is written there, and said by the `voice`.
     With `whole_tree` all its nodes are shown in the end.
     """
-    for told in prepared.mission.notes:
+    for told in dict.fromkeys(note for each in prepared.all for note in each.mission.notes):
         console.print(f"{told}.", markup=False)
     for line in (*prepared.request.scenario.lines(), *prepared.request.variation.lines()):
         console.print(f"Scenario: {line}", markup=False)

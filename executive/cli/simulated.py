@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -47,6 +47,7 @@ class SimulatedBackend:
         """Build the plant, things set by the seed. Raises InputError when they do not fit into the world."""
         self._world, self._robots, self._record = world, robots, record
         self._simulation = simulate(world, robots, seed=seed, record=record, variation=variation)
+        self._keep: Callable[[], None] | None = None
 
     @property
     def clock(self) -> Clock:
@@ -66,12 +67,19 @@ class SimulatedBackend:
             raise InputError(f"there is no robot '{tree.robot_name}' in {self._world.name}", hint=hint)
         if durable is None:
             return run_entry(self._simulation, self._world, tree, robot.stack, told=robot.told)
-        told, believed = robot.told and not durable.take_up, durable.pose
+        told, believed = robot.told and not durable.take_up, durable.poses.get(tree.robot_name)
         entry = run_entry(self._simulation, self._world, tree, robot.stack, believed=believed, told=told)
-        if durable.take_up:
-            take_up_plant(self._simulation, durable.plant, label=durable.take_up_label)
-        durable.journal.keep_world = self._simulation.keep_in(durable.plant, label=durable.label)
-        return replace(entry, journal=durable.journal)
+        journal = durable.journals[tree.robot_name]
+        journal.keep_world = self._keeping(durable)
+        return replace(entry, journal=journal)
+
+    def _keeping(self, durable: Durable) -> Callable[[], None]:
+        """Keeps the plant's state, which the first robot to be had takes up where `durable` says so."""
+        if self._keep is None:
+            if durable.take_up:
+                take_up_plant(self._simulation, durable.plant, label=durable.take_up_label)
+            self._keep = self._simulation.keep_in(durable.plant, label=durable.label)
+        return self._keep
 
     def happened(self) -> Sequence[tuple[float, str]]:
         """What doors did, and what somebody moved."""

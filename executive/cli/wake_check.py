@@ -19,16 +19,20 @@ __all__ = ["refuse_unaddressed"]
 def refuse_unaddressed(arguments: Sequence[str]) -> None:
     """Raise InputError where `--say` lacks the robot's name, although `--wake` or the world asks for it.
 
-    Whether a name that is there calls the robot is decided later, and so is all that cannot be read here.
+    Whether a name that is there calls the robot is decided later, and so is all that cannot be read here, and who of
+    several robots is called.
     """
     options = _Options(add_help=False, allow_abbrev=False)
     options.add_argument("--say")
     options.add_argument("--world", default="flat")
+    options.add_argument("--robots")
     options.add_argument("--wake", action=argparse.BooleanOptionalAction)
     try:
         asked, _ = options.parse_known_args(arguments)
         robot = _robot_of(asked.world)
     except (ValueError, OSError, yaml.YAMLError):
+        return
+    if asked.robots is not None:
         return
     required = robot.get("require_wake", False) if asked.wake is None else asked.wake
     name = str(robot.get("name") or "")
@@ -46,10 +50,10 @@ class _Options(argparse.ArgumentParser):
 
 
 def _robot_of(world: str) -> dict[str, Any]:
-    """What the knowledge file of a world says about the robot; {} where it says nothing."""
+    """What the knowledge file of a world says about its one robot; {} where it says nothing, or has several."""
     worlds = find_spec("plant.worlds")
     folders = [Path(world), *(Path(each) / world for each in (worlds and worlds.submodule_search_locations) or ())]
     file = next(file for folder in folders if (file := folder / "knowledge.yaml").is_file() or folder is folders[-1])
     knowledge = yaml.load(file.read_text(encoding="utf-8"), yaml.CSafeLoader)
-    robot = knowledge.get("robot") if isinstance(knowledge, dict) else None
+    robot = knowledge.get("robot") if isinstance(knowledge, dict) and "robots" not in knowledge else None
     return robot if isinstance(robot, dict) else {}

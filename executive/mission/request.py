@@ -104,4 +104,8 @@ class Request:
         world = self.world if self.world is None or not Path(self.world).exists() else str(Path(self.world).resolve())
         stack = None if self.stack is None else self.stack.resolve()
         own_map = None if self.map is None else self.map.resolve()
-        return replace(self, file=file, world=world, out=self.out.resolve(), stack=stack, map=own_map)
+        robots = {
+            name: robot if robot.stack is None else replace(robot, stack=robot.stack.resolve())
+            for name, robot in self.robots.items()
+        }
+        return replace(self, file=file, world=world, out=self.out.resolve(), stack=stack, map=own_map, robots=robots)

@@ -18,7 +18,7 @@ from skills.robot import Pose2D
 
 __all__ = [
     "EVERYBODY",
-    "RobotFile",
+    "NamedRobot",
     "RobotSetup",
     "RobotsFile",
     "checked_kind",
@@ -56,7 +56,7 @@ class RobotSetup:
     source: SourceLine | None = field(default=None, compare=False)
 
 
-class RobotFile(BaseModel):
+class NamedRobot(BaseModel):
     """A robot of a run: its kind, and where and with what it begins."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -81,7 +81,7 @@ def _short_robot(value: object) -> Any:
 
 
 RobotsFile = Annotated[
-    dict[Name, Annotated[RobotFile, BeforeValidator(_short_robot, json_schema_input_type=RobotFile | Name)]],
+    dict[Name, Annotated[NamedRobot, BeforeValidator(_short_robot, json_schema_input_type=NamedRobot | Name)]],
     Field(min_length=1),
 ]
 """Robots by name, each as its kind alone or with more."""
@@ -153,7 +153,7 @@ def parse_robots(text: str, kinds: Collection[str]) -> Mapping[str, RobotSetup]:
 
 
 def robots_in(
-    robots: Mapping[str, RobotFile], kinds: Collection[str], source: YamlSource | None
+    robots: Mapping[str, NamedRobot], kinds: Collection[str], source: YamlSource | None
 ) -> Mapping[str, RobotSetup]:
     """The robots that stand under `robots` in a file, in its order; their stacks are seen from its folder.
 

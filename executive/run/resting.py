@@ -2,22 +2,73 @@
 
 from __future__ import annotations
 
+import math
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Protocol
 
-from executive.run.session import Session
+from executive.run.guarded_robot import GuardedRobot
 from executive.run.traffic import TrafficTable
 from executive.run.watchdog import VerbHung, Watchdog
+from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from skills.api import Running, SkillContext
 from skills.navigate.giving_way import GivingWay
 from skills.navigate.skill import Navigate, NavigateInputs
 
-__all__ = ["Resting", "SteppingAside"]
+__all__ = ["HOLDER", "Resting", "Spare", "SteppingAside", "WithoutWork"]
 
+HOLDER = "errand"
 _LOOK_S = 0.5
+
+
+class WithoutWork(Protocol):
+    """A robot that may have no work: one whose mission is over, or that has none."""
+
+    context: RunContext
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+
+    def sense(self) -> None:
+        """Bring its estimators up to date."""
+
+    def rest(self) -> SkillContext:
+        """Claim its lease: what may be used to step aside for others. Raises LeaseError."""
+
+    def leave(self) -> None:
+        """Stop it and give the lease back."""
+
+
+@dataclass
+class Spare:
+    """A robot that has no mission in the run, or none yet."""
+
+    context: RunContext
+    robot: GuardedRobot
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self.context.robot.name
+
+    def sense(self) -> None:
+        """Bring its estimators up to date."""
+        self.context.localiser.update(self.context.robot)
+        self.context.costmap.update(self.context.robot, self.context.localiser.estimate())
+
+    def rest(self) -> SkillContext:
+        """Claim its lease. Raises LeaseError."""
+        self.context = replace(self.context, lease=self.robot.claim(HOLDER))
+        return self.context
+
+    def leave(self) -> None:
+        """Stop it and give the lease back."""
+        self.context.robot.stop(lease=self.context.lease)
+        self.robot.give_lease_back()
 
 
 class SteppingAside:
@@ -27,20 +78,20 @@ class SteppingAside:
         self._context, self._skill = context, Navigate(context)
         self._giving = GivingWay(context, self._skill.options.giving_way)
         self._due_s = context.clock.now()
-        self._drives = False
+        self.drives = False
         self.moved = False
 
     def step(self) -> None:
         """One tick. Raises what the robot's verbs raise."""
-        if not self._drives:
+        if not self.drives:
             self._begin_where_asked()
         elif not isinstance(self._skill.step(), Running):
             self.end()
 
     def end(self) -> None:
         """Stand. Idempotent; raises what the robot's verbs raise."""
-        if self._drives:
-            self._drives = False
+        if self.drives:
+            self.drives = False
             self._due_s = self._context.clock.now() + _LOOK_S
             self._skill.end()
 
@@ -56,19 +107,20 @@ class SteppingAside:
         if place is not None:
             self._skill = Navigate(self._context)
             self._skill.begin(NavigateInputs(place))
-            self._drives = self.moved = True
+            self.drives = self.moved = True
 
 
 @dataclass
 class _Robot:
-    session: Session
+    who: WithoutWork
     aside: SteppingAside
     own_lease: bool
+    sense_due_s: float = -math.inf
 
 
 @dataclass
 class Resting:
-    """The robots of a run that have no work now: they wait for their turn, or are done.
+    """The robots of a run that have no work now: they wait for their turn, are done, or were given none.
 
     `sense` brings a robot's estimators up to date. A robot whose verbs fail is left alone from then on.
     """
@@ -76,18 +128,18 @@ class Resting:
     table: TrafficTable
     watchdog: Watchdog
     tick_limit_s: float
-    sense: Callable[[Session], None]
+    sense: Callable[[WithoutWork], None]
     stepped_aside: set[str] = field(default_factory=set)
     _robots: dict[str, _Robot] = field(default_factory=dict)
 
-    def wait(self, session: Session) -> None:
+    def wait(self, who: WithoutWork) -> None:
         """A robot whose mission has not begun; the run senses for it."""
-        if session.name not in self._robots:
-            self._begin(session, session.context, own_lease=False)
+        if who.name not in self._robots:
+            self._begin(who, who.context, own_lease=False)
 
-    def rest(self, session: Session) -> None:
-        """A robot whose mission is over, and whose lease was given back; it is sensed for as well."""
-        self._guarded(session, lambda: self._begin(session, session.rest(), own_lease=True))
+    def rest(self, who: WithoutWork) -> None:
+        """A robot whose lease nobody holds, since its mission is over or it has none; it is sensed for as well."""
+        self._guarded(who, lambda: self._begin(who, who.rest(), own_lease=True))
 
     def leave(self, name: str) -> None:
         """The robot has work again, or the run is over. Idempotent; raises nothing."""
@@ -97,10 +149,10 @@ class Resting:
         self.table.rest(name, idle=False)
         if robot.aside.moved and robot.own_lease:
             self.stepped_aside.add(name)
-        self._guarded(robot.session, robot.aside.end)
+        self._guarded(robot.who, robot.aside.end)
         if robot.own_lease:
             self.table.release(name)
-            self._guarded(robot.session, robot.session.leave)
+            self._guarded(robot.who, robot.who.leave)
 
     def close(self) -> None:
         """The run is over."""
@@ -112,27 +164,36 @@ class Resting:
         for name, robot in sorted(self._robots.items()):
             step = partial(self._step, robot, hold=held(name))
             with self.watchdog.over_tick(name, self.tick_limit_s):
-                if not self._guarded(robot.session, step):
+                if not self._guarded(robot.who, step):
                     self.leave(name)
 
-    def _begin(self, session: Session, context: SkillContext, *, own_lease: bool) -> None:
-        self._robots[session.name] = _Robot(session, SteppingAside(context), own_lease)
-        self.table.rest(session.name, idle=True)
+    def _begin(self, who: WithoutWork, context: SkillContext, *, own_lease: bool) -> None:
+        self._robots[who.name] = _Robot(who, SteppingAside(context), own_lease)
+        self.table.rest(who.name, idle=True)
 
     def _step(self, robot: _Robot, *, hold: bool) -> None:
         if robot.own_lease:
-            self.sense(robot.session)
+            self._look_out(robot)
         if hold:
             robot.aside.end()
         else:
             robot.aside.step()
 
-    def _guarded(self, session: Session, call: Callable[[], None]) -> bool:
+    def _look_out(self, robot: _Robot) -> None:
+        """Bring the estimators up to date, seldom while the robot stands; it is there all the same."""
+        context = robot.who.context
+        if robot.aside.drives or context.clock.now() >= robot.sense_due_s:
+            robot.sense_due_s = context.clock.now() + _LOOK_S
+            self.sense(robot.who)
+        else:
+            self.table.heard(robot.who.name, context.known_pose())
+
+    def _guarded(self, who: WithoutWork, call: Callable[[], None]) -> bool:
         """Whether the call went well; what it raised goes to the log."""
         try:
             call()
         except (Exception, VerbHung):
             trace = traceback.format_exc()
-            session.context.publish(ERROR_TOPIC, {"node": session.name, "what": "resting", "traceback": trace})
+            who.context.publish(ERROR_TOPIC, {"node": who.name, "what": "resting", "traceback": trace})
             return False
         return True

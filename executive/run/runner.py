@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TypeVar, cast
+from typing import Final, TypeVar, cast
 
 from executive.mission.errors import disk_is_full
 from executive.record.profile import Profile
@@ -20,7 +20,7 @@ from executive.run.endings import CancelledError, LastingLog, TimeOverError, end
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
 from executive.run.outcome import Outcome, RobotStatus, RunResult
-from executive.run.resting import Resting
+from executive.run.resting import HOLDER, Resting, Spare, WithoutWork
 from executive.run.session import Session
 from executive.run.traffic import TrafficTable
 from executive.run.tree_run import Ending
@@ -35,13 +35,13 @@ from executive.tree.snapshot import Snapshot
 from skills.api import Cause, Costmap, Detector, Localiser, Publish, SharedCostmap, Worker
 from skills.detection import NO_DETECTOR
 from skills.navigate.footprint import Footprint
-from skills.robot import Clock, Pose2D, Robot
+from skills.robot import Clock, Lease, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 from skills.traffic import NO_TRAFFIC
 
-HOLDER = "errand"
 _WAYS_PERIOD_S = 0.5
 ResultT = TypeVar("ResultT")
+_NO_LEASE: Final = Lease("", "", 0)
 
 
 @dataclass(frozen=True)
@@ -109,6 +109,7 @@ def run(
     work: Work | None = None,
     profile: Profile | None = None,
     dispatch: Dispatch | None = None,
+    spare: Sequence[RunEntry] = (),
 ) -> RunResult:
     """Run trees to their end, robots in the order of their names.
 
@@ -117,11 +118,12 @@ def run(
     ticked, and that time counts against no limit. In every case all trees and robots are stopped and all leases
     returned before this returns. Without control, equal seeds give equal logs. `work` counts what is computed,
     `profile` times the skills. With `dispatch`, robots are given missions as long as it has any, one that fails ends
-    only its own, and the result has one entry for each mission. Raises ValueError: no entries, two robots of one name,
-    one that waits for a robot that is not there, or a breakpoint at a node that there is not. Raises OSError, when all
-    is stopped: the disk is full.
+    only its own, and the result has one entry for each mission. Robots that are `spare` have no mission, or none yet:
+    their trees do not count, and they clear ways that others reserve, as those do whose missions are over. Raises
+    ValueError: no entries, two robots of one name, one that waits for a robot that is not there, or a breakpoint at a
+    node that there is not. Raises OSError, when all is stopped: the disk is full.
     """
-    names = [entry.robot.name for entry in entries]
+    names = [entry.robot.name for entry in (*entries, *spare)]
     if (not entries and dispatch is None) or len(set(names)) != len(names):
         raise ValueError(f"a run needs robots of different names, not {names}")
     if strangers := {name for entry in entries for name in entry.after} - set(names):
@@ -129,7 +131,7 @@ def run(
     control = control or Control(pace=None)
     control.begin({entry.tree.robot_name: entry.tree for entry in entries})
     made = _Run(clock, worker, publish, settings, control)
-    made.observer, made.work, made.profile = observer, work or Work(), profile
+    made.observer, made.work, made.profile, made.spare = observer, work or Work(), profile, spare
     if dispatch is not None:
         made.give_out(dispatch)
     return made.run(entries)
@@ -144,6 +146,7 @@ class _Run:
         self.observer: Observer | None = None
         self.work = Work()
         self.profile: Profile | None = None
+        self.spare: Sequence[RunEntry] = ()
         self._given: DispatchedSessions | None = None
         self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
@@ -171,10 +174,13 @@ class _Run:
         ending: Ending | None = None
         full: BaseException | None = None
         try:
-            if len(entries) > 1 or self._given is not None:
+            if len(entries) + len(self.spare) > 1 or self._given is not None:
                 self._traffic = TrafficTable({}, self._clock.now)
                 tick_limit_s = self._settings.tick_limit_s
                 self._resting = Resting(self._traffic, self._watchdog, tick_limit_s, self._sense)
+                for entry in self.spare:
+                    robot = self._guard(entry)
+                    self._resting.rest(Spare(self._context(entry, robot, _NO_LEASE), robot))
             for entry in sorted(entries, key=lambda entry: entry.robot.name):
                 self._sessions.append(self._open(entry))
                 self._after[entry.robot.name] = entry.after
@@ -254,16 +260,19 @@ class _Run:
         except (Exception, VerbHung, KeyboardInterrupt):
             self._publish(ERROR_TOPIC, {"node": "runner", "traceback": traceback.format_exc()})
 
-    def _open(self, entry: RunEntry) -> Session:
+    def _guard(self, entry: RunEntry) -> GuardedRobot:
+        """The robot under the watchdog, known to the others."""
         settings = self._settings
-        robot = GuardedRobot(
-            entry.robot, self._watchdog, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s
-        )
         if self._traffic is not None:
             self._traffic.join(entry.robot.name, Footprint.of(entry.robot.capabilities()).discs)
-        context = RunContext(
+        return GuardedRobot(
+            entry.robot, self._watchdog, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s
+        )
+
+    def _context(self, entry: RunEntry, robot: GuardedRobot, lease: Lease) -> RunContext:
+        return RunContext(
             robot=cast(Robot, robot),
-            lease=robot.claim(HOLDER),
+            lease=lease,
             clock=self._clock,
             worker=self._worker,
             localiser=entry.localiser,
@@ -280,6 +289,10 @@ class _Run:
             stack=entry.stack,
             traffic=NO_TRAFFIC if self._traffic is None else self._traffic.view_of(entry.robot.name),
         )
+
+    def _open(self, entry: RunEntry) -> Session:
+        robot = self._guard(entry)
+        context = self._context(entry, robot, robot.claim(HOLDER))
         try:
             return Session(
                 entry.tree, context, robot, self._control, entry.journal, self.profile, speaker_W=entry.speaker_W
@@ -341,7 +354,7 @@ class _Run:
                 self._resting.wait(session)
         self._resting.tick(held)
 
-    def _sense(self, session: Session) -> None:
+    def _sense(self, session: WithoutWork) -> None:
         """Bring a robot's estimators up to date, and tell the others where it believes to be."""
         costmap = session.context.costmap
         if self._traffic is not None and isinstance(costmap, SharedCostmap):

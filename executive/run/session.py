@@ -17,6 +17,7 @@ from executive.run.control import Control
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
 from executive.run.outcome import Outcome, RobotResult, RobotStatus
+from executive.run.resting import HOLDER
 from executive.run.tree_run import Ending, TreeRun
 from executive.run.watchdog import VerbHung
 from executive.tree.behaviours.board import Board
@@ -54,7 +55,6 @@ class Session:
             context.board.put(start_key(tree.robot_name, tree.mission_name), speaker_W)
         self.context = context
         self._robot, self._control, self._profile = robot, control, profile
-        self._holder = context.lease.holder
         self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal, profile),)
         self._given_up: tuple[TreeRun, ...] = ()
         self._held = False
@@ -276,13 +276,13 @@ class Session:
 
     def rest(self) -> SkillContext:
         """Claim the lease again after the end: what may be used to step aside for others. Raises LeaseError."""
-        return replace(self.context, lease=self._robot.claim(self._holder))
+        self.context = replace(self.context, lease=self._robot.claim(HOLDER))
+        return self.context
 
     def leave(self) -> None:
         """Stop the robot and give back the lease that `rest` claimed."""
-        if self._robot.token is not None:
-            context = replace(self.context, lease=self._robot.token)
-            self._attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
+        context = self.context
+        self._attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
         self._attempt("return the lease", self._robot.give_lease_back)
 
     def log_end(self, ticks: int) -> None:

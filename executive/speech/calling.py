@@ -7,7 +7,7 @@ without being told anything is another witness.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Final
 
 from executive.speech.recogniser import Recognition
@@ -21,20 +21,22 @@ _OTHER_WHOLE: Final = 10.0
 _OPENING_WORDS: Final = 4
 
 
-def opening_as_heard(recognition: Recognition, text: str, name: str, calls: Callable[[str], bool]) -> str:
+def opening_as_heard(recognition: Recognition, text: str, names: Collection[str], calls: Callable[[str], bool]) -> str:
     """The text, or what is heard when no names are expected, where that is much likelier and calls nobody.
 
-    `calls` tells of a text whether it calls the robot `name`. First only the opening is exchanged, since the names
-    behind it are better heard when they are expected. A text without the name among its first words stays.
+    `calls` tells of a text whether it calls one of the robots `names`. First only the opening is exchanged, since the
+    names behind it are better heard when they are expected. A text without any name among its first words stays.
     """
     words = text.split()
     bare = [re.sub(r"\W", "", word).lower() for word in words[:_OPENING_WORDS]]
-    if name.lower() not in bare:
+    called = {name.lower() for name in names}
+    at = next((number for number, word in enumerate(bare) if word in called), None)
+    if at is None:
         return text
     unprompted = recognition.unprompted()
     if not unprompted or calls(unprompted):
         return text
-    behind = bare.index(name.lower()) + 1
+    behind = at + 1
     exchanged = " ".join([*unprompted.split()[:behind], *words[behind:]])
     if exchanged == text:
         return text

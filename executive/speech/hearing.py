@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Protocol
 
 from executive.language import DependencyParser, Status, Understanding, understand
 from executive.language.lexicon import lexicon
+from executive.language.normalise import clean
+from executive.language.questions import RefusalError
+from executive.language.robots import Part, understand_for_robots
+from executive.language.robots.cutting import cut_by_robot
 from executive.language.roles import HERE
-from executive.language.wake import Address, heard_wake
+from executive.language.sounds import sound_distance
+from executive.language.wake import SAME_NAME, Address, addressed_to, heard_wake
 from executive.mission.command import Command, is_attribute
+from executive.mission.errors import InputError
 from executive.mission.knowledge import Knowledge
 from executive.speech.alikes import SoundAlikes
 from executive.speech.sound_correction import Reading
 from executive.speech.vocabulary import Vocabulary
 
-__all__ = ["Meant", "SpeechReader", "spoken_phrases"]
+__all__ = ["Meant", "Reader", "SpeechReader", "TeamReader", "refuse_alike", "spoken_phrases"]
 
 _GREETINGS: Final = ("Hey", "Hi", "OK")
+_EVERYBODY: Final = ("everyone", "everybody")
 _ARTICLES: Final = ("the", "a", "an", "my", "from the", "to the", "on the", "in the")
 _NUMBERS: Final = ("two", "three", "four", "five")
 _BEINGS: Final = ("it's", "they're", "there's", "it is", "they are", "there is", "there are", "he is", "she is")
@@ -31,10 +38,34 @@ class Meant:
     """What a heard sentence means, and whether the robot was called by its name.
 
     The text of `understanding` is the sentence with the robot's name spelled right, so that it can be typed instead.
+    `parts` say which of several robots does what.
     """
 
     understanding: Understanding
     addressed: bool
+    parts: tuple[Part, ...] = ()
+
+
+class Reader(Protocol):
+    """Reads heard sentences."""
+
+    @property
+    def vocabulary(self) -> Vocabulary:
+        """The names that are listened for."""
+
+    @property
+    def require_wake(self) -> bool:
+        """Whether a robot must be called."""
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots that can be called."""
+
+    def read(self, text: str) -> Reading[Meant]:
+        """What a text means."""
+
+    def calls(self, text: str) -> bool:
+        """Whether a robot is called in a text."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +81,11 @@ class SpeechReader:
     robot_name: str
     require_wake: bool
     other_robots: Collection[str] = ()
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robot."""
+        return (self.robot_name,)
 
     def read(self, text: str) -> Reading[Meant]:
         """What `text` means; it fits when it becomes commands in known names."""
@@ -85,12 +121,66 @@ class SpeechReader:
         yield from (name for name in dict.fromkeys(spoken) if known and not _knows(known, name))
 
 
+@dataclass(frozen=True)
+class TeamReader:
+    """Reads heard sentences for several robots: one, some or all of them may be called."""
+
+    parser: DependencyParser
+    knowledge: Knowledge
+    vocabulary: Vocabulary
+    robots: tuple[str, ...]
+    require_wake: bool
+
+    def read(self, text: str) -> Reading[Meant]:
+        """What `text` means for each; it fits when it becomes commands."""
+        said = self._as_called(text)
+        asked = understand_for_robots(
+            said, robots=self.robots, parser=self.parser, knowledge=self.knowledge, require_wake=self.require_wake
+        )
+        commands = tuple(command for part in asked.parts for command in part.meaning.commands)
+        rest = (commands, asked.reason, asked.unknown_words, asked.question, asked.notes, asked.memory)
+        meant = Meant(Understanding(said, asked.status, *rest), self.calls(said), asked.parts)
+        if asked.status is Status.NOT_ADDRESSED:
+            return Reading(meant, fits=False, correctable=False)
+        return Reading(meant, fits=asked.status is Status.OK, suspects=asked.unknown_words)
+
+    def calls(self, text: str) -> bool:
+        """Whether robots are called in `text`, a name perhaps misspelled."""
+        try:
+            return cut_by_robot(clean(self._as_called(text)), self.robots).listener is not None
+        except RefusalError:
+            return True
+
+    def _as_called(self, text: str) -> str:
+        """The text with the name of the robot that it begins with spelled right."""
+        for name in self.robots:
+            text = _with_pause(text, name)
+        if addressed_to(text, self.robots).name is not None:
+            return text
+        others = {name: [other for other in self.robots if other != name] for name in self.robots}
+        heard = (heard_wake(text, name, others=others[name]) for name in self.robots)
+        return next((f"Hey {one.name}, {one.text}" for one in heard if one.name is not None), text)
+
+
+def refuse_alike(robots: Sequence[str]) -> None:
+    """Raise InputError where robots cannot be told apart by voice, or a name cannot be said."""
+    for number, name in enumerate(robots):
+        if not re.fullmatch(r"[^\W\d_]+(?:[ '-][^\W\d_]+)*", name):
+            hint = "give it a name of letters, or write what it is to do"
+            raise InputError(f"'{name[:60]}' cannot be called by voice", hint=hint)
+        alike = next((other for other in robots[:number] if sound_distance(other, name) <= SAME_NAME), None)
+        if alike is not None:
+            what = f"{alike} and {name} sound alike, and cannot be told apart by voice"
+            raise InputError(what, hint="give one of them another name")
+
+
 def spoken_phrases(vocabulary: Vocabulary) -> SoundAlikes:
     """All that a misheard word may have been: the names, also in the plural, and the words of requests."""
     words = lexicon()
     verbs = [" ".join(verb) for verb in words.verbs]
     prepositions = [" ".join(preposition) for preposition in words.prepositions]
-    calls = [f"{greeting} {vocabulary.robot_name}" for greeting in _GREETINGS] if vocabulary.robot_name else []
+    called = (*vocabulary.robots, *(_EVERYBODY if vocabulary.other_robots else ()))
+    calls = [f"{greeting} {name}" for name in called for greeting in _GREETINGS]
     names = [form for name in vocabulary.names for form in (name, f"{name}s")]
     told = [f"{being} {where}" for being in _BEINGS for where in ("at", "by", "in", "on")]
     goals = [f"to {name}" for name in vocabulary.names]

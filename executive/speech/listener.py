@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from executive.language import Status
+from executive.language.robots import Part
 from executive.mission.command import Command
 from executive.mission.errors import InputError
 from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Utterance
 from executive.speech.alikes import SoundAlikes
 from executive.speech.calling import opening_as_heard
-from executive.speech.hearing import Meant, SpeechReader
+from executive.speech.hearing import Meant, Reader
 from executive.speech.interpret import interpret
 from executive.speech.recogniser import Recogniser
 from executive.speech.sound import Loudness, Samples, joined
@@ -43,7 +44,7 @@ class Listener:
 
     recogniser: Recogniser
     new_detector: Callable[[], SpeechDetector]
-    reader: SpeechReader
+    reader: Reader
     alikes: SoundAlikes
     rules: PauseRules = field(default_factory=PauseRules)
 
@@ -86,7 +87,7 @@ class Listener:
             return None
         text, meant = best.text, best.meaning
         if meant.addressed:
-            text = opening_as_heard(recognition, text, self.reader.robot_name, self.reader.calls)
+            text = opening_as_heard(recognition, text, self.reader.robots, self.reader.calls)
             meant = meant if text == best.text else self.reader.read(text).meaning
         return HeardUtterance(utterance.start_s, utterance.end_s, text, meant)
 
@@ -129,6 +130,11 @@ class Recording:
         return tuple(command for one in self.decisive for command in one.meant.understanding.commands)
 
     @property
+    def parts(self) -> tuple[Part, ...]:
+        """What each of several robots is to do; nothing when any part of it was not understood."""
+        return tuple(part for one in self.decisive for part in one.meant.parts) if self.status is Status.OK else ()
+
+    @property
     def reason(self) -> str | None:
         """Why there are no commands."""
         if not self.heard:
@@ -151,6 +157,7 @@ class Recording:
             "commands": [command.to_json() for command in self.commands],
             "reason": self.reason,
             "notes": list(self.notes),
+            **({"parts": [part.to_json() for part in self.parts]} if self.parts else {}),
             "utterances": [
                 {"start_s": round(one.start_s, 2), "end_s": round(one.end_s, 2), "text": one.text} for one in self.heard
             ],

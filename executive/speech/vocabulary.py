@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 from typing import Final
 
@@ -20,20 +21,28 @@ _MOST_LETTERS = 80
 class Vocabulary:
     """Names of things, places and people as they are spoken, the most usual last, and the robot's own name.
 
-    Without `robot_name` nobody need call the robot.
+    Without `robot_name` nobody need call the robot; `other_robots` are more that may be called.
     """
 
     names: tuple[str, ...] = ()
     robot_name: str | None = None
+    other_robots: tuple[str, ...] = ()
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """All robots that may be called."""
+        return () if self.robot_name is None else (self.robot_name, *self.other_robots)
 
     @property
     def prompt(self) -> str:
         """What the recogniser is told was said before: the names, and the turns in which people ask."""
-        call = ("Hey {0}, could", "Hi {0}, would", "OK {0}, take", "{0}, please") if self.robot_name else _UNCALLED
+        call: tuple[str, ...] = _UNCALLED
+        if self.robots:
+            call = tuple(form.format(name) for form, name in zip(_CALLED, cycle(self.robots), strict=False))
         turns = (
             f"{call[0]} you bring me two? {call[1]} you go there. {call[2]} it back. "
             f"{call[3]} pick it up, move it and put it there."
-        ).format(self.robot_name)
+        )
         return f"{', '.join(_longest(self.names))}. {turns}" if self.names else turns
 
 
@@ -72,4 +81,5 @@ def read_vocabulary(file: Path, robot_name: str | None) -> Vocabulary:
     return Vocabulary((*names, *([robot_name] if robot_name else [])), robot_name)
 
 
+_CALLED: Final = ("Hey {}, could", "Hi {}, would", "OK {}, take", "{}, please")
 _UNCALLED: Final = ("Could", "Would", "Take", "Please")

@@ -10,7 +10,7 @@ from typing import Final
 
 from executive.mission.errors import InputError, disk_is_full
 
-VERSION: Final = 8
+VERSION: Final = 9
 APPLICATION_ID: Final = 0x45525244  # "ERRD"
 BUSY_S: Final = 2.0
 _DAMAGED: Final = "move it away (its missions are lost), or name another by --store"
@@ -100,8 +100,18 @@ _CHAINS: Final = """
 ALTER TABLE given ADD COLUMN part_of INTEGER;
 ALTER TABLE given ADD COLUMN follows INTEGER;
 """
+_ROBOTS: Final = """
+ALTER TABLE mission ADD COLUMN robots TEXT;
+CREATE TABLE part (
+    mission INTEGER NOT NULL REFERENCES mission (id) ON DELETE CASCADE,
+    robot TEXT NOT NULL,
+    pose TEXT,
+    instead TEXT,
+    PRIMARY KEY (mission, robot)
+);
+"""
 _OLDEST: Final = 4
-_ADDED: Final = {5: _TRIGGERS + _SCENARIOS_AND_TIMES, 6: _VARIATIONS, 7: _FLEET, 8: _CHAINS}
+_ADDED: Final = {5: _TRIGGERS + _SCENARIOS_AND_TIMES, 6: _VARIATIONS, 7: _FLEET, 8: _CHAINS, 9: _ROBOTS}
 """What each version has added to the one before; `_OLDEST` is `_SCHEMA`."""
 
 

@@ -12,9 +12,10 @@ from executive.mission.request import Request
 from executive.run.journal import TickNote
 from executive.store.database import transaction
 from executive.store.recollection import Recollection
-from executive.store.records import row_of
+from executive.store.records import pose_text, row_of
 from executive.store.values import to_text
 from executive.tree.compiler import CompiledTree
+from executive.tree.compiling.builder import slug
 from executive.tree.snapshot import Change
 from skills.geometry import wrap
 from skills.robot import Pose2D
@@ -26,6 +27,13 @@ _PUT_VALUE: Final = "INSERT OR REPLACE INTO value VALUES (?, ?, ?)"
 _PUT_CHARGE: Final = """
 INSERT INTO battery (mission, lowest, last) VALUES (?, ?, ?)
 ON CONFLICT (mission) DO UPDATE SET lowest = min(lowest, excluded.lowest), last = excluded.last, ended = NULL
+"""
+_PUT_POSE: Final = """
+INSERT INTO part (mission, robot, pose) VALUES (?, ?, ?) ON CONFLICT (mission, robot) DO UPDATE SET pose = excluded.pose
+"""
+_PUT_INSTEAD: Final = """
+INSERT INTO part (mission, robot, instead) VALUES (?, ?, ?)
+ON CONFLICT (mission, robot) DO UPDATE SET instead = excluded.instead
 """
 _REPLACED: Final = ("name", "commands", "fingerprint", "sentence", "file", "text")
 _REPLACE: Final = f"UPDATE mission SET {', '.join(f'{name} = :{name}' for name in _REPLACED)} WHERE id = :id"
@@ -39,8 +47,11 @@ class StoreJournal:
     `keep_world` is called before what a tick brought is written, for a simulated world must not lag behind it.
     """
 
-    def __init__(self, connection: sqlite3.Connection, mission: int) -> None:
-        self._connection, self._mission = connection, mission
+    def __init__(
+        self, connection: sqlite3.Connection, mission: int, robot: str | None = None, *, charges: bool = True
+    ) -> None:
+        """`robot` is the one of several whose part it keeps; `charges` tells whether its battery's is noted, too."""
+        self._connection, self._mission, self._robot, self._counts = connection, mission, robot, charges
         self._written: dict[str, Any] = {}
         self._steps: dict[str, tuple[object, ...]] = {}
         self._values: dict[str, str] = {}
@@ -59,17 +70,22 @@ class StoreJournal:
 
     def replaced(self, tree: CompiledTree) -> StoreJournal:
         """Keep the mission that takes this one's place in its stead, with nothing done of it yet."""
-        journal = StoreJournal(self._connection, self._mission)
+        journal = StoreJournal(self._connection, self._mission, self._robot, charges=self._counts)
         journal.troubles, journal.keep_world = self.troubles, self.keep_world
         if self._request_of is None:
             return journal
-        row = {**row_of(self._request_of(tree)), "id": self._mission}
+        request = self._request_of(tree)
         journal.replaceable(self._request_of)
         try:
             with transaction(self._connection):
-                for table in ("step", "value"):
-                    self._connection.execute(f"DELETE FROM {table} WHERE mission = ?", (self._mission,))
-                self._connection.execute(_REPLACE, row)
+                for table, key in (("step", "path_id"), ("value", "key")):
+                    delete = f"DELETE FROM {table} WHERE mission = ? AND {of_robot(key)}"
+                    self._connection.execute(delete, (self._mission, *prefix_of(self._robot)))
+                if self._robot is None:
+                    self._connection.execute(_REPLACE, {**row_of(request), "id": self._mission})
+                else:
+                    instead = json.dumps((request.name, request.commands, request.fingerprint))
+                    self._connection.execute(_PUT_INSTEAD, (self._mission, self._robot, instead))
         except sqlite3.Error as error:
             self._trouble(f"the mission that took this one's place could not be kept ({error})")
         return journal
@@ -117,12 +133,12 @@ class StoreJournal:
                 self._trouble(f"'{key}': {error}")
 
     def _take_charge(self, charge: float | None) -> None:
-        if charge is not None:
+        if charge is not None and self._counts:
             self._charges = (charge if self._charges is None else min(self._charges[0], charge), charge)
 
     def _write(self, note: TickNote) -> None:
         pose = note.pose or self._pose
-        text = None if pose is None else json.dumps((pose.x_m, pose.y_m, pose.yaw_rad))
+        text = None if pose is None else pose_text(pose)
         dropped = () if self._recollection is None else tuple(self._recollection.dropped)
         try:
             with transaction(self._connection):
@@ -131,10 +147,13 @@ class StoreJournal:
                 run(_PUT_STEP, self._steps.values())
                 run(_PUT_VALUE, [(self._mission, key, value) for key, value in self._values.items()])
                 run(_PUT_CHARGE, [] if self._charges is None else [(self._mission, *self._charges)])
+                own = text if self._robot is None else None
                 self._connection.execute(
                     "UPDATE mission SET clock_s = ?, pose = coalesce(?, pose) WHERE id = ?",
-                    (note.now_s, text, self._mission),
+                    (note.now_s, own, self._mission),
                 )
+                if self._robot is not None and text is not None:
+                    self._connection.execute(_PUT_POSE, (self._mission, self._robot, text))
         except sqlite3.Error as error:
             self._trouble(f"the store could not be written ({error})")
             return
@@ -145,6 +164,17 @@ class StoreJournal:
     def _trouble(self, sentence: str) -> None:
         if sentence not in self.troubles:
             self.troubles.append(sentence)
+
+
+def of_robot(column: str) -> str:
+    """The SQL condition that a path id or a blackboard key is that of a robot; its values are `prefix_of` the robot."""
+    return f"substr({column}, 1, length(?)) = ?"
+
+
+def prefix_of(robot: str | None) -> tuple[str, str]:
+    """How a robot's path ids and blackboard keys begin, twice; those of any robot for None."""
+    prefix = "" if robot is None else f"{slug(robot)}/"
+    return prefix, prefix
 
 
 def _no_world() -> None:

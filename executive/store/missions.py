@@ -20,8 +20,16 @@ from py_trees.common import Status
 from executive.mission.errors import InputError, listing
 from executive.mission.request import Request
 from executive.store.database import connect, told, transaction
-from executive.store.journal import StoreJournal
-from executive.store.records import Memory, StepRecord, request_of, row_of
+from executive.store.journal import StoreJournal, of_robot, prefix_of
+from executive.store.records import (
+    Memory,
+    Replacement,
+    StepRecord,
+    pose_of_text,
+    pose_text,
+    request_of,
+    row_of,
+)
 from executive.store.values import from_text
 from skills.api import Cause
 from skills.robot import Pose2D
@@ -128,23 +136,46 @@ class MissionStore:
         """Whether anything was done of a mission."""
         return bool(self.rows("SELECT 1 FROM step WHERE mission = ? LIMIT 1", number))
 
-    def memory(self, number: int) -> Memory:
+    def memory(self, number: int, robot: str | None = None) -> Memory:
         """All that is known of how far a mission has come, once the skills are loaded that it was done with.
 
-        Raises InputError: it cannot be read.
+        `robot` is the one of several whose part is meant. Raises InputError: it cannot be read.
         """
-        steps = self.rows("SELECT * FROM step WHERE mission = ?", number)
-        values = self.rows("SELECT key, text FROM value WHERE mission = ?", number)
+        own = prefix_of(robot)
+        steps = self.rows(f"SELECT * FROM step WHERE mission = ? AND {of_robot('path_id')}", number, *own)
+        values = self.rows(f"SELECT key, text FROM value WHERE mission = ? AND {of_robot('key')}", number, *own)
         try:
             board = {row["key"]: from_text(row["text"]) for row in values}
-            return Memory({row["path_id"]: _step(row) for row in steps}, board, self.mission(number).pose)
+            pose = self.mission(number).pose if robot is None else self.poses(number).get(robot)
+            return Memory({row["path_id"]: _step(row) for row in steps}, board, pose)
         except ValueError as error:
             hint = f"`errand queue remove {number}`, and give the mission again"
             raise InputError(f"mission {number} cannot be taken up: {error}", hint=hint, file=self.path) from error
 
-    def journal(self, number: int) -> StoreJournal:
-        """Keeps notes of a mission's run."""
-        return StoreJournal(self._connection, number)
+    def journal(self, number: int, robot: str | None = None) -> StoreJournal:
+        """Keeps notes of a mission's run; `robot` is the one of several whose part it keeps.
+
+        Of several batteries, that of the robot that stands for all is noted.
+        """
+        charges = robot is None or robot == self.mission(number).request.robot
+        return StoreJournal(self._connection, number, robot, charges=charges)
+
+    def poses(self, number: int) -> Mapping[str, Pose2D]:
+        """Where each of several robots was last in a mission's world, by its name (world frame)."""
+        rows = self.rows("SELECT robot, pose FROM part WHERE mission = ? AND pose IS NOT NULL", number)
+        return {row["robot"]: Pose2D(*json.loads(row["pose"])) for row in rows}
+
+    def place(self, number: int, poses: Mapping[str, Pose2D]) -> None:
+        """Note where several robots are when a mission begins; of a robot that was noted already, that stays."""
+        with self.writing() as connection:
+            put = "INSERT OR IGNORE INTO part (mission, robot, pose) VALUES (?, ?, ?)"
+            connection.executemany(put, [(number, robot, pose_text(pose)) for robot, pose in poses.items()])
+
+    def replacements(self, number: int) -> Mapping[str, Replacement]:
+        """What some of several robots do in place of their parts, by a correction."""
+        rows = self.rows("SELECT robot, instead FROM part WHERE mission = ? AND instead IS NOT NULL", number)
+        told = {row["robot"]: json.loads(row["instead"]) for row in rows}
+        return {robot: Replacement(name, tuple(commands), print_) for robot, (name, commands, print_) in told.items()}
 
     @contextmanager
     def claimed(self) -> Iterator[None]:
@@ -203,7 +234,7 @@ def _mission(row: sqlite3.Row) -> StoredMission:
         starts=row["starts"],
         message=row["message"],
         clock_s=row["clock_s"],
-        pose=None if row["pose"] is None else Pose2D(*json.loads(row["pose"])),
+        pose=pose_of_text(row["pose"]),
         standing=row["standing"],
         why=row["why"] or "",
     )

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
@@ -20,6 +21,7 @@ from py_trees.decorators import Decorator
 from executive.run.findings import finding_keys
 from executive.store.recollection import Recollection
 from executive.store.records import Memory, StepRecord
+from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decorators import Guard
 from executive.tree.behaviours.explained import Explained
@@ -72,6 +74,36 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(CompiledTree)}
     board = {**memory.board, finding_keys(tree.robot_name, tree.mission_name).again: _answered(tree, memory)}
     return ResumedTree(**{**own, "root": root}, board=board, changes=change.made), recollection
+
+
+def ended_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recollection] | None:
+    """The tree of a mission that had come to its end, while other robots went on; None where it had not.
+
+    Its nodes say what they said, its root does so in its first tick, and nothing more is done: what it brought about
+    may be gone by now, since another robot took it. One that ended with a defect had not come to its end.
+    """
+    ended = memory.steps.get(tree.root.path_id)
+    if ended is None or not ended.ended or ended.cause is Cause.ERROR:
+        return None
+    changes: dict[str, Callable[[Any], object]] = {
+        path: partial(_say_as_before, step=step, board=memory.board)
+        for path, step in memory.steps.items()
+        if step.ended
+    }
+    changes[tree.root.path_id] = lambda node: _AsBefore(node, ended)
+    recollection = Recollection(tree.path_ids, {})
+    recollection.told.append(f"{tree.root.path_id}: {ended.status.value.lower()} {BEFORE}: {ended.message}")
+    own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(CompiledTree)}
+    return ResumedTree(**own, board=memory.board, changes=changes), recollection
+
+
+def _say_as_before(node: Behaviour, *, step: StepRecord, board: Mapping[str, Any]) -> None:
+    """Let a node say what it said before the restart."""
+    node.status = step.status
+    if isinstance(node, Explained):
+        node.cause, node.message = step.cause, step.message
+    if isinstance(node, Answer):
+        node.answer = board.get(node.key)
 
 
 def _answered(tree: CompiledTree, memory: Memory) -> frozenset[str]:

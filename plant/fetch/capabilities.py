@@ -49,6 +49,7 @@ def fetch_capabilities() -> Capabilities:
             carry_x_m=tuple(arm_room["carry_x"]),
             carry_z_m=tuple(arm_room["carry_z"]),
             carry_best_x_m=arm_room["carry_best_x"],
+            tuck_x_m=tuple(arm_room["tuck_x"]),
         ),
         gripper=_gripper(),
         cameras=(CameraCapabilities(HEAD_CAMERA, head_camera().X_link_camera(), Mount.HEAD),),

@@ -113,6 +113,28 @@ def carry_configuration(
     raise PlanningError("no pose to carry the thing near the body is free of contact")
 
 
+def tucked_configuration(
+    scene: ArmScene, arm: ArmCapabilities, R_BH: RotationMatrix, q_near_rad: FloatArray
+) -> FloatArray:
+    """Arm angles with the hand close to the body and turned to either side, the thing as upright as in R_BH.
+
+    Raises PlanningError when no such pose is free.
+    """
+    x_axis = R_BH.matrix()[:, 0]
+    ahead = -float(np.arctan2(x_axis[1], x_axis[0]))
+    rotations = [RotationMatrix.MakeZRotation(ahead + turn) @ R_BH for turn in (0.5 * np.pi, -0.5 * np.pi)]
+    candidates = [
+        (_carry_cost(x - arm.tuck_x_m[0], z, q, q_near_rad), q)
+        for rotation, x, z in itertools.product(rotations, arm.tuck_x_m, arm.carry_z_m)
+        for solution in scene.model.inverse(RigidTransform(rotation, [x, 0.0, z]), margin_rad=0.05)
+        for q in [scene.model.turned_near(solution, q_near_rad)]
+    ]
+    for _, q in sorted(candidates, key=lambda candidate: candidate[0]):
+        if scene.free(q) and scene.free_as_usual(q):
+            return q
+    raise PlanningError("the thing cannot be drawn in to the body")
+
+
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
 
 

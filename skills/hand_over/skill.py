@@ -37,6 +37,10 @@ _FREE_S = 2.0
 _LETS_GO, _KEEPS = "let go", "hold on"
 _POINTS_DOWN = 0.8
 _LOOKS = 3
+_BORNE_M, _DEEP_M, _OVER_M = 0.42, 0.12, 0.005
+"""How far hands or a tray that bear what was let go of may reach: wide, below its lowest point and over that (m)."""
+_OWN_M, _OVER_TOP_M = 0.14, 0.03
+"""The object's own space, as it may have turned: wide, and over its highest point (m)."""
 
 
 @dataclass(frozen=True)
@@ -164,11 +168,29 @@ class HandOver(ArmSkill[HandOverInputs]):
                 raise SkillFailure(Cause.POSTCONDITION, f"the {inputs.thing} is still in the open gripper")
             yield Running(message)
         yield from self.pause(_STILL_S, message)
-        yield from self.leave_object()
-        yield from self.try_stow()
         camera = self.context.robot.capabilities().object_camera
-        if camera is not None and not camera.on_hand:
-            yield from self._check_given(inputs, release_from(self.checkpoint["release"]))
+        if camera is None or camera.on_hand:
+            yield from self.leave_object()
+            yield from self.try_stow()
+            return
+        release = release_from(self.checkpoint["release"])
+        yield from self.leave_object()
+        yield from self._stow_beside(release, message)
+        yield from self._check_given(inputs, release)
+
+    def _stow_beside(self, release: Release, message: str) -> Routine[None]:
+        """Stow the arm around the hands, or the tray, that bear the object now; where there is no such way, by any."""
+        boxes, X_BW = self.boxes, self.X_WB().inverse()
+        borne = (_BORNE_M, release.low_m - _DEEP_M, release.low_m + _OVER_M)
+        for side_m, low_m, high_m in (borne, (_OWN_M, release.low_m, release.top_m + _OVER_TOP_M)):
+            X_WG = RigidTransform([release.x_m, release.y_m, 0.5 * (low_m + high_m)])
+            self.boxes = [*self.boxes, Box(X_BW @ X_WG, (side_m, side_m, high_m - low_m))]
+        try:
+            yield from self.stow(message)
+        except SkillFailure:
+            self.boxes = boxes
+            yield from self.try_stow()
+        self.boxes = boxes
 
     def _check_given(self, inputs: HandOverInputs, release: Release) -> Routine[None]:
         """Raise SkillFailure with cause POSTCONDITION unless the object is seen with the person."""

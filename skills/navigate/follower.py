@@ -134,10 +134,10 @@ class PathFollower:
         lead = max(speed * options.lead_s, 0.01)
         target, after = self._at(along), self._at(along + lead)
         forward = (after - target) / lead * speed
+        if self.length_m - along < 0.02:
+            target, forward = self._path.poses[-1], np.zeros(3)
         error = target - here
         error[2] = wrap(error[2])
-        if self.length_m - along < 0.02:
-            forward = np.zeros(3)
         if not self._sideways:
             return tracking_velocity(here, float(target[2]), forward, error, options.gain)
         world = forward + options.gain * error

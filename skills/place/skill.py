@@ -16,7 +16,7 @@ from skills.approach.standing import free_places, reachable
 from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel
-from skills.arm.poses import carry_configuration, overview_viewpoints
+from skills.arm.poses import carry_configuration, overview_viewpoints, tucked_configuration
 from skills.arm.routine import Routine, SkillFailure
 from skills.arm.solid_cells import CELL_M
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
@@ -49,6 +49,7 @@ _RELAX_M = 0.003
 _FEEL_S = 0.4
 _FLOOR_M = 0.06
 _STANDS_OUT_M, _HIGHEST_M, _OFF_SURFACE_M = 0.03, 0.5, 0.01
+_BESIDE, _TUCKED_M = 0.6, 0.03
 _AT_HAND_M, _HIDDEN = 0.4, 0.5
 """A picture of which half is nearer than that, or too near to tell, shows what is held and not what lies behind it."""
 _OVER_SPOT_M = 0.45
@@ -167,7 +168,9 @@ class Place(ArmSkill[PlaceInputs]):
         heights_m, standing = self._heights_m(surface), f"standing up to the {surface.name}"
         while True:
             yield from self.stand_at(heights_m[0], standing)
-            on_floor, standing_W = surface.height_m < _FLOOR_M, self._standing_W(surface)
+            yield from self._hold_ahead(surface, carried)
+            on_floor = surface.height_m < _FLOOR_M and self.object_camera.on_hand
+            standing_W = self._standing_W(surface)
             view = yield from self._look_at_floor(surface) if on_floor else self._look(surface, spot_W)
             if view is None or (on_floor and len(free_spots(view, self._spots(surface))) == 0):
                 view = unseen_view(surface, standing_W)
@@ -180,10 +183,11 @@ class Place(ArmSkill[PlaceInputs]):
                     raise
             gone_to.append(spot_W)
             spot_W = others[0]
-            message = "carrying the object on along the surface"
-            yield from self.move_to(
-                lambda scene, q: carry_configuration(scene, arm, carried, q), message, speed_rad_s=0.9
-            )
+            if not (yield from self._draw_in(held)):
+                message = "carrying the object on along the surface"
+                yield from self.move_to(
+                    lambda scene, q: carry_configuration(scene, arm, carried, q), message, speed_rad_s=0.9
+                )
             yield from self._stand_as_usual()
             yield from self._go_before(spot_W, surface, held)
 
@@ -233,6 +237,7 @@ class Place(ArmSkill[PlaceInputs]):
 
     def _go_before(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Routine[None]:
         """Drive to where a spot is within the arm's reach, or as near as may be."""
+        yield from self._draw_in(held)
         context, pose, point_W = self.context, self.context.pose(), (float(spot[0]), float(spot[1]))
         footprint, reach_cost = ArmFootprint(context).now(), self._reach_cost(spot, surface, held)
         distances, best_m = (self.arm.standing_m, self.arm.nearer_m), self.arm.standing_m[0]
@@ -246,6 +251,38 @@ class Place(ArmSkill[PlaceInputs]):
         if not places:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {surface.name}")
         yield from self.perform(Navigate(context), NavigateInputs(places[0].pose, 0.08, 0.1, 0.5))
+
+    def _tucked(self) -> bool:
+        """Whether the hand is drawn in to the body."""
+        X_BH, tuck_x_m = self.model.X_BH(self.q_rad()), self.arm.tuck_x_m
+        beside = abs(float(X_BH.rotation().matrix()[1, 0])) > _BESIDE
+        return bool(tuck_x_m) and beside and float(X_BH.translation()[0]) < max(tuck_x_m) + _TUCKED_M
+
+    def _draw_in(self, held: HeldObject) -> Routine[bool]:
+        """Draw in what sticks out over the surface while the robot drives up to it; whether the arm can."""
+        arm, R_BH = self.arm, self.model.X_BH(self.q_rad()).rotation()
+        if not arm.tuck_x_m or self._tucked():
+            return bool(arm.tuck_x_m)
+        self.held = [held.box_H]
+        try:
+            yield from self.move_to(
+                lambda scene, q: tucked_configuration(scene, arm, R_BH, q), "drawing the object in", speed_rad_s=0.9
+            )
+        except SkillFailure as failure:
+            if failure.cause is not Cause.PLANNING:
+                raise
+            return False
+        finally:
+            self.held = ()
+        return True
+
+    def _hold_ahead(self, surface: Surface, carried: RotationMatrix) -> Routine[None]:
+        """Take what was drawn in out of the view of a camera on the head."""
+        if not self._tucked():
+            return
+        arm, self.boxes = self.arm, surface_boxes([surface], self.X_WB())
+        message = f"holding the object before the {surface.name}"
+        yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, carried, q), message, speed_rad_s=0.9)
 
     def _reach_cost(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Callable[[Pose2D], float | None]:
         """How awkwardly the arm puts the object down on a spot from a pose of the body; None where it does not."""
@@ -284,7 +321,7 @@ class Place(ArmSkill[PlaceInputs]):
         return None if view is None or (hidden and len(free_spots(view, self._spots(surface))) == 0) else view
 
     def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView | None]:
-        """What the cameras at the body's front see of the floor: the object hides it from the hand camera."""
+        """What the cameras at the body's front see of the floor: the object hides it from one on the hand."""
         message, robot = f"looking for a free spot on the {surface.name}", self.context.robot
         X_WO, views = self.context.localiser.estimate().X_WO, list[SurfaceView]()
         for camera in robot.capabilities().body_cameras:
@@ -391,6 +428,12 @@ class HeldObject:
     def p_HO(self) -> FloatArray:
         """The object's middle in the hand frame (3,), m."""
         return np.asarray(0.5 * (self.corners_H.min(axis=0) + self.corners_H.max(axis=0)))
+
+    @property
+    def box_H(self) -> Box:
+        """The box about it in the hand frame."""
+        x, y, z = np.maximum(self.corners_H.max(axis=0) - self.corners_H.min(axis=0), 0.01)
+        return Box(RigidTransform(self.p_HO), (float(x), float(y), float(z)))
 
     def box(self, X_BH: RigidTransform) -> Box:
         """The upright box about it where the hand holds it at X_BH (B), a little lifted off what it stands on."""

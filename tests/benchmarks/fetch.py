@@ -4,14 +4,15 @@
 
 The number of a mission is the seed of its world and draws what is brought, and where to: half the missions end with a
 person. A line a mission goes to stderr as it ends. Reported are how many missions were fulfilled by the referee with
-Wilson's interval of 95 %, false claims (the robot says that it is done, the referee denies it), contacts, and what the
-others failed of.
+Wilson's interval of 95 %, false claims (the robot says that it is done, the referee denies it), contacts with what was
+touched, and what the others failed of.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -108,6 +109,11 @@ def run_mission(number: int, sentence: str, out: Path) -> Result:
     )
 
 
+def touched(events: Sequence[str]) -> list[str]:
+    """What the robot touched in each of its contacts: a hand that takes what lies feels for the surface below it."""
+    return [found[1] for event in events if (found := re.search(r" hit (?:the )?(.+) at [\d.]+ s", event))]
+
+
 def summary(results: Sequence[Result]) -> dict[str, object]:
     """The figures of some missions."""
     fulfilled = Rate(sum(each.fulfilled for each in results), len(results))
@@ -119,7 +125,7 @@ def summary(results: Sequence[Result]) -> dict[str, object]:
         "interval": [round(low, 3), round(high, 3)],
         "false_claims": sum(each.false_claim for each in results),
         "contacts": sum(each.contacts for each in results),
-        "with_contacts": sum(each.contacts > 0 for each in results),
+        "touched": dict(Counter(what for each in results for what in touched(each.events)).most_common()),
         "drops": sum(each.drops for each in results),
         "causes": dict(Counter(each.cause or "false claim" for each in failed).most_common()),
         "failed": [[each.number, each.sentence, each.message, each.why] for each in failed],

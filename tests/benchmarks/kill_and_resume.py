@@ -1,7 +1,8 @@
 """Kills a mission at random moments of its robot's clock and takes it up; counts how often that ends right.
 
 Run it by hand, it takes a while: `python tests/benchmarks/kill_and_resume.py --moments 30`. The moments come from a
-seed; the process that runs the mission is killed with SIGKILL when its plant has come to the moment.
+seed; the process that runs the mission is killed with SIGKILL when its plant has come to the moment. With `--two` two
+robots have a part each, the second of which comes after the first.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ from plant.snapshot.file import SnapshotError, read_snapshot
 FETCH = ("Hey Alice, can you fetch me a drink from the kitchen", 50.0)
 TIDY = ("Hey Alice, take a drink from the kitchen to the sideboard", 60.0)
 MISSIONS = (FETCH, TIDY)
+TWO = ("Alice, take a drink from the kitchen to the sideboard, then let Bob bring it to the coffee table", 110.0)
+ROBOTS = "alice=spot,bob=fetch"
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class Trial:
     message: str
 
 
-def trial(number: int, sentence: str, moment_s: float, seed: int, out: Path) -> Trial:
+def trial(number: int, sentence: str, moment_s: float, seed: int, out: Path, robots: str | None = None) -> Trial:
     """Run, kill, resume; a mission that has ended before the moment is killed at an earlier one.
 
     Raises FileExistsError when `out` is there already, since what lies in it would be taken for this run's.
@@ -52,18 +55,21 @@ def trial(number: int, sentence: str, moment_s: float, seed: int, out: Path) -> 
     begun = time.perf_counter()
     command = [sys.executable, "-m", "executive.cli"]
     asked = ["run", "--say", sentence, "--seed", str(seed), "--out", str(out), "--no-record", "--quiet", "--json"]
+    asked += [] if robots is None else ["--robots", robots]
     with (out / "first.txt").open("wb") as told:
         process = subprocess.Popen([*command, *asked], stdout=told, stderr=subprocess.STDOUT)
         killed = _kill_at(process, out / "missions.plant", moment_s)
     if not killed:
-        return trial(number, sentence, 0.7 * moment_s, seed, out / "earlier")
+        return trial(number, sentence, 0.7 * moment_s, seed, out / "earlier", robots)
     again = [*command, "resume", "--store", str(out / "missions.sqlite"), "--quiet", "--json"]
     ended = subprocess.run(again, capture_output=True, text=True, check=False)
     text = ended.stdout + ended.stderr
     (out / "second.txt").write_text(text)
     report = _report(text)
     lifts = sum(" lifted the " in line and line.startswith("  ") for line in text.splitlines())
-    right = report.get("outcome") == "success" and bool(report["referee"]["success"]) and lifts == 1
+    every = list(report.get("robots", {}).values()) or [report]
+    right = all(each.get("outcome") == "success" and each["referee"]["success"] for each in every)
+    right = right and lifts == (1 if robots is None else 2)
     message = f"{report.get('message', 'no report')} / {report.get('referee', {}).get('why', '')}"
     wall_s = time.perf_counter() - begun
     return Trial(number, sentence, moment_s, seed, right and not _done_twice(out), lifts, wall_s, message)
@@ -91,13 +97,13 @@ def _report(text: str) -> dict[str, Any]:
 
 def _done_twice(out: Path) -> bool:
     """Whether both logs tell that one leaf which changes the world did its work to the end."""
-    done: list[str] = []
+    done: list[tuple[str, str]] = []
     for log in sorted(out.glob("log*.mcap")):
         for event in read_events(log):
             told = event.data
             work = event.topic == "transitions" and told["to"] == "SUCCESS" and not told_before(told["message"])
             if work and told["node"].rsplit("/", 1)[-1] in ("grasp", "place"):
-                done.append(told["node"].rsplit("/", 1)[-1])
+                done.append((told["robot"], told["node"].rsplit("/", 1)[-1]))
     return len(done) > len(set(done))
 
 
@@ -107,17 +113,18 @@ def main() -> None:
     parser.add_argument("--moments", type=int, default=30)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=1)
+    parser.add_argument("--two", action="store_true", help="two robots, with a part each")
     parser.add_argument("--out", type=Path, default=None)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
     folder = options.out or Path(tempfile.mkdtemp(prefix="errand-kills-"))
     right = 0
     for number in range(1, options.moments + 1):
-        sentence, length_s = MISSIONS[number % len(MISSIONS)]
+        sentence, length_s = TWO if options.two else MISSIONS[number % len(MISSIONS)]
         moment_s = float(rng.uniform(0.2, length_s))
         if number < options.first:
             continue
-        done = trial(number, sentence, moment_s, number, folder / f"{number:02d}")
+        done = trial(number, sentence, moment_s, number, folder / f"{number:02d}", ROBOTS if options.two else None)
         right += done.right
         verdict = "right" if done.right else "WRONG"
         line = f"{number:3d}  killed at {done.moment_s:5.1f} s  {verdict}  {done.lifts} lifts  {done.wall_s:5.1f} s"

@@ -3,10 +3,10 @@
     python -m tests.benchmarks.traffic [--what door,missions] [--first 0] [--count 5] [--out FOLDER]
 
 `door`: the two meet at a door or passage that one fits through, each on its way to the place where the other begins;
-world, door, kinds of robots, starts and delays are drawn from the case's number. `missions`: each has a mission of its
-own. Reported are how many runs ended with both fulfilled (`resolved`: by the tree, and not denied by the referee),
-contacts between the two and all collisions by the referee, and deadlocks: runs that stood still for 60 s, or ran out of
-time.
+world, door, kinds of robots, starts and delays are drawn from the case's number, and nobody else is about. `missions`:
+each has a mission of its own. Reported are how many runs ended with both fulfilled (`resolved`: by the tree, and not
+denied by the referee), contacts between the two and all collisions by the referee, and deadlocks: runs that stood
+still for 60 s, or ran out of time.
 """
 
 from __future__ import annotations
@@ -89,7 +89,8 @@ def run_case(what: str, number: int, out: Path) -> Result:
     )
     request.out.mkdir(parents=True, exist_ok=True)
     prepared = prepare_several(request, ask=None)
-    backend = SimulatedBackend(prepared.world, prepared.robots, seed=number, record=False)
+    here = prepared.world if what == "missions" else prepared.world.without_people()
+    backend = SimulatedBackend(here, prepared.robots, seed=number, record=False)
     standing = Standing()
     report = run_request(prepared, backend, observer=standing).report
     seen = [each.referee for each in report.robots.values() if each.referee is not None]

@@ -62,6 +62,7 @@ class Trip:
     attempts: int = 0
     ended: Step | None = None
     aside: SteppingAside | None = None
+    last: Step | None = None
 
     def step(self, table: TrafficTable) -> None:
         """One tick; before and after its trip a robot steps aside where it is asked to."""
@@ -77,7 +78,7 @@ class Trip:
         if self.skill is None:
             self.skill, self.attempts = Navigate(self.context), self.attempts + 1
             self.skill.begin(NavigateInputs(self.goal))
-        step = self.skill.step()
+        step = self.last = self.skill.step()
         if isinstance(step, Succeeded | Failed):
             self.skill.end()
             self.skill = None

@@ -13,6 +13,7 @@ from executive.cli.entry import app
 from executive.cli.listen_command import answer_line, hear_request, show_hearing
 from executive.language import Status, Understanding
 from executive.mission.errors import InputError
+from executive.mission.robots import RobotSetup
 from executive.speech.microphone import follow
 
 GO = "Hey Alice, go to the kitchen."
@@ -73,6 +74,60 @@ def test_open_words_stay_as_spoken_and_are_matched_to_the_vocabulary(says, wav, 
     (told,) = _lines(_listen(wav, "--jsonl", "--open", "--no-wake", "--vocabulary", names))
     assert told["commands"][-1]["item"] == "big dish"
     assert told["commands"][-1]["goal"] == "washing machine"
+
+
+# What is heard; what each robot is to do there.
+CALLED = [
+    ("Hey Bob, go to the kitchen.", {"Bob": "kitchen"}),
+    ("Hey Bop, go to the kitchen.", {"Bob": "kitchen"}),
+    ("Hey everyone, go to the kitchen.", {"all": "kitchen"}),
+    ("Alice, go to the kitchen, and Bob, go to the office.", {"Alice": "kitchen", "Bob": "office"}),
+]
+
+
+@pytest.mark.parametrize(("heard", "goals"), CALLED)
+def test_any_of_several_robots_may_be_called(says, wav, heard, goals):
+    says(heard)
+    (told,) = _lines(_listen(wav, "--jsonl", "--robots", "alice=spot,bob=fetch"))
+    assert (told["status"], told["addressed"]) == ("ok", True), told["reason"]
+    found = {part["robot"]: part["meaning"]["commands"][0]["goal"] for part in told["parts"]}
+    assert found == goals
+
+
+def test_who_of_several_robots_does_what_is_shown(says, wav):
+    says("Hey Bob, go to the kitchen.")
+    assert f"  Bob: {KITCHEN}" in _listen(wav, "--robots", "alice=spot,bob=fetch").stdout.splitlines()
+
+
+def test_a_call_to_a_robot_that_is_not_there_is_to_none_of_them(says, wav):
+    says("Hey Carl, go to the kitchen.")
+    (told,) = _lines(_listen(wav, "--jsonl", "--robots", "alice=spot,bob=fetch"))
+    assert (told["status"], told["commands"], "Carl" in told["reason"]) == ("not_addressed", [], True)
+
+
+# Options, and what the refusal says.
+NOT_BY_VOICE = [
+    (("--robots", "alice=spot,alyce=fetch"), "Alice and Alyce sound alike"),
+    (("--robots", "alice=spot,bob2=fetch"), "'Bob2' cannot be called by voice"),
+    (("--robots", "alice=spot,bob=fetch", "--robot", "Eve"), "--robots stands without --robot"),
+    (("--robots", "alice=spot,bob=fetch", "--open"), "--robots stands without --robot and --open"),
+]
+
+
+@pytest.mark.parametrize(("options", "words"), NOT_BY_VOICE)
+def test_robots_that_cannot_be_called_by_voice_are_refused(says, wav, options, words):
+    says(GO)
+    result = _listen(wav, *options)
+    assert (result.exit_code, words in result.stderr) == (2, True), result.output
+
+
+def test_a_run_with_several_robots_hears_the_one_that_is_called(says, wav):
+    says("Hey Bob, go to the kitchen.")
+    robots = {"alice": RobotSetup("spot"), "bob": RobotSetup("fetch")}
+    console = Console(file=io.StringIO())
+    assert hear_request(wav, None, world=None, require_wake=True, console=console, robots=robots) == (
+        "Hey Bob, go to the kitchen."
+    )
 
 
 def test_the_robot_may_have_another_name(says, wav):

@@ -24,6 +24,7 @@ from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
 from executive.tree.registry import installed_skills
 from executive.tree.snapshot import Change, NodeState
+from skills.robot import Pose2D
 
 
 class GoneError(BaseException):
@@ -36,6 +37,7 @@ class Plant:
     def __init__(self):
         self.runs = []
         self.stacks = []
+        self.commands = []
         self.outcomes = []
 
     def __call__(self, prepared, *, durable, **_):
@@ -44,13 +46,28 @@ class Plant:
         durable.plant.with_name(f"{durable.plant.name}.a").touch()
         self.runs.append((prepared.mission.name, prepared.request.seed, out.name, durable))
         self.stacks.append(prepared.request.stack)
-        leaf = next(node.path_id for node in tree.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id)
-        done = Change(leaf, NodeState(), NodeState(Status.SUCCESS, None, "done"))
-        durable.journal.note(TickNote(1.0, (done,), {}, None, {}))
+        self.commands.append([list(map(str, each.tree.commands)) for each in prepared.all])
+        for number, each in enumerate(prepared.all):
+            done = Change(first_leaf(each.tree), NodeState(), NodeState(Status.SUCCESS, None, "done"))
+            pose = Pose2D(float(number), 0.5, 0.0) if prepared.robots else None
+            durable.journals[each.mission.robot_name].note(TickNote(1.0, (done,), {}, pose, {}))
         outcome = self.outcomes.pop(0) if self.outcomes else "success"
         if outcome == "killed":
             raise GoneError
         return Finished(report(outcome), node_view(tree.root))
+
+
+def first_leaf(tree):
+    """The path id of the first skill of a mission."""
+    return next(node.path_id for node in tree.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id)
+
+
+def corrected_to(goal, prepared, robot="Alice"):
+    """The tree of going elsewhere, and a note of that being under way."""
+    go = mission_from_commands([Command(goal=goal)], world="flat", robot_name=robot)
+    other = compile_mission(replace(go, name=f"go {goal} 2"), knowledge=prepared.knowledge, registry=installed_skills())
+    change = Change(first_leaf(other), NodeState(), NodeState(Status.RUNNING, None, "on the way"))
+    return other, TickNote(2.0, (change,), {}, None, {})
 
 
 def report(outcome):
@@ -168,14 +185,8 @@ def test_a_bad_mission_is_not_queued(errand, mission, states):
 def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(errand, mission, plant, monkeypatch):
     def corrected(prepared, *, durable, **_):
         prepared.request.out.mkdir(parents=True, exist_ok=True)
-        go = mission_from_commands([Command(goal="bathroom")], world="flat", robot_name="Alice")
-        named = replace(go, name="go bathroom 2")
-        other = compile_mission(named, knowledge=prepared.knowledge, registry=installed_skills())
-        leaf = next(
-            node.path_id for node in other.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id
-        )
-        change = Change(leaf, NodeState(), NodeState(Status.RUNNING, None, "on the way"))
-        durable.journal.replaced(other).note(TickNote(2.0, (change,), {}, None, {}))
+        other, note = corrected_to("bathroom", prepared)
+        durable.journals["Alice"].replaced(other).note(note)
         raise GoneError
 
     with monkeypatch.context() as patch, pytest.raises(GoneError):
@@ -184,6 +195,59 @@ def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(erra
     result = errand("resume", "--quiet")
     assert result.exit_code == 0, result.output
     assert [run[0] for run in plant.runs] == ["go bathroom 2"]
+
+
+PARTS = """name: two
+robots: {alice: spot, bob: fetch}
+parts:
+  alice: {steps: [{to: kitchen}]}
+  bob: {after: alice, steps: [{to: bedroom}]}
+"""
+GO = "Take [Nothing] to [%s] and do [Nothing] to [Nothing]"
+
+
+@pytest.fixture
+def two(tmp_path):
+    (tmp_path / "two.yaml").write_text(PARTS, encoding="utf-8")
+    return str(tmp_path / "two.yaml")
+
+
+def test_a_killed_run_of_two_robots_is_resumed_with_each_where_it_was(errand, two, plant, states):
+    plant.outcomes = ["killed"]
+    with pytest.raises(GoneError):
+        errand("run", two, "--quiet", "--no-record")
+    result = errand("resume", "--quiet")
+    assert (result.exit_code, states()) == (0, ["success"]), result.output
+    durable = plant.runs[1][3]
+    assert (durable.take_up, durable.log) == (True, "log-2.mcap")
+    assert durable.poses == {"Alice": Pose2D(0.0, 0.5, 0.0), "Bob": Pose2D(1.0, 0.5, 0.0)}
+    assert plant.commands == [[[GO % "kitchen"], [GO % "bedroom"]]] * 2
+
+
+def test_what_took_the_place_of_one_robots_part_is_resumed_beside_the_others(errand, two, plant, monkeypatch):
+    def corrected(prepared, *, durable, **_):
+        prepared.request.out.mkdir(parents=True, exist_ok=True)
+        other, note = corrected_to("office", prepared, "Bob")
+        durable.journals["Bob"].replaced(other).note(note)
+        raise GoneError
+
+    with monkeypatch.context() as patch, pytest.raises(GoneError):
+        patch.setattr(main, "run_simulated", corrected)
+        errand("run", two, "--quiet")
+    result = errand("resume", "--quiet")
+    assert result.exit_code == 0, result.output
+    assert plant.commands == [[[GO % "kitchen"], [GO % "office"]]]
+
+
+def test_queued_missions_of_the_same_robots_share_a_world_also_with_one_that_stands_by(errand, two, plant, mission):
+    robots = "alice=spot,bob=fetch"
+    errand("queue", "add", mission("go"), "--robots", robots)
+    errand("queue", "add", two, "--robots", robots)
+    errand("queue", "add", mission("go"), "--robots", "alice=spot,carl=spot")
+    errand("queue", "add", mission("alone"))
+    result = errand("queue", "run", "--quiet")
+    assert [run[3].take_up for run in plant.runs] == [False, True, False, False], result.output
+    assert list(plant.runs[1][3].poses) == ["Alice", "Bob"]
 
 
 def test_resume_goes_on_with_what_was_killed_and_then_with_the_queue(errand, mission, plant, states):

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from executive.cli.requests import prepare
+from executive.cli.wake_check import refuse_unaddressed
 from executive.cli.worlds import open_world
 from executive.mission.errors import InputError
 from executive.mission.request import Request, Start
@@ -123,13 +124,36 @@ def test_a_file_with_robots_and_steps_goes_to_the_robot_that_it_names(asked_file
     assert (prepared.mission.robot_name, list(prepared.robots)) == ("Bob", ["Alice", "Bob"])
 
 
-def test_a_world_may_name_its_robots(tmp_path):
-    world = tmp_path / "world"
-    shutil.copytree(open_world("flat").folder, world)
-    known = world / "knowledge.yaml"
-    known.write_text(f"robots: {{eve: spot, bob: fetch}}\n{known.read_text(encoding='utf-8')}", encoding="utf-8")
-    prepared = prepare(Request("Hey Bob, go to the kitchen", world=str(world)), ask=None)
+@pytest.fixture
+def world_of_two(tmp_path):
+    """A world that names two robots; what is written into its knowledge before is changed."""
+
+    def of(said="", instead=""):
+        world = tmp_path / "world"
+        shutil.copytree(open_world("flat").folder, world)
+        known = world / "knowledge.yaml"
+        text = known.read_text(encoding="utf-8").replace(said, instead)
+        known.write_text(f"robots: {{eve: spot, bob: fetch}}\n{text}", encoding="utf-8")
+        return str(world)
+
+    return of
+
+
+def test_a_world_may_name_its_robots(world_of_two):
+    prepared = prepare(Request("Hey Bob, go to the kitchen", world=world_of_two()), ask=None)
     assert (prepared.mission.robot_name, prepared.kind, list(prepared.robots)) == ("Bob", "fetch", ["Eve", "Bob"])
+
+
+def test_a_world_may_ask_that_one_of_its_robots_is_called(world_of_two):
+    world = world_of_two("robot: {name: Alice}", "robot: {name: Alice, require_wake: true}")
+    refuse_unaddressed(["--say", "Hey Bob, go to the kitchen", "--world", world])
+    assert prepare(Request("Hey Bob, go to the kitchen", world=world), ask=None).mission.robot_name == "Bob"
+    with pytest.raises(InputError, match='begin with "Hey Eve" or "Hey Bob"'):
+        prepare(Request("go to the kitchen", world=world), ask=None)
+
+
+def test_any_of_the_robots_of_the_option_may_be_called():
+    refuse_unaddressed(["--wake", "--say", "Hey Bob, go to the kitchen", "--robots", "alice=spot,bob=spot"])
 
 
 # What is changed in the file with parts; the line, and what is told.

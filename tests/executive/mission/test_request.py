@@ -1,15 +1,25 @@
-"""Where the robot starts, as users write it and the store keeps it."""
+"""What is asked for: where the robot starts, and a request that can be taken up from any folder."""
+
+from pathlib import Path
 
 import pytest
 
 from executive.mission.errors import InputError
-from executive.mission.request import Start
+from executive.mission.request import Request, Start
+from executive.mission.robots import RobotSetup
 from skills.robot import Pose2D
 
 
 @pytest.mark.parametrize("start", [Start(), Start(Pose2D(1.25, -3.0, 0.1))])
 def test_a_start_is_read_back_as_it_was_written(start):
     assert Start.of(str(start)) == start
+
+
+def test_from_anywhere_the_stacks_of_robots_are_found(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    robots = {"alice": RobotSetup("spot", stack=Path("own.yaml")), "bob": RobotSetup("fetch")}
+    found = Request("go", robots=robots).from_anywhere().robots
+    assert found == {"alice": RobotSetup("spot", stack=tmp_path / "own.yaml"), "bob": RobotSetup("fetch")}
 
 
 @pytest.mark.parametrize("text", ["", "nowhere", "1 2", "1 2 3 4", "1 2 nan", "1 2 x"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -124,10 +124,11 @@ class Lane:
             after=after,
         )
 
-    def run(self, *entries: RunEntry) -> RunResult:
+    def run(self, *entries: RunEntry, spare: Sequence[RunEntry] = ()) -> RunResult:
         """Run them to their end."""
         return run(
             entries,
+            spare=spare,
             clock=self.clock,
             worker=LockStepWorker(self.clock),
             publish=lambda topic, message: self.published.append((topic, message)),
@@ -175,3 +176,11 @@ def test_a_verb_that_hangs_ends_the_mission_of_its_robot_only(lane: Lane) -> Non
     assert alice_result.outcome is Outcome.SUCCESS
     assert bob_result.outcome is Outcome.ERROR and "'imu'" in bob_result.message
     assert bob.robot.lease_holder() is None
+
+
+def test_a_robot_without_a_mission_clears_a_way_as_well(lane: Lane) -> None:
+    """Bob has nothing to do in the run, and is not among its results."""
+    bob = lane.entry("Bob", Finishes, 2.0)
+    result = lane.run(lane.entry("Alice", Drives, 0.0), spare=(bob,))
+    assert [(each.robot_name, each.outcome) for each in result.robots] == [("Alice", Outcome.SUCCESS)]
+    assert bob.robot.odometry().pose.x_m + 2.0 > 3.7 and bob.robot.lease_holder() is None

@@ -149,3 +149,45 @@ def test_the_way_of_a_robot_that_does_not_answer_is_told_no_more() -> None:
     assert len(list(made.news())) == 1
     time.now_s = SILENT_S + 0.1
     assert list(made.news()) == [{"robot": "alice", "turn": None, "x": [], "y": []}]
+
+
+def test_who_clears_a_way_is_told_from_who_works() -> None:
+    """| bob | alice, who claimed, sees him yield |
+    | claims later | yes |
+    | has nothing to do | yes |
+    | works | no |
+    | claimed first | no |"""
+    made = table(Time(), "alice", "bob")
+    made.claim("alice")
+    assert not made.others("alice")[0].yields
+    made.rest("bob", idle=True)
+    assert made.others("alice")[0].yields
+    made.rest("bob", idle=False)
+    made.claim("bob")
+    assert made.others("alice")[0].yields and not made.others("bob")[0].yields
+
+
+def test_what_the_others_cover_is_where_they_believe_to_be() -> None:
+    """Bob's disc of 0.3 m about (2, 1), and a little more; nothing of Alice's own."""
+    made = table(Time(), "alice", "bob")
+    made.heard("bob", Pose2D(2.0, 1.0, 1.0))
+    covered = made.covered_W("alice")
+    assert covered[:, :2].tolist() == [[2.0, 1.0]]
+    assert 0.4 < covered[0, 2] < 0.7
+
+
+def test_a_goal_is_reserved_until_it_is_given_back_or_the_robot_falls_silent() -> None:
+    """As for a dock: the last pose of a way that was announced."""
+    time = Time()
+    made = table(time, "alice", "bob")
+    for end in ("release", "silence"):
+        made.claim("alice")
+        made.announce("alice", WAY, DISCS)
+        (seen,) = made.others("bob")
+        assert seen.first and seen.way is not None and seen.way[-1].tolist() == WAY[-1].tolist()
+        if end == "release":
+            made.release("alice")
+            assert made.others("bob")[0].way is None
+        else:
+            time.now_s += SILENT_S + 0.1
+            assert made.others("bob") == ()

@@ -10,7 +10,7 @@ OLIVER, ALICE = "Hey Oliver, get me a cube.", "Hey Alice, get me a cube."
 
 def _opening(text, plain, likely):
     recognition = ScriptedRecognition(plain=plain, likely=likely)
-    return opening_as_heard(recognition, text, "Alice", lambda heard: "alice" in heard.lower())
+    return opening_as_heard(recognition, text, ("Alice",), lambda heard: "alice" in heard.lower())
 
 
 #   heard with the name expected    heard without   likelier by e to the    taken
@@ -42,4 +42,4 @@ def test_a_call_at_the_end_stays():
 
 
 def test_where_nothing_is_heard_without_expecting_names_the_call_stays():
-    assert opening_as_heard(ScriptedRecognition(), ALICE, "Alice", lambda heard: False) == ALICE
+    assert opening_as_heard(ScriptedRecognition(), ALICE, ("Alice",), lambda heard: False) == ALICE

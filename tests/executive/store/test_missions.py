@@ -11,6 +11,7 @@ from py_trees.common import Status
 
 from executive.mission.errors import InputError
 from executive.mission.request import Request, Start
+from executive.mission.robots import RobotSetup
 from executive.mission.scenario import Scenario
 from executive.run.journal import TickNote
 from executive.store.database import VERSION
@@ -217,9 +218,9 @@ def test_a_store_of_version_4_is_brought_up_to_date(path):
     with MissionStore(path) as store:
         kept = store.add(REQUEST, queued=True)
     with sqlite3.connect(path) as old:
-        for table in ("standing", "origin", "battery", "given"):
+        for table in ("standing", "origin", "battery", "given", "part"):
             old.execute(f"DROP TABLE {table}")
-        for column in ("scenario", "time_of_day", "time_limit_s", "variation"):
+        for column in ("scenario", "time_of_day", "time_limit_s", "variation", "robots"):
             old.execute(f"ALTER TABLE mission DROP COLUMN {column}")
         old.execute("PRAGMA user_version = 4")
     old.close()
@@ -228,6 +229,33 @@ def test_a_store_of_version_4_is_brought_up_to_date(path):
         store.journal(kept.id).note(note(changed("a", Status.SUCCESS), charge=0.5))
         store.finish(kept.id, MissionState.SUCCESS, "done")
         assert store.rows("SELECT lowest, last FROM battery")[0]["last"] == 0.5
+
+
+def test_a_mission_keeps_its_robots(path):
+    robots = {
+        "bob": RobotSetup("fetch", Pose2D(1.0, 2.5, -0.25), "kitchen", Path("/stacks/own.yaml")),
+        "alice": RobotSetup("spot"),
+    }
+    with MissionStore(path) as store:
+        store.add(replace(REQUEST, robots=robots), queued=True)
+    with MissionStore(path, create=False) as store:
+        assert list(store.missions()[0].request.robots.items()) == list(robots.items())
+
+
+def test_each_of_several_robots_has_its_own_steps_values_and_pose(path):
+    with MissionStore(path) as store:
+        mission = store.add(replace(REQUEST, robot="Alice"), queued=False).id
+        store.place(mission, {"Alice": Pose2D(9.0, 9.0, 0.0), "Carl": Pose2D(5.0, 5.0, 0.0)})
+        for name, x_m, charge in (("Alice", 1.0, 0.5), ("Bob", 2.0, 0.1)):
+            slug, pose = name.lower(), Pose2D(x_m, 0.0, 0.0)
+            done = changed(f"{slug}/a", Status.SUCCESS)
+            journal = store.journal(mission, name)
+            journal.note(note(done, board={f"{slug}/x": x_m}, pose=pose, charge=charge))
+        alice, bob = store.memory(mission, "Alice"), store.memory(mission, "Bob")
+        assert ([*alice.steps], alice.board, alice.pose) == (["alice/a"], {"alice/x": 1.0}, Pose2D(1.0, 0.0, 0.0))
+        assert ([*bob.steps], bob.board, bob.pose) == (["bob/a"], {"bob/x": 2.0}, Pose2D(2.0, 0.0, 0.0))
+        assert store.poses(mission)["Carl"] == Pose2D(5.0, 5.0, 0.0)
+        assert [tuple(row) for row in store.rows("SELECT lowest, last FROM battery")] == [(0.5, 0.5)]
 
 
 def test_the_lowest_charge_of_a_mission_is_kept_over_a_restart_and_the_last(path):

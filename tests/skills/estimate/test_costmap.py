@@ -75,3 +75,15 @@ def test_nothing_is_taken_in_while_the_robot_does_not_know_its_place():
     bench.tick()
     assert not bench.localiser.estimate().localised
     assert len(bench.costmap.seen_m()) == 0
+
+
+def test_what_stands_where_another_robot_says_it_is_is_left_out_but_told():
+    bench = Bench(START, unmapped=[PERSON])
+    bench.costmap.leave_out(np.array([[3.4, 5.4, 0.5]]))
+    ticked(bench)
+    bench.costmap.add_points(np.tile([[3.3, 5.4, 0.4]], (20, 1)), bench.clock.now())
+    assert len(bench.costmap.seen_m()) == 0
+    assert len(bench.costmap.unexplained()[1]) > 0
+    bench.costmap.leave_out(np.empty((0, 3)))
+    ticked(bench)
+    assert bench.costmap.clearance_m(AT_PERSON)[0] < 0.05

@@ -1,5 +1,6 @@
 """Whether what was let go of is seen with the person: by a robot whose camera is on its head."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -66,6 +67,20 @@ def test_two_fingers_are_drawn_straight_back_from_what_they_let_go_of():
         robot.advance(0.1)
     way_H = X_BH.inverse() @ HEAD_MODEL.X_BH(robot.arm_commands[moved].positions_rad[-1]).translation()
     assert way_H == pytest.approx([-0.16, 0.0, 0.0], abs=0.003)  # not aside first: both fingers are off it
+
+
+def test_the_arm_is_stowed_around_what_bears_the_object_now():
+    robot = _robot(_at_release(RED))
+    context = context_of(robot)
+    around_m = ((-0.033, 0.033), (-0.06, 0.055), (-0.033, 0.033))  # the can, gripped in its middle; y of the hand is up
+    context.payload.corners_H = P_HT + np.array(list(itertools.product(*around_m)))
+    assert isinstance(outcome(HandOver(context), COKE), Succeeded)
+    for q in robot.arm_commands[-1].positions_rad:
+        for x_m in (0.0, 0.1, 0.2):
+            x, y, z = HEAD_MODEL.X_BH(q) @ np.array([x_m, 0.0, 0.0])
+            over_m = z + HEAD_CAPABILITIES.standing_height_m - (LEVEL_M - 0.06)
+            assert max(abs(x - AHEAD_M), abs(y)) > 0.20 or not -0.10 < over_m < 0.02, "through the tray"
+    assert robot.q == pytest.approx(HEAD_MODEL.stowed_rad, abs=0.06)
 
 
 def test_what_is_seen_nowhere_is_not_given():

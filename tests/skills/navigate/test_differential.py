@@ -140,3 +140,13 @@ def test_far_off_the_heading_it_turns_on_the_spot():
 def test_corners_are_where_turning_begins_and_ends_and_where_the_direction_changes():
     poses = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.1, 0, 0.2], [0.1, 0, 0], [0.2, 0, 0], [0.1, 0, 0]])
     assert corners_of(Path(poses, np.ones(len(poses)))).tolist() == [1, 3, 4]
+
+
+def test_a_turn_too_short_for_the_path_is_made_all_the_same():
+    """A path of 0.04 rad on the spot, less than 2 cm long: the base turns to its end."""
+    turn_rad = 0.04
+    path = Path(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, turn_rad]]), np.full(2, 3.0))
+    follower = FollowerOptions().build(path, BASE, max_speed_m_s=0.8)
+    costmap = costmap_of(*OPEN)
+    command = follower.command(Pose2D(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.zeros(3), costmap)
+    assert command.velocity[2] > 0.01

@@ -1,0 +1,23 @@
+"""The referee sees robots touch each other."""
+
+from __future__ import annotations
+
+from plant.simulation import Simulation
+from plant.worlds.world import load_world
+from skills.robot import Pose2D
+
+
+def test_a_crash_of_two_robots_is_one_contact_between_them() -> None:
+    """Alice drives into Bob, who stands, and stays there."""
+    starts = {"Alice": Pose2D(2.0, 4.5, 0.0), "Bob": Pose2D(2.95, 4.5, 3.14)}
+    robots = {"Alice": "spot", "Bob": "fetch"}
+    simulation = Simulation(load_world("flat"), seed=1, visuals=False, robots=robots, starts=starts)
+    alice = simulation.robots["Alice"]
+    lease = alice.acquire_lease("test")
+    for _ in range(20):
+        alice.drive(0.5, 0.0, 0.0, until_s=simulation.clock.now() + 0.3, lease=lease)
+        simulation.clock.advance(0.05)
+    verdict = simulation.referee.judge([])
+    assert (verdict.collisions, verdict.robots_hit, verdict.people_hit) == (1, 1, 0)
+    (bump,) = simulation.referee.collisions
+    assert {bump.robot, bump.other_robot} == {"Alice", "Bob"}

@@ -96,7 +96,7 @@ def write_fleet_report(
         verdicts=(),
         facts=(("robots", ", ".join(f"{name} ({kind})" for name, kind in robots.items())), *facts),
         missions=rows,
-        map=map_of(artifacts, events),
+        map=map_of(artifacts, events, several=len(robots) > 1),
         parts=[_part(each, tuple(robots), artifacts, events) for each in ended],
     )
     return save_report(out, page)

@@ -48,6 +48,7 @@ _CAPTIONS: Final = {
     "hand_over": "Handing it over",
 }
 _MAP: Final = "The map, with the path of the robot"
+_MAPS: Final = "The map, with the path of each robot"
 _SKIPPED: Final = "skipped"
 _SKIPS: Final = frozenset({"skip", "ask"})
 
@@ -87,11 +88,11 @@ def write_report(
     for each in ended:
         (out / f"{file_name(TREE, each.tree.robot_name, names)}.svg").write_text(each.picture, encoding="utf-8")
     page = ReportPage(
-        title=prepared.mission.name,
+        title=", ".join(names) if several else prepared.mission.name,
         request=_request(prepared),
         commands=() if several else report.commands,
         verdicts=() if several else tuple(_verdicts(report)),
-        facts=_facts(report, ", ".join(names) if several else ended[0].tree.robot_name),
+        facts=_facts(report, "" if several else ended[0].tree.robot_name),
         answers=[
             AnswerRow(
                 one.t_s,
@@ -107,7 +108,7 @@ def write_report(
         seen=[SeenRow(each.t_s, each.name, _where(each.surface, each.place)) for each in report.seen_objects],
         steps=() if several else ended[0].steps(events),
         events=() if report.referee is None else report.referee.events,
-        map=map_of(artifacts, events),
+        map=map_of(artifacts, events, several=several),
         pictures=() if several else tuple(_pictures(artifacts, ended[0].tree.robot_name, names)),
         tree_svg="" if several else ended[0].picture,
         parts=[part_of(each, names, artifacts, events) for each in ended] if several else (),
@@ -124,7 +125,7 @@ def part_of(
         title=title or f"{name} ({report.kind})",
         colour=ROBOT_COLOURS[sorted(robots).index(name) % len(ROBOT_COLOURS)],
         commands=report.commands,
-        verdicts=tuple(_verdicts(report)),
+        verdicts=tuple(_verdicts(report, counts=True)),
         steps=ended.steps(events),
         pictures=tuple(_pictures(artifacts, name, robots)) if title is None else (),
         tree_svg=ended.picture,
@@ -209,23 +210,28 @@ def _request(prepared: Prepared) -> str:
     return f"mission file {request.file.name}" if request.file is not None else "commands"
 
 
-def _verdicts(report: RunReport | RobotReport) -> Iterator[Verdict]:
+def _verdicts(report: RunReport | RobotReport, *, counts: bool = False) -> Iterator[Verdict]:
+    """What the tree claims and what the referee saw, with its counts where they are asked for."""
     cause = f" ({report.cause})" if report.cause else ""
     yield Verdict(
         "The tree claims", report.outcome == Outcome.SUCCESS.value, f"{report.outcome}{cause}", report.message
     )
     if report.referee is not None:
         good = report.referee.success
-        yield Verdict("The referee saw", good, VERDICTS[good], report.referee.why)
+        why = f"{report.referee.why} ({counts_text(report.referee)})" if counts else report.referee.why
+        yield Verdict("The referee saw", good, VERDICTS[good], why)
 
 
 def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
+    """The facts of a run; without a robot's name those of all robots."""
     facts = (
-        ("robot", robot_name),
         ("world", f"{report.world}, seed {report.seed}"),
         ("duration", f"{report.sim_time_s:.1f} s simulated in {report.wall_time_s:.1f} s"),
     )
-    return facts if report.referee is None else (*facts, ("contacts", counts_text(report.referee)))
+    if not robot_name:
+        return facts
+    contacts = () if report.referee is None else (("contacts", counts_text(report.referee)),)
+    return (("robot", robot_name), *facts, *contacts)
 
 
 def _where(surface: str | None, place: str | None) -> str:
@@ -233,15 +239,16 @@ def _where(surface: str | None, place: str | None) -> str:
     return ", ".join(filter(None, (on, place))) or "somewhere else"
 
 
-def map_of(artifacts: Artifacts, events: Sequence[Event]) -> PagePicture | None:
+def map_of(artifacts: Artifacts, events: Sequence[Event], *, several: bool) -> PagePicture | None:
     """The world from above where the run was recorded, else the robot's own map; None where there is neither."""
+    caption = _MAPS if several else _MAP
     if (drawn := _drawn(artifacts, "map")) is not None:
-        return PagePicture(_MAP, drawn)
+        return PagePicture(caption, drawn)
     try:
         picture = map_picture(events)
     except InputError:
         return None
-    return PagePicture(_MAP, to_jpeg(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8)))
+    return PagePicture(caption, to_jpeg(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8)))
 
 
 def _pictures(artifacts: Artifacts, robot: str, robots: Sequence[str]) -> Iterator[PagePicture]:

@@ -69,7 +69,7 @@ def trial(number: int, sentence: str, moment_s: float, seed: int, out: Path, rob
     lifts = sum(" lifted the " in line and line.startswith("  ") for line in text.splitlines())
     every = list(report.get("robots", {}).values()) or [report]
     right = all(each.get("outcome") == "success" and each["referee"]["success"] for each in every)
-    right = right and lifts == 1
+    right = right and (robots is not None or lifts == 1)  # of several robots the lifts are not told
     message = f"{report.get('message', 'no report')} / {report.get('referee', {}).get('why', '')}"
     wall_s = time.perf_counter() - begun
     return Trial(number, sentence, moment_s, seed, right and not _done_twice(out), lifts, wall_s, message)

@@ -28,6 +28,8 @@ DOWN = 0.95
 """The share of the pull that goes down, beside that towards the person."""
 GIVES_M, GIVES_RAD = 0.01, 0.03
 """The gripper gives way: the object has moved so far in the hand since the pull began, or the fingers have opened."""
+DROPS_M = BELOW_M - 0.002
+"""As long as nobody pulls, what creeps in the hand by less is not let go of."""
 SETTLE_S = 1.5
 ON_TRAY_M = 0.25
 _NEAR_M, _ASIDE_M, _DOWN_M = 0.004, 0.05, 0.05
@@ -73,7 +75,7 @@ class Receiver:
         elif self.phase is Phase.RECEIVING:
             if not self._on_tray(self.offer) and now_s - self._since_s > SETTLE_S:
                 self._go_home(now_s)
-        elif self._gives(self.offer):
+        elif self._gives(self.offer, moved_m=DROPS_M if self.phase is Phase.BRINGING else GIVES_M):
             self._turn_to(Phase.RECEIVING, now_s)
         elif not self._offers.holds(self.offer):
             self._go_home(now_s)
@@ -94,10 +96,10 @@ class Receiver:
         """Note how the gripper has the object, against which it is seen to give way."""
         self._opening, self._p_HO = self._offers.opening(offer.robot), self._offers.in_hand(offer)
 
-    def _gives(self, offer: Offer, opens_rad: float = GIVES_RAD) -> bool:
+    def _gives(self, offer: Offer, opens_rad: float = GIVES_RAD, moved_m: float = GIVES_M) -> bool:
         """Whether the gripper gives way: somebody who pulls feels it sooner."""
         opened = self._offers.opening(offer.robot) - self._opening > opens_rad
-        return opened or float(np.linalg.norm(self._offers.in_hand(offer) - self._p_HO)) > GIVES_M
+        return opened or float(np.linalg.norm(self._offers.in_hand(offer) - self._p_HO)) > moved_m
 
     def pull_W(self, now_s: float) -> FloatArray | None:
         """The force (N, world) on the object; it ends for good when the gripper gives way."""

@@ -5,7 +5,8 @@
 The number of a mission is the seed of its world and draws what is brought, and where to: half the missions end with a
 person. A line a mission goes to stderr as it ends. Reported are how many missions were fulfilled by the referee with
 Wilson's interval of 95 %, false claims (the robot says that it is done, the referee denies it), contacts with what was
-touched, and what the others failed of.
+touched, and what the others failed of. The wrench is left out unless it is named: from the height of the head it is
+seen too seldom.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ ROBOT: Final = "bob"
 WORLD: Final = "flat"
 TIME_LIMIT_S: Final = 420.0
 PERSON: Final = "Robin"
-THINGS: Final = ("beer", "coke", "cube", "cylinder", "hammer", "screwdriver", "wrench")
+THINGS: Final = ("beer", "coke", "cube", "cylinder", "hammer", "screwdriver")
 SURFACES: Final = (
     "kitchen counter",
     "kitchen table",

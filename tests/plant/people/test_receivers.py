@@ -201,3 +201,14 @@ def test_a_state_taken_up_again_goes_on_as_before(tmp_path):
     hall.let_go()
     hall.until(Phase.RECEIVING).engine.advance(2.0)
     assert hall.referee.objects["coke"].on_tray_of == "Kim"
+
+
+# how far (m) the object has moved in the hand while the tray still comes -> whether it counts as let go of
+@pytest.mark.parametrize(("moved_m", "let_go"), [(0.013, False), (0.02, True)])
+def test_what_creeps_in_the_hand_before_anybody_pulls_is_not_let_go_of(tmp_path, moved_m, let_go):
+    hall = Hall(tmp_path).until(Phase.BRINGING)
+    state = hall.kim.state()
+    x, y, z = state["p_HO"]
+    hall.kim.restore({**state, "p_HO": [x + moved_m, y, z]})
+    hall.engine.advance(0.3)
+    assert (hall.kim.phase is Phase.RECEIVING) is let_go

@@ -15,6 +15,7 @@ from skills.api import Cause, PlanningError, Question, Running, Succeeded
 from skills.approach.standing import go_to_one
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, Box
+from skills.arm.poses import carry_configuration
 from skills.arm.pull import PullWatch
 from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
@@ -39,6 +40,8 @@ _POINTS_DOWN = 0.8
 _LOOKS = 3
 _BORNE_M, _DEEP_M, _OVER_M = 0.42, 0.12, 0.005
 """How far hands or a tray that bear what was let go of may reach: wide, below its lowest point and over that (m)."""
+_FLOOR_FROM_M, _FLOOR_M = 0.07, (1.2, 2.4, 0.1)
+"""The floor, for an arm that goes round: from how far before the body on, and how large (m)."""
 _OWN_M, _OVER_TOP_M = 0.14, 0.03
 """The object's own space, as it may have turned: wide, and over its highest point (m)."""
 
@@ -179,13 +182,21 @@ class HandOver(ArmSkill[HandOverInputs]):
         yield from self._check_given(inputs, release)
 
     def _stow_beside(self, release: Release, message: str) -> Routine[None]:
-        """Stow the arm around the hands, or the tray, that bear the object now; where there is no such way, by any."""
+        """Stow the arm around the hands, or the tray, that bear the object now; where there is no such way, by any.
+
+        First the hand comes near the body: a long way round would swing it through what no camera has seen.
+        """
         boxes, X_BW = self.boxes, self.X_WB().inverse()
         borne = (_BORNE_M, release.low_m - _DEEP_M, release.low_m + _OVER_M)
         for side_m, low_m, high_m in (borne, (_OWN_M, release.low_m, release.top_m + _OVER_TOP_M)):
             X_WG = RigidTransform([release.x_m, release.y_m, 0.5 * (low_m + high_m)])
             self.boxes = [*self.boxes, Box(X_BW @ X_WG, (side_m, side_m, high_m - low_m))]
+        front_m = max(x for x, _ in self.context.robot.capabilities().footprint_m) + _FLOOR_FROM_M
+        X_BG = RigidTransform([front_m + 0.5 * _FLOOR_M[0], 0.0, -self._height_m() - 0.5 * _FLOOR_M[2]])
+        self.boxes = [*self.boxes, Box(X_BG, _FLOOR_M)]
+        arm, R_BH = self.arm, self.model.X_BH(self.q_rad()).rotation()
         try:
+            yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q), message)
             yield from self.stow(message)
         except SkillFailure:
             self.boxes = boxes

@@ -75,11 +75,12 @@ def test_the_arm_is_stowed_around_what_bears_the_object_now():
     around_m = ((-0.033, 0.033), (-0.06, 0.055), (-0.033, 0.033))  # the can, gripped in its middle; y of the hand is up
     context.payload.corners_H = P_HT + np.array(list(itertools.product(*around_m)))
     assert isinstance(outcome(HandOver(context), COKE), Succeeded)
-    for q in robot.arm_commands[-1].positions_rad:
+    for q in np.vstack([each.positions_rad for each in robot.arm_commands[-2:]]):
         for x_m in (0.0, 0.1, 0.2):
             x, y, z = HEAD_MODEL.X_BH(q) @ np.array([x_m, 0.0, 0.0])
             over_m = z + HEAD_CAPABILITIES.standing_height_m - (LEVEL_M - 0.06)
             assert max(abs(x - AHEAD_M), abs(y)) > 0.20 or not -0.10 < over_m < 0.02, "through the tray"
+    assert HEAD_MODEL.X_BH(robot.arm_commands[-2].positions_rad[-1]).translation()[0] < 0.61  # near the body first
     assert robot.q == pytest.approx(HEAD_MODEL.stowed_rad, abs=0.06)
 
 

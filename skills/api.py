@@ -196,8 +196,8 @@ class ForgettingCostmap(Protocol):
 
 
 @runtime_checkable
-class SharedCostmap(Protocol):
-    """A costmap that leaves other robots to those who know where they are."""
+class LeavesOthersOut(Protocol):
+    """A costmap or localiser that leaves other robots to those who know where they are."""
 
     def leave_out(self, discs_W: NDArray[np.float64]) -> None:
         """From now on take in nothing that is seen within these discs, rows of x, y and radius (m, world)."""

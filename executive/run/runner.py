@@ -32,7 +32,7 @@ from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
 from executive.tree.compiling.builder import slug
 from executive.tree.snapshot import Snapshot
-from skills.api import Cause, Costmap, Detector, Localiser, Publish, SharedCostmap, Worker
+from skills.api import Cause, Costmap, Detector, LeavesOthersOut, Localiser, Publish, Worker
 from skills.detection import NO_DETECTOR
 from skills.navigate.footprint import Footprint
 from skills.robot import Clock, Lease, Pose2D, Robot
@@ -356,9 +356,11 @@ class _Run:
 
     def _sense(self, session: WithoutWork) -> None:
         """Bring a robot's estimators up to date, and tell the others where it believes to be."""
-        costmap = session.context.costmap
-        if self._traffic is not None and isinstance(costmap, SharedCostmap):
-            costmap.leave_out(self._traffic.covered_W(session.name))
+        if self._traffic is not None:
+            covered_W = self._traffic.covered_W(session.name)
+            for estimator in (session.context.localiser, session.context.costmap):
+                if isinstance(estimator, LeavesOthersOut):
+                    estimator.leave_out(covered_W)
         session.sense()
         if self._traffic is not None:
             self._traffic.heard(session.name, session.context.known_pose())

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from skills.api import LocalisationEstimate
 from skills.estimate.compiled import distances
 from skills.estimate.grid_map import GridMap
-from skills.estimate.scan_points import scan_points, sensor_pose
+from skills.estimate.scan_points import outside_discs, placed_points, scan_points, sensor_pose
 from skills.estimate.seen_layer import clear_cells, mark_cells
 from skills.estimate.self_filter import SelfFilter, in_body_axes
 from skills.geometry import compose
@@ -196,8 +196,7 @@ class LayeredCostmap:
         """Those (x, y, z) rows that do not lie where another robot says that it is."""
         if not len(self._left_out_W) or not len(points_W):
             return points_W
-        offsets = np.linalg.norm(points_W[:, None, :2] - self._left_out_W[None, :, :2], axis=2)
-        return np.ascontiguousarray(points_W[(offsets > self._left_out_W[:, 2]).all(axis=1)])
+        return np.ascontiguousarray(points_W[outside_discs(points_W, self._left_out_W)])
 
     def _seen_field(self) -> NDArray[np.float32] | None:
         """Distance (m) from each cell of the layer to what is seen, None when nothing is."""
@@ -214,10 +213,3 @@ def _empty_like(grid: GridMap, cell_m: float) -> GridMap:
     """An empty grid over the same ground with cells of another size."""
     columns, rows = (max(2, math.ceil(size / cell_m)) for size in grid.size_m)
     return GridMap(np.zeros((rows, columns), dtype=np.bool_), cell_m, grid.origin_m)
-
-
-def placed_points(points_F: FloatArray, X_WF: Pose2D) -> FloatArray:
-    """Points of the levelled body frame in the world, (N, 3)."""
-    c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
-    x, y = points_F[:, 0], points_F[:, 1]
-    return np.column_stack([X_WF.x_m + c * x - s * y, X_WF.y_m + s * x + c * y, points_F[:, 2]])

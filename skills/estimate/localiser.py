@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
 from skills.estimate.matching import Match, MatchOptions, match, score_poses
-from skills.estimate.scan_points import scan_points
+from skills.estimate.scan_points import outside_discs, placed_points, scan_points
 from skills.geometry import compose, inverse, relative
 from skills.quantities import Count, Height, Length, Share, Turn
 from skills.robot import FloatArray, Pose2D, Robot, Scan
@@ -83,6 +83,7 @@ class ScanMatchingLocaliser:
         self._poor_scans = 0
         self._localised = False
         self._transformed: tuple[Pose2D, RigidTransform] | None = None
+        self._left_out_W: FloatArray = np.empty((0, 3))
 
     @property
     def grid(self) -> GridMap:
@@ -110,7 +111,16 @@ class ScanMatchingLocaliser:
         if len(points_F) < self._options.min_points:
             self._note_poor(0.0)
             return
-        self._take_in(points_F)
+        others_left_out_F = self._others_left_out(points_F)
+        if len(others_left_out_F) >= self._options.min_points:
+            self._take_in(others_left_out_F)
+
+    def leave_out(self, discs_W: FloatArray) -> None:
+        """From now on match nothing that is seen within these discs, rows of x, y and radius (m, world).
+
+        They count from where the robot believes to be. A scan of which they leave too little says nothing about it.
+        """
+        self._left_out_W = discs_W
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
         """Where a scan fits the map, within radius_m of a belief or anywhere (None); changes nothing.
@@ -151,6 +161,14 @@ class ScanMatchingLocaliser:
         if len(points) <= options.max_points:
             return points
         return np.ascontiguousarray(points[np.linspace(0, len(points) - 1, options.max_points).astype(np.int64)])
+
+    def _others_left_out(self, points_F: FloatArray) -> FloatArray:
+        """Those points that do not lie where another robot says that it is."""
+        if not (self._placed and len(self._left_out_W)):
+            return points_F
+        assert self._X_OB is not None
+        points_W = placed_points(points_F, compose(self._X_WO, self._X_OB))
+        return np.ascontiguousarray(points_F[outside_discs(points_W, self._left_out_W)])
 
     def _predict(self, X_OB: Pose2D) -> None:
         """Move the belief along with odometry and let its spread grow."""

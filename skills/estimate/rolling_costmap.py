@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from skills.api import LocalisationEstimate
 from skills.estimate.compiled import bilinear, compiled
-from skills.estimate.costmap import placed_points
 from skills.estimate.grid_map import GridMap
-from skills.estimate.scan_points import scan_points, sensor_pose
+from skills.estimate.scan_points import placed_points, scan_points, sensor_pose
 from skills.estimate.self_filter import ArmShape, SelfFilter, in_body_axes
 from skills.geometry import compose
 from skills.quantities import Count, Factor, Height, Length, Margin

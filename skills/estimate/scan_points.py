@@ -30,6 +30,20 @@ def scan_points(scan: Scan, *, azimuths: int, heights_m: tuple[float, float], ma
     return _select(ranges, scan.elevations_rad, angles, rotation, translation, limits, stride)
 
 
+def placed_points(points_F: FloatArray, X_WF: Pose2D) -> FloatArray:
+    """Points of the levelled body frame in the world, (N, 3)."""
+    c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
+    x, y = points_F[:, 0], points_F[:, 1]
+    return np.column_stack([X_WF.x_m + c * x - s * y, X_WF.y_m + s * x + c * y, points_F[:, 2]])
+
+
+def outside_discs(points_W: FloatArray, discs_W: FloatArray) -> NDArray[np.bool_]:
+    """Which of the points (N, 2 or more columns) lie in none of the discs, rows of x, y and radius (m, same frame)."""
+    offsets = np.linalg.norm(points_W[:, None, :2] - discs_W[None, :, :2], axis=2)
+    outside: NDArray[np.bool_] = (offsets > discs_W[:, 2]).all(axis=1)
+    return outside
+
+
 def sensor_pose(scan: Scan) -> tuple[FloatArray, FloatArray]:
     """Rotation (3, 3) and position (3,) of the LiDAR in frame F."""
     yaw = Pose2D.from_transform(scan.X_OB).yaw_rad

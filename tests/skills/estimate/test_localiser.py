@@ -138,3 +138,35 @@ def test_pose_is_given_in_the_world_whatever_odometry_says():
         bench.tick()
     assert bench.context().pose().x_m == pytest.approx(START.x_m, abs=0.03)
     assert bench.context().pose().yaw_rad == pytest.approx(START.yaw_rad, abs=0.02)
+
+
+def surrounded_bench() -> tuple[Bench, np.ndarray]:
+    """A robot in a corridor between three others that no map knows, and the discs that cover them."""
+    others = [Box(x - 0.3, 5.0, x + 0.3, 6.2, 0.0, 1.1) for x in (3.0, 5.6)] + [Box(3.8, 4.5, 4.8, 4.8, 0.0, 1.1)]
+    middles = [(x, y) for x in (3.0, 5.6) for y in (5.3, 5.9)] + [(4.0, 4.65), (4.6, 4.65)]
+    return Bench(Pose2D(4.3, 5.6, 0.0), unmapped=others), np.array([[*middle, 0.6] for middle in middles])
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_a_robot_amid_others_that_say_where_they_are_keeps_its_place(told: bool) -> None:
+    """Most of what it sees are the others: left out, the rest is enough; taken for walls, it is lost."""
+    bench, discs_W = surrounded_bench()
+    if told:
+        bench.localiser.leave_out(discs_W)
+    for _ in range(30):
+        bench.tick()
+    assert bench.localiser.estimate().localised == told
+
+
+def test_a_scan_of_nothing_but_other_robots_takes_no_place_away() -> None:
+    """Localised first, then all is covered: the belief goes on by odometry."""
+    bench = Bench(START)
+    for _ in range(5):
+        bench.tick()
+    before = bench.localiser.estimate()
+    bench.localiser.leave_out(np.array([[*START.transform().translation()[:2], 30.0]]))
+    for _ in range(30):
+        bench.tick()
+    after = bench.localiser.estimate()
+    assert before.localised and after.localised
+    assert np.array_equal(before.X_WO.GetAsMatrix4(), after.X_WO.GetAsMatrix4())

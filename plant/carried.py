@@ -6,8 +6,9 @@ and leave the gripper within a minute of walking. What moves with a hand is ther
 step, as on an arc. Forces, velocities and contacts stay those of the plant.
 
 Nor do such steps follow a body that spins fast: its gyroscopic torque, taken at the step's beginning, makes a flat
-wrench that flies out of the fingers spin ever faster, until nothing is finite. Free bodies therefore spin no faster
-than a step can follow.
+wrench that flies out of the fingers spin ever faster, until nothing is finite. And what turns by radians in a step
+comes to lie deep in what it touches: a can that is wrung out of the fingers at 600 rad/s leaves a table at 90 m/s
+within three steps. Free bodies therefore spin no faster, after any step, than the next one can follow.
 """
 
 from __future__ import annotations

@@ -132,7 +132,6 @@ class Engine:
         for _ in range(max(1, round(dt_s / TIME_STEP_S))):
             if self._steps % SLEEP_PERIOD_STEPS == 0:
                 self._sleepers.update(self.now())
-                self._carried.limit_spin()
             if self._steps % CONTROL_STEPS == 0:
                 self._command_robots()
             holding = [name for name, robot in self._robots.items() if robot.gripper().holding]
@@ -143,6 +142,7 @@ class Engine:
                 self.moves.before_step(self.now(), self._hands_W, holding)
             self._steps += 1
             self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
+            self._carried.limit_spin()
             for name in holding:
                 self._carried.after_step(self._hands[name], TIME_STEP_S)
             self.work["plant_steps"] += 1

@@ -17,7 +17,7 @@ from executive.mission.request import Start
 from executive.mission.robots import RobotSetup, display_name
 from executive.mission.stack_file import load_stack
 from plant.kinds import robot_kind
-from plant.worlds.placement import place_people
+from plant.worlds.placement import people_stand_W, place_people
 from plant.worlds.world import World
 from skills.estimate.grid_map import GridMap
 from skills.navigate.footprint import Footprint
@@ -95,12 +95,17 @@ def _dock(name: str, setup: RobotSetup, knowledge: Knowledge) -> Pose2D | None:
 
 
 def _free_start(free: GridMap, world: World, setup: RobotSetup, placed: Mapping[str, PlacedRobot]) -> Pose2D:
-    """The free pose nearest to the world's start, clear of the robots that stand already. Raises InputError: none."""
+    """The free pose nearest to the world's start, clear of the robots that stand already and of where people may be.
+
+    Raises InputError: there is none.
+    """
     reach_m = _reach_m(setup.kind)
     places = free.centres(np.argwhere(free.distance > max(TURNING_M, reach_m)))
     for other in placed.values():
         away_m = np.hypot(*(places - [other.start.x_m, other.start.y_m]).T)
         places = places[away_m > reach_m + _reach_m(other.kind) + BETWEEN_M]
+    for person_W in people_stand_W(world):
+        places = places[np.hypot(*(places - person_W).T) > FROM_PEOPLE_M]
     if not len(places):
         raise InputError(f"there is no room in {world.name} for one more robot", hint="leave one out, or give starts")
     x, y = places[np.argmin(np.hypot(*(places - [world.start.x_m, world.start.y_m]).T))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -154,6 +155,23 @@ def _before_start(
     x = world.start.x_m + distance * np.cos(direction)
     y = world.start.y_m + distance * np.sin(direction)
     return float(x), float(y), float(yaw)
+
+
+def people_stand_W(world: World) -> FloatArray:
+    """Places (N, 2) in the world about which people may stand or set out at some seed: those in the midst and at the
+    edges of where each of them may be.
+    """
+    places = list[tuple[float, float]]()
+    for rule in world.seed_rules.people:
+        if rule.ranges is not None:
+            distance_m, bearing_rad, _ = rule.ranges
+            for distance, bearing in itertools.product(np.linspace(*distance_m, 3), np.linspace(*bearing_rad, 5)):
+                direction = world.start.yaw_rad + bearing
+                x, y = world.start.x_m + distance * np.cos(direction), world.start.y_m + distance * np.sin(direction)
+                places.append((float(x), float(y)))
+        elif rule.route is not None:
+            places.append(route_of(rule.route, world.standing).stops[0].at_W)
+    return np.array(places).reshape(-1, 2)
 
 
 def outline_of(placement: Placement) -> FloatArray:

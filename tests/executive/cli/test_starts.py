@@ -8,6 +8,7 @@ from executive.cli.starts import PlacedRobot, alone, knowledge_for, placed_robot
 from executive.cli.worlds import knowledge_of, open_world
 from executive.mission.errors import InputError
 from executive.mission.robots import RobotSetup
+from plant.worlds.placement import place_people
 from skills.robot import Pose2D
 
 WORLD = open_world("flat")
@@ -64,3 +65,13 @@ def test_a_robot_knows_its_own_name_start_and_dock_and_the_names_of_the_others()
     known = knowledge_for("Bob", robots["Bob"], robots, KNOWN)
     assert (known.robot.name, known.robot.others) == ("Bob", ("Alice",))
     assert (known.start.x, known.start.y, known.start.yaw, known.dock) == (1.0, 2.0, 0.5, None)
+
+
+def test_no_robot_without_a_start_stands_where_a_person_may_stand():
+    """Four robots about the world's start, before which a person stands at all seeds."""
+    kinds = {"alice": "spot", "bob": "spot", "carol": "fetch", "dave": "fetch"}
+    robots = placed_robots(WORLD, KNOWN, {name: RobotSetup(kind) for name, kind in kinds.items()})
+    people = [one.X_WO.translation()[:2] for seed in range(20) for one in place_people(WORLD, seed)]
+    for name in ("Bob", "Carol", "Dave"):
+        start = robots[name].start
+        assert min(math.dist((start.x_m, start.y_m), person) for person in people) > 1.0

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
 from py_trees.common import Status
 
 from executive.mission.geometry import distance_m
@@ -17,6 +19,7 @@ from skills.geometry import compose
 from skills.quantities import Coordinate, Height
 from skills.robot import Pose2D
 
+_TURNS_RAD: Final = tuple(math.radians(turn) for turn in (0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180))
 _CORNERS: Final = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 
 
@@ -27,8 +30,8 @@ class Fallen(ExplainedLeaf):
     Writes to the blackboard: the robot's pose (`pose_key`); the point of the floor `ahead_m` before the body, where it
     fell (`spot_key`); the square of floor about it, `half_m` to each side (`floor_key`); that square with those of
     `surfaces` that lie within `within_m` of the robot, onto which it may have fallen as well (`around_key`). What the
-    gripper still holds by then has slipped, and is not yet lost: a smaller square says where to set it down
-    (`set_down_key`).
+    gripper still holds by then has slipped, and is not yet lost: a smaller square of free floor says where to
+    set it down (`set_down_key`).
     """
 
     thing: str
@@ -66,13 +69,21 @@ class Fallen(ExplainedLeaf):
         if self.context.clock.now() < self._end_s:
             self.message = f"feels whether the {self.thing} is still held"
             return Status.RUNNING
-        here = floor_square(self.context.pose(), self.set_down_ahead_m, self.set_down_half_m)
-        self.context.board.put(self.set_down_key, here)
+        self.context.board.put(self.set_down_key, self._free_floor())
         slipped = self.context.robot.gripper().holding
         happened = "slips in the gripper" if slipped else "fell"
         then = "is set down and gripped anew" if slipped else "is picked up again"
         self.cause, self.message = None, f"the {self.thing} {happened} on the way {self.to}; it {then}"
         return Status.SUCCESS
+
+    def _free_floor(self) -> Surface:
+        """Floor on which nothing stands, as straight ahead as may be: a robot at a table has the table ahead."""
+        pose, costmap = self.context.pose(), self.context.costmap
+        turned = [compose(pose, Pose2D(0.0, 0.0, turn)) for turn in _TURNS_RAD]
+        middles = [compose(each, Pose2D(self.set_down_ahead_m, 0.0, 0.0)) for each in turned]
+        clear_m = costmap.clearance_m(np.array([[middle.x_m, middle.y_m] for middle in middles]))
+        first = int(np.argmax(clear_m >= self.set_down_half_m))
+        return floor_square(turned[first], self.set_down_ahead_m, self.set_down_half_m)
 
 
 def floor_square(pose: Pose2D, ahead_m: float, half_m: float) -> Surface:

@@ -1,6 +1,7 @@
 """Where an object is looked for that fell on the way, and what is said about it."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from py_trees.common import Status
@@ -8,6 +9,8 @@ from py_trees.common import Status
 from executive.tree.behaviours.fallen import Fallen
 from skills.api import Surface
 from skills.robot import Pose2D
+from skills.testing.blocks import Block
+from skills.testing.estimators import BlockCostmap
 
 NEAR = Surface("bench", ((1.0, 0.5), (2.0, 0.5), (2.0, 1.0)), 0.8)
 FAR = Surface("shelf", ((4.0, 0.0), (5.0, 0.0), (5.0, 1.0)), 0.8)
@@ -67,3 +70,24 @@ def test_it_begins_anew_with_where_the_robot_is_then(leaf, clock, robot, context
     robot.standing = Pose2D(3.0, 0.0, 0.0)
     leaf.tick_once()
     assert (leaf.status, context.board.get("alice/pose")) == (Status.RUNNING, Pose2D(3.0, 0.0, 0.0))
+
+
+# Where obstacles stand (their middles), each 0.8 m wide -> the turn (degrees) of the floor on which it is set down.
+@pytest.mark.parametrize(
+    ("obstacles", "turn_deg"),
+    [
+        ([], 0),
+        ([(1.15, 0.0)], 60),
+        ([(1.15, 0.0), (0.6, 1.0)], -60),
+        ([(1.15 * math.cos(k * math.pi / 6), 1.15 * math.sin(k * math.pi / 6)) for k in range(12)], 0),
+    ],
+)
+def test_it_is_set_down_where_nothing_stands_as_straight_ahead_as_may_be(
+    leaf, clock, robot, context, obstacles, turn_deg
+):
+    blocks = [Block(x - 0.4, y - 0.4, x + 0.4, y + 0.4, z1=1.0) for x, y in obstacles]
+    leaf.context = replace(context, costmap=BlockCostmap(blocks))
+    ended(leaf, clock)
+    middle = [sum(axis) / 4 for axis in zip(*context.board.get("alice/set_down").polygon_W, strict=True)]
+    turn = math.radians(turn_deg)
+    assert middle == pytest.approx([1.15 * math.cos(turn), 1.15 * math.sin(turn)])

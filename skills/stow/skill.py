@@ -11,10 +11,12 @@ import numpy as np
 from skills.api import Cause, Part, Succeeded
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.poses import carry_configuration
-from skills.arm.routine import Routine
+from skills.arm.routine import Routine, SkillFailure
 
 _NEAR_X_M, _NEAR_Z_M = 0.05, 0.06
 """A hand no farther than so beyond where it carries is near the body."""
+_RAISED_M = 0.05
+"""A body no more than so above its usual height is not raised."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +38,22 @@ class Stow(ArmSkill[StowInputs]):
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
 
     def run(self, inputs: StowInputs) -> Routine[Succeeded]:
-        """Stow, or carry."""
-        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
+        """Stow, or carry. From a raised body the arm comes near first: lowered, it would press on what is under it."""
+        usual_m = self.context.robot.capabilities().standing_height_m
+        if self.context.robot.odometry().X_OB.translation()[2] > usual_m + _RAISED_M:
+            try:
+                yield from self._come_near()
+            except SkillFailure as failure:
+                if failure.cause is not Cause.PLANNING:
+                    raise
+        yield from self.stand_at(usual_m, "standing as usual")
+        return Succeeded((yield from self._come_near()))
+
+    def _come_near(self) -> Routine[str]:
+        """Fold the empty arm, or draw in what it holds where that is far from the body; says how it is then."""
         if not self.context.robot.gripper().holding:
             yield from self.stow()
-            return Succeeded("the arm is stowed")
+            return "the arm is stowed"
         X_BH = self.model.X_BH(self.q_rad())
         p_BH = X_BH.translation()
         arm = self.arm
@@ -50,4 +63,4 @@ class Stow(ArmSkill[StowInputs]):
             yield from self.move_to(
                 lambda scene, q: carry_configuration(scene, arm, rotation, q), "drawing in the arm", speed_rad_s=0.9
             )
-        return Succeeded("the object is held near the body")
+        return "the object is held near the body"

@@ -1,6 +1,9 @@
 """The stow skill: stowed when empty, near the body when holding."""
 
+from dataclasses import dataclass, field
+
 import numpy as np
+import pytest
 from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
 
 from skills.api import Cause, Succeeded
@@ -40,3 +43,24 @@ def test_a_held_thing_is_drawn_in_and_kept():
 def test_an_arm_that_is_stopped_is_a_failed_execution():
     robot = ScriptedRobot(q=OUT.copy(), arm_answers={1: CommandStatus(CommandState.STOPPED, "expired")})
     failed(Stow(context_of(robot)), StowInputs(), Cause.EXECUTION, "expired")
+
+
+@dataclass
+class Raised(ScriptedRobot):
+    """Notes where the hand is ahead of the body whenever the body is sent to another height."""
+
+    hand_x_m: list[float] = field(default_factory=list)
+
+    def stand(self, height_m, pitch_rad, *, until_s, lease):
+        self.hand_x_m.append(float(MODEL.X_BH(self.q).translation()[0]))
+        return super().stand(height_m, pitch_rad, until_s=until_s, lease=lease)
+
+
+@pytest.mark.parametrize("holding", [True, False])
+def test_the_arm_comes_near_before_a_raised_body_is_lowered(holding):
+    """Over a table, it would be pressed onto it."""
+    robot = Raised(q=OUT.copy(), holding=holding, opening=0.3 if holding else 0.0, height_m=0.62)
+    assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
+    assert robot.height_m == pytest.approx(0.52)
+    assert len(robot.hand_x_m) == 1
+    assert robot.hand_x_m[0] < 0.56 < MODEL.X_BH(OUT).translation()[0]

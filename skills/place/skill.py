@@ -14,7 +14,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.approach.standing import free_places, reachable
 from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill
-from skills.arm.collision import ArmScene, Box
+from skills.arm.collision import ArmScene, Box, box_corners
 from skills.arm.kinematics import ArmModel
 from skills.arm.poses import carry_configuration, overview_viewpoints, tucked_configuration
 from skills.arm.routine import Routine, SkillFailure
@@ -49,7 +49,7 @@ _RELAX_M = 0.003
 _FEEL_S = 0.4
 _FLOOR_M = 0.06
 _STANDS_OUT_M, _HIGHEST_M, _OFF_SURFACE_M = 0.03, 0.5, 0.01
-_BESIDE, _TUCKED_M = 0.6, 0.03
+_BESIDE, _TUCKED_M, _EDGE_M = 0.6, 0.03, 0.1
 _AT_HAND_M, _HIDDEN = 0.4, 0.5
 """A picture of which half is nearer than that, or too near to tell, shows what is held and not what lies behind it."""
 _OVER_SPOT_M = 0.45
@@ -175,8 +175,10 @@ class Place(ArmSkill[PlaceInputs]):
             if view is None or (on_floor and len(free_spots(view, self._spots(surface))) == 0):
                 view = unseen_view(surface, standing_W)
             try:
-                above = partial(self._go_above, surface, view, held)
-                return (yield from self.from_a_height(heights_m, standing, above))
+                above, X_WB = partial(self._go_above, surface, view, held), self.X_WB()
+                corners_W = X_WB.multiply(box_corners(held.box(self.model.X_BH(self.q_rad()))).T).T
+                clear_m = clear_heights(heights_m, float(X_WB.translation()[2]), corners_W, surface)
+                return (yield from self.from_a_height(clear_m, standing, above))
             except SkillFailure as failure:
                 others = roomiest_first(free_spots(view, self._spots(surface)), view, [*gone_to, spot_W])
                 if failure.cause is not Cause.PLANNING or len(others) == 0 or len(gone_to) >= self.options.moves:
@@ -415,6 +417,19 @@ class Place(ArmSkill[PlaceInputs]):
             return HeldObject(carried, np.array([gripper.grip_x_m, 0.0, 0.0]) + np.array([low_H, -low_H]))
         tip_H = np.array([gripper.tip_x_m, 0.0, 0.0])
         return HeldObject(hand_rotation(0.5 * math.pi, 0.0, 1.0), np.array([tip_H, tip_H - [0.06, 0.0, 0.0]]))
+
+
+def clear_heights(heights_m: Sequence[float], now_m: float, held_W: FloatArray, surface: Surface) -> Sequence[float]:
+    """Those heights of the body (m), the first in any case, at which what is held does not press on a surface.
+
+    `held_W` are its corners (N, 3) while the body is `now_m` high, with the arm as it stays. Only what is above the
+    surface or its edge can come to press on it.
+    """
+    room_m = float(held_W[:, 2].min()) - surface.height_m
+    if room_m < 0.0 or not inside_polygon(held_W[:, :2], surface.polygon_W, _EDGE_M).any():
+        return heights_m
+    lowest_m = now_m - room_m + _OFF_SURFACE_M
+    return [*heights_m[:1], *(height_m for height_m in heights_m[1:] if height_m > lowest_m)]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from skills.api import Cause, Failed, Running, Surface
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model
 from skills.arm.motion import RrtConnect
-from skills.place.skill import HeldObject, Place, PlaceInputs, Release, above_goal
+from skills.place.skill import HeldObject, Place, PlaceInputs, Release, above_goal, clear_heights
 from skills.robot import Pose2D
 
 MODEL = arm_model(spot_capabilities())
@@ -121,3 +121,18 @@ def test_what_is_held_from_above_is_put_down_nearer(held, off_m, reached):
 def test_before_a_high_surface_the_body_stands_up():
     skill = Place(context_of(ScriptedRobot(holding=True)))
     assert skill._heights_m(BENCH)[0] > spot_capabilities().standing_height_m == skill._heights_m(TABLE)[0]
+
+
+# Where the held object is (x, and its lowest z, with the body 0.76 m high) -> the heights that are tried.
+@pytest.mark.parametrize(
+    ("x_m", "low_m", "tried_m"),
+    [
+        (0.9, 0.9, (0.76, 0.6)),  # over the table of 0.7 m: 0.2 m of room, 1 cm of it is kept
+        (0.7, 0.9, (0.76, 0.6)),  # its edge
+        (0.4, 0.9, (0.76, 0.6, 0.5, 0.4)),  # before it
+        (0.9, 0.5, (0.76, 0.6, 0.5, 0.4)),  # under it
+    ],
+)
+def test_a_body_is_not_lowered_so_far_that_what_it_holds_is_pressed_on_the_surface(x_m, low_m, tried_m):
+    corners_W = np.array([[x_m, y, z] for y in (-0.03, 0.03) for z in (low_m, low_m + 0.1)])
+    assert tuple(clear_heights((0.76, 0.6, 0.5, 0.4), 0.76, corners_W, TABLE)) == tried_m

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.cli.durable import as_it_was
@@ -45,7 +45,8 @@ URGENT: Final = 0.5
 class FleetMission:
     """A mission of the queue: what each robot that may do it would do. The first `done` commands are done already.
 
-    It began at `since_s` (s on the robots' clock; None: not yet); `shares` are what robots did that had it before.
+    It began at `since_s` (s on the robots' clock; None: not yet); `shares` are what robots did that had it before, and
+    `tried` why one did not do it, by its name.
     """
 
     stored: StoredMission
@@ -53,6 +54,7 @@ class FleetMission:
     done: int = 0
     since_s: float | None = None
     shares: tuple[Share, ...] = ()
+    tried: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

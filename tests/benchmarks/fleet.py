@@ -26,8 +26,9 @@ from typing import Any
 
 import numpy as np
 
+from executive.cli.fleet_dispatch import FleetDispatch
 from executive.cli.fleet_report import told
-from executive.cli.fleet_run import FleetDispatch, run_fleet
+from executive.cli.fleet_run import run_fleet
 from executive.cli.fleet_setup import simulated_fleet
 from executive.cli.requests import prepare
 from executive.cli.simulated import SimulatedBackend

@@ -9,10 +9,11 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from executive.cli import entry, fleet_missions, fleet_run
+from executive.cli import entry, fleet_dispatch, fleet_missions, fleet_robots
+from executive.cli.fleet_dispatch import FleetDispatch
 from executive.cli.fleet_missions import FleetMission
 from executive.cli.fleet_report import told
-from executive.cli.fleet_run import FleetDispatch, run_fleet
+from executive.cli.fleet_run import run_fleet
 from executive.cli.page_view import PageView
 from executive.cli.requests import Prepared
 from executive.fleet.auction import Bid
@@ -28,6 +29,7 @@ from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.faults.faulty_robot import with_faults
 from skills.robot import Pose2D
+from tests.executive.conftest import default_end
 
 KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
 BEDROOM = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
@@ -49,8 +51,8 @@ class Fleet:
         self.robots = {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
         self.faults, self.make, self.missions, self.judged = {}, make, {}, []
         self.shares, self.since_s = [], []
-        monkeypatch.setattr(fleet_run, "entry_for", lambda prepared, backend, durable, work: self._entry(prepared))
-        monkeypatch.setattr(fleet_run, "bid_for", self._bid)
+        monkeypatch.setattr(fleet_dispatch, "entry_for", lambda prepared, backend, durable, work: self._entry(prepared))
+        monkeypatch.setattr(fleet_robots, "bid_for", self._bid)
         monkeypatch.setattr(fleet_missions, "prepared_for", lambda r, mission, *_: self._prepared(r, mission))
 
     def _entry(self, prepared):
@@ -390,3 +392,58 @@ def test_a_robot_that_gave_up_finding_its_place_is_lost_whatever_it_believes_aft
 
     script.ends.update(navigate=lose, relocalise=give_up)
     assert fleet.run() == [("Bob", "success", 1)]
+
+
+def sees_nothing(script, *names):
+    """Only robots that are not named see the object."""
+
+    def detect(skill):
+        if skill.context.robot.name in names:
+            return Failed(Cause.POSTCONDITION, "no coke was seen")
+        return default_end(script, "detect")(skill)
+
+    return detect
+
+
+def test_what_one_robot_does_not_find_the_other_is_sent_for(fleet, script):
+    fleet.queue(TAKE)
+    script.ends.update(detect=sees_nothing(script, "Alice"), grasp=fleet.hold)
+    assert fleet.run() == [("Bob", "success", 1)]
+
+
+def test_what_fell_down_is_taken_by_the_other(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT)
+
+    def lose(skill):
+        fleet.robots[skill.context.robot.name].let_go()
+        return Failed(Cause.EXECUTION, "it slipped")
+
+    script.ends["grasp"] = fleet.hold
+    script.ends["place"] = lambda skill: (lose if skill.context.robot.name == "Alice" else fleet.put_down)(skill)
+    assert fleet.run() == [("Bob", "success", 1)]
+    assert fleet.robots["Alice"].holding is fleet.robots["Bob"].holding is False
+
+
+def test_what_the_first_still_holds_is_not_given_to_the_other(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT)
+    script.ends.update(grasp=fleet.hold, place=lambda skill: Failed(Cause.PLANNING, "no place"))
+    assert [outcome for _, outcome, _ in fleet.run()] == ["failure"]
+    assert fleet.rows[0]["reassigned"] == 0
+
+
+def test_what_neither_robot_manages_ends_with_the_words_of_both(fleet, script):
+    fleet.queue(TAKE)
+    script.ends["detect"] = sees_nothing(script, "Alice", "Bob")
+    assert fleet.run() == [("Bob", "failure", 1)]
+    assert "; Alice before: it tried: " in fleet.message(1)
+
+
+def test_what_the_other_cannot_do_stays_with_the_first(fleet, script):
+    fleet.queue(TAKE)
+    fleet.unable = {"Bob"}
+    script.ends["detect"] = sees_nothing(script, "Alice")
+    assert fleet.run() == [("Alice", "failure", 0)]

@@ -1,0 +1,75 @@
+"""The robots of a fleet as work is given out to them, and what they offer for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from executive.cli.feasibility import route_planner_of
+from executive.cli.fleet_missions import FleetMission, RobotNow, bid_for
+from executive.cli.fleet_progress import Progress, ProgressJournal
+from executive.cli.requests import Prepared
+from executive.cli.starts import PlacedRobot
+from executive.fleet.auction import Bid
+from executive.mission.knowledge import BatteryFacts
+from executive.run.runner import RunEntry
+from executive.tree.estimate import RoutePlanner
+from skills.robot import Pose2D
+
+__all__ = ["FleetRobot", "Offers"]
+
+
+@dataclass
+class FleetRobot:
+    """A robot of the fleet: where it is free next, and from when (s on the robots' clock).
+
+    Its mission to `dock` is None where it cannot charge.
+    """
+
+    placed: PlacedRobot
+    pose: Pose2D
+    charge: float = 1.0
+    free_at_s: float = 0.0
+    entry: RunEntry | None = None
+    journal: ProgressJournal | None = None
+    dock: Prepared | None = None
+    planner: RoutePlanner | None = None
+    faults: tuple[str, ...] = ()
+
+    @property
+    def progress(self) -> Progress:
+        """How far the mission is that it has."""
+        return Progress(0) if self.journal is None else self.journal.progress
+
+
+class Offers:
+    """What robots offer for missions; each route is planned once for each place that it is offered from."""
+
+    def __init__(self, robots: Mapping[str, FleetRobot], battery: BatteryFacts, now: Callable[[], float]) -> None:
+        """`now` is the robots' clock (s)."""
+        self._robots, self._battery, self._now = robots, battery, now
+        self._known: dict[tuple[int, str, int, Pose2D, float, bool], Bid] = {}
+
+    def known(self, wanted: FleetMission, name: str, *, resting: bool) -> Bid:
+        """What a robot offers for a mission of the queue."""
+        robot = self._robots[name]
+        if (tried := wanted.tried.get(name)) is not None:
+            return Bid(wanted.stored.id, name, 0.0, 0.0, problems=(tried,))
+        key = (wanted.stored.id, name, wanted.done, robot.pose, robot.charge, resting)
+        if key not in self._known:
+            self._known[key] = self.new(wanted, name, resting=resting)
+        return replace(self._known[key], ready_s=self._ready_s(robot))
+
+    def new(self, wanted: FleetMission, name: str, *, resting: bool) -> Bid:
+        """What a robot offers from where it is free next; one that is `resting` from its dock."""
+        robot = self._robots[name]
+        if robot.planner is None:
+            some = wanted.options.get(name, next(iter(wanted.options.values())))
+            robot.planner = route_planner_of(some.world, some.request.stack, robot.placed.kind, kept=False)
+        now = RobotNow(robot.pose, robot.charge, self._battery.low, robot.planner, robot.dock)
+        if resting and robot.dock is not None:
+            now = replace(now, pose=robot.dock.world.dock or robot.pose, charge=self._battery.charged)
+        return replace(bid_for(wanted, name, now), ready_s=self._ready_s(robot))
+
+    def _ready_s(self, robot: FleetRobot) -> float:
+        return max(0.0, robot.free_at_s - self._now())

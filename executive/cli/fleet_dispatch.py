@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Final
 
 from rich.console import Console
 
@@ -22,7 +23,7 @@ from executive.cli.starts import PlacedRobot
 from executive.fleet.auction import Bid
 from executive.fleet.dispatcher import Dispatcher
 from executive.mission.errors import listing
-from executive.mission.knowledge import BatteryFacts
+from executive.mission.knowledge import BatteryFacts, SurfaceFacts
 from executive.mission.scenario import Scenario
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
@@ -34,8 +35,13 @@ from executive.run.runner import RunEntry
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.node_view import node_view
+from skills.robot import Pose2D
 
 __all__ = ["FleetDispatch"]
+
+
+LEFT_M: Final = 1.5
+"""A robot that has come so far has left the table where it put something down for another."""
 
 
 @dataclass
@@ -72,6 +78,7 @@ class FleetDispatch:
         self._gone: dict[str, str] = {}
         self._recalled: set[str] = set()
         self._to_dock: list[str] = []
+        self._leaving: dict[str, tuple[int, Pose2D]] = {}
         self._work = Work()
         self.over: list[EndedMission] = []
 
@@ -83,6 +90,7 @@ class FleetDispatch:
     def begin(self) -> Sequence[RunEntry]:
         """The missions that begin now."""
         entries: list[RunEntry] = []
+        self._let_follow({})
         given = self._dispatcher.assign(self._bid)
         refused = {number: why for number, why in given.refused.items() if not self._split(number)}
         for number, why in refused.items():
@@ -107,7 +115,7 @@ class FleetDispatch:
     def _split(self, number: int) -> bool:
         """Have a mission done in two parts, as no robot can do it alone; whether two can."""
         mission = self.missions[number]
-        chain = None if number in self._parts else chained(mission, self._offer)
+        chain = None if number in self._parts else chained(mission, self._offer, self._takes_from)
         if chain is None:
             return False
         names = [f"{mission.stored.request.name}, part {part} of 2" for part in (1, 2)]
@@ -128,12 +136,22 @@ class FleetDispatch:
 
     def recalled(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
         """The robots that are low and have nothing in hand; and those that charge when nothing is left to do."""
+        self._let_follow(seen)
         under_way = self._dispatcher.under_way
         low = {name: each for name, each in seen.items() if name in under_way and self._may_leave(name, each)}
         idle = self._dispatcher.resting if not under_way and not self._dispatcher.waiting else ()
         self._recalled = {*low, *idle}
         why = {name: f"its battery is at {each.charge:.0%}" for name, each in low.items()}
         return {**why, **dict.fromkeys(idle, "nothing is left to do")}
+
+    def _let_follow(self, seen: Mapping[str, RobotStatus]) -> None:
+        """The next part begins when the robot of the one before has left the table, or does not leave it."""
+        for name, (number, from_W) in tuple(self._leaving.items()):
+            pose = seen[name].pose if name in seen else None
+            gone_m = 0.0 if pose is None else math.hypot(pose.x_m - from_W.x_m, pose.y_m - from_W.y_m)
+            if name not in self._dispatcher.resting or gone_m > LEFT_M:
+                del self._leaving[name]
+                self._dispatcher.done(number)
 
     def _may_leave(self, name: str, seen: RobotStatus) -> bool:
         """Whether a robot is low, can charge, and leaves nothing half done."""
@@ -244,6 +262,9 @@ class FleetDispatch:
     def _offer(self, wanted: FleetMission, name: str) -> Bid:
         return self._offers.new(wanted, name, resting=name in self._dispatcher.resting)
 
+    def _takes_from(self, name: str, table: SurfaceFacts) -> bool:
+        return self._offers.takes_from(name, table)
+
     def _dock_entry(self, name: str) -> RunEntry:
         """A robot goes to its dock and charges."""
         robot = self._robots[name]
@@ -342,6 +363,7 @@ class FleetDispatch:
         name = share.tree.robot_name
         if following and name in self._dispatcher.robots and self._robots[name].dock is not None:
             self._leave_for_dock(name)
+            self._leaving[name] = (number, self._robots[name].pose)
         if whole is not None and not following:
             self._given.judge(whole, seen)
 
@@ -349,7 +371,8 @@ class FleetDispatch:
         self.store.finish(number, state, message)
         self._tell(f"Mission {number}: {state.value}: {message}")
         if state is MissionState.SUCCESS:
-            self._dispatcher.done(number)
+            if all(number != part for part, _ in self._leaving.values()):
+                self._dispatcher.done(number)
         else:
             self._dispatcher.drop(number)
         self._given.settle()

@@ -17,7 +17,7 @@ from executive.language.robots import Part, Whom
 from executive.mission.command import Command, Task
 from executive.mission.errors import InputError
 from executive.mission.file.model import Mission
-from executive.mission.knowledge import Knowledge, Pose
+from executive.mission.knowledge import Knowledge
 from executive.mission.mission import mission_from_lines
 from executive.mission.request import Request
 from executive.store.missions import MissionStore, StoredMission
@@ -33,6 +33,7 @@ __all__ = [
     "charging_missions",
     "charging_time_s",
     "fleet_mission",
+    "is_way",
     "rest_of",
     "with_commands",
 ]
@@ -206,15 +207,15 @@ def _out_of_reach(prepared: Prepared, now: RobotNow) -> Iterator[str]:
         place = None if command.goal is None else knowledge.place(command.goal)
         usual = knowledge.usual_surfaces(command.object.name) if place is None else (place,)
         surfaces = [name for spot in usual for name in knowledge.surfaces_in(spot)]
-        if surfaces and not any(
-            _is_way(now, view) for name in surfaces for view in knowledge.surfaces[name].viewpoints
-        ):
+        views = [view for name in surfaces for view in knowledge.surfaces[name].viewpoints]
+        if surfaces and not any(is_way(now.planner, now.pose, Pose2D(each.x, each.y, each.yaw)) for each in views):
             yield f"there is no way to the {place or surfaces[0]}, where the {command.object} is to be taken"
 
 
-def _is_way(now: RobotNow, pose: Pose) -> bool:
+def is_way(planner: RoutePlanner, start: Pose2D, goal: Pose2D) -> bool:
+    """Whether there is a route."""
     try:
-        now.planner.route(now.pose, Pose2D(pose.x, pose.y, pose.yaw))
+        planner.route(start, goal)
     except ValueError:
         return False
     return True

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
 
 from executive.cli.feasibility import route_planner_of
-from executive.cli.fleet_missions import FleetMission, RobotNow, bid_for
+from executive.cli.fleet_missions import FleetMission, RobotNow, bid_for, is_way
 from executive.cli.fleet_progress import Progress, ProgressJournal
 from executive.cli.requests import Prepared
 from executive.cli.starts import PlacedRobot
 from executive.fleet.auction import Bid
-from executive.mission.knowledge import BatteryFacts
+from executive.mission.knowledge import BatteryFacts, SurfaceFacts
 from executive.run.runner import RunEntry
 from executive.tree.estimate import RoutePlanner
+from plant.kinds import robot_kind
+from skills.api import Surface
+from skills.geometry import wrap
+from skills.place.free_spot import spots
 from skills.robot import Pose2D
 
 __all__ = ["FleetRobot", "Offers"]
+
+_HEADINGS: Final = 16
 
 
 @dataclass
@@ -70,6 +80,24 @@ class Offers:
         if resting and robot.dock is not None:
             now = replace(now, pose=robot.dock.world.dock or robot.pose, charge=self._battery.charged)
         return replace(bid_for(wanted, name, now), ready_s=self._ready_s(robot))
+
+    def takes_from(self, name: str, table: SurfaceFacts) -> bool:
+        """Whether a robot that has offered something has a way to where it reaches what another one puts on a table.
+
+        That is nearest to the first viewpoint, from which it is put down.
+        """
+        robot, arm = self._robots[name], robot_kind(self._robots[name].placed.kind).capabilities().arm
+        view, planner = table.viewpoints[0], robot.planner
+        if arm is None or planner is None:
+            return False
+        there = spots(Surface("table", table.polygon, table.height))
+        x, y = min(there, key=lambda spot: float(np.hypot(*(spot - [view.x, view.y]))))
+        yaws = [wrap(2.0 * math.pi * n / _HEADINGS) for n in range(_HEADINGS)]
+        return any(
+            is_way(planner, robot.pose, Pose2D(x - d_m * math.cos(yaw), y - d_m * math.sin(yaw), yaw))
+            for d_m in arm.standing_m
+            for yaw in yaws
+        )
 
     def _ready_s(self, robot: FleetRobot) -> float:
         return max(0.0, robot.free_at_s - self._now())

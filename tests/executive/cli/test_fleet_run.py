@@ -53,6 +53,8 @@ class Fleet:
         self.shares, self.since_s = [], []
         monkeypatch.setattr(fleet_dispatch, "entry_for", lambda prepared, backend, durable, work: self._entry(prepared))
         monkeypatch.setattr(fleet_robots, "bid_for", self._bid)
+        self.tables = None
+        monkeypatch.setattr(fleet_robots.Offers, "takes_from", self._takes_from)
         monkeypatch.setattr(fleet_missions, "prepared_for", lambda r, mission, *_: self._prepared(r, mission))
 
     def _entry(self, prepared):
@@ -66,6 +68,9 @@ class Fleet:
         unable = name in self.unable or any(self.cannot(name, command) for command in commands)
         problems = ("out of reach",) if unable else ()
         return Bid(mission.stored.id, name, 0.0, 1.0 + 0.5 * ROBOTS.index(name), problems=problems)
+
+    def _takes_from(self, name, table):
+        return self.tables is None or table.place in self.tables
 
     def _prepared(self, request, mission):
         tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
@@ -311,6 +316,27 @@ def test_the_first_robot_leaves_the_table_to_the_second_and_goes_to_its_dock(cha
     chain.run()
     assert script.begun.count("charge") == 1
     assert [robot.holder for robot in chain.robots.values()] == [None, None]
+
+
+def test_where_the_second_robot_does_not_reach_what_the_first_puts_down_nothing_is_handed_over(chain):
+    chain.tables = ()
+    assert chain.run() == [(None, "failure", 0)]
+
+
+def test_the_second_part_begins_when_the_first_robot_has_left_the_table(chain, script):
+    begun = []
+
+    def charge(skill):
+        begun.append(len([each for each in script.begun if each == "grasp"]))
+        alice = chain.robots["Alice"]
+        if len(begun) < 5:
+            return Running("on its way")
+        alice.standing = Pose2D(2.0, 0.0, 0.0)
+        return Running("far enough") if len(begun) < 400 else chain.charge(skill)
+
+    script.ends["charge"] = charge
+    assert [outcome for _, outcome, _ in chain.run()] == ["success"] * 3
+    assert (begun[4], begun[-1]) == (1, 2)
 
 
 def test_when_the_first_part_fails_the_second_is_not_begun(chain, script):

@@ -257,10 +257,14 @@ class FleetDispatch:
         return self.backend.clock.now()
 
     def _bid(self, mission: int, name: str) -> Bid:
-        return self._offers.known(self.missions[mission], name, resting=name in self._dispatcher.resting)
+        resting = name in self._dispatcher.resting
+        busy = resting or name in self._dispatcher.under_way
+        return self._offers.known(self.missions[mission], name, busy=busy, resting=resting)
 
     def _offer(self, wanted: FleetMission, name: str) -> Bid:
-        return self._offers.new(wanted, name, resting=name in self._dispatcher.resting)
+        resting = name in self._dispatcher.resting
+        busy = resting or name in self._dispatcher.under_way
+        return self._offers.new(wanted, name, busy=busy, resting=resting)
 
     def _takes_from(self, name: str, table: SurfaceFacts) -> bool:
         return self._offers.takes_from(name, table)

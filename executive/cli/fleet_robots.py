@@ -46,6 +46,11 @@ class FleetRobot:
     planner: RoutePlanner | None = None
     faults: tuple[str, ...] = ()
 
+    def ready_s(self, now_s: float, *, busy: bool) -> float:
+        """In how long it is free (s). What is late is expected to be as late again."""
+        left_s = self.free_at_s - now_s
+        return abs(left_s) if busy else max(0.0, left_s)
+
     @property
     def progress(self) -> Progress:
         """How far the mission is that it has."""
@@ -60,18 +65,19 @@ class Offers:
         self._robots, self._battery, self._now = robots, battery, now
         self._known: dict[tuple[int, str, int, Pose2D, float, bool], Bid] = {}
 
-    def known(self, wanted: FleetMission, name: str, *, resting: bool) -> Bid:
+    def known(self, wanted: FleetMission, name: str, *, busy: bool, resting: bool) -> Bid:
         """What a robot offers for a mission of the queue."""
         robot = self._robots[name]
         if (tried := wanted.tried.get(name)) is not None:
             return Bid(wanted.stored.id, name, 0.0, 0.0, problems=(tried,))
         key = (wanted.stored.id, name, wanted.done, robot.pose, robot.charge, resting)
         if key not in self._known:
-            self._known[key] = self.new(wanted, name, resting=resting)
-        return replace(self._known[key], ready_s=self._ready_s(robot))
+            self._known[key] = self.new(wanted, name, busy=busy, resting=resting)
+        return replace(self._known[key], ready_s=robot.ready_s(self._now(), busy=busy))
 
-    def new(self, wanted: FleetMission, name: str, *, resting: bool) -> Bid:
-        """What a robot offers from where it is free next; one that is `resting` from its dock."""
+    def new(self, wanted: FleetMission, name: str, *, busy: bool, resting: bool) -> Bid:
+        """What a robot offers from where it is free next; one that is `resting` from its dock, and is `busy` as one is
+        that has a mission."""
         robot = self._robots[name]
         if robot.planner is None:
             some = wanted.options.get(name, next(iter(wanted.options.values())))
@@ -79,7 +85,7 @@ class Offers:
         now = RobotNow(robot.pose, robot.charge, self._battery.low, robot.planner, robot.dock)
         if resting and robot.dock is not None:
             now = replace(now, pose=robot.dock.world.dock or robot.pose, charge=self._battery.charged)
-        return replace(bid_for(wanted, name, now), ready_s=self._ready_s(robot))
+        return replace(bid_for(wanted, name, now), ready_s=robot.ready_s(self._now(), busy=busy))
 
     def takes_from(self, name: str, table: SurfaceFacts) -> bool:
         """Whether a robot that has offered something has a way to where it reaches what another one puts on a table.
@@ -98,6 +104,3 @@ class Offers:
             for d_m in arm.standing_m
             for yaw in yaws
         )
-
-    def _ready_s(self, robot: FleetRobot) -> float:
-        return max(0.0, robot.free_at_s - self._now())

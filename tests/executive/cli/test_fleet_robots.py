@@ -34,3 +34,9 @@ def test_a_robot_takes_over_only_what_it_can_come_near_to(clock, x_m, reached):
     robot = FleetRobot(SimpleNamespace(kind="spot"), Pose2D(11.0, 2.0, 0.0), planner=EastOf(x_m))
     offers = Offers({"Bob": robot}, BatteryFacts(), clock.now)
     assert offers.takes_from("Bob", TABLE) is reached
+
+
+@pytest.mark.parametrize(("now_s", "busy", "ready_s"), [(20.0, True, 80.0), (150.0, True, 50.0), (150.0, False, 0.0)])
+def test_a_robot_that_is_late_is_expected_to_be_as_late_again(now_s, busy, ready_s):
+    robot = FleetRobot(SimpleNamespace(kind="spot"), Pose2D(11.0, 2.0, 0.0), free_at_s=100.0)
+    assert robot.ready_s(now_s, busy=busy) == ready_s

@@ -53,7 +53,7 @@ class Fleet:
         self.shares, self.since_s = [], []
         monkeypatch.setattr(fleet_dispatch, "entry_for", lambda prepared, backend, durable, work: self._entry(prepared))
         monkeypatch.setattr(fleet_robots, "bid_for", self._bid)
-        self.tables = None
+        self.tables, self.slower_s = None, 0.5
         monkeypatch.setattr(fleet_robots.Offers, "takes_from", self._takes_from)
         monkeypatch.setattr(fleet_missions, "prepared_for", lambda r, mission, *_: self._prepared(r, mission))
 
@@ -67,7 +67,7 @@ class Fleet:
         commands = () if prepared is None else prepared.tree.commands
         unable = name in self.unable or any(self.cannot(name, command) for command in commands)
         problems = ("out of reach",) if unable else ()
-        return Bid(mission.stored.id, name, 0.0, 1.0 + 0.5 * ROBOTS.index(name), problems=problems)
+        return Bid(mission.stored.id, name, 0.0, 1.0 + self.slower_s * ROBOTS.index(name), problems=problems)
 
     def _takes_from(self, name, table):
         return self.tables is None or table.place in self.tables
@@ -473,3 +473,16 @@ def test_what_the_other_cannot_do_stays_with_the_first(fleet, script):
     fleet.unable = {"Bob"}
     script.ends["detect"] = sees_nothing(script, "Alice")
     assert fleet.run() == [("Alice", "failure", 0)]
+
+
+def test_a_mission_does_not_wait_for_a_robot_that_is_late(fleet, script):
+    for line in (KITCHEN, KITCHEN, KITCHEN):
+        fleet.queue(line)
+    fleet.slower_s = 1.5
+
+    def arrive(skill):
+        late = skill.context.robot.name == "Alice" and fleet.clock.now() < 20.0
+        return Running("does not get on") if late else Succeeded("there")
+
+    script.ends["navigate"] = arrive
+    assert [robot for robot, *_ in fleet.run()] == ["Alice", "Bob", "Bob"]

@@ -29,6 +29,7 @@ from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.faults.faulty_robot import with_faults
 from skills.robot import Pose2D
+from tests.benchmarks.fleet import begun_again
 from tests.executive.conftest import default_end
 
 KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
@@ -165,6 +166,20 @@ def test_commands_that_are_done_are_not_done_again_by_the_other(fleet, script, r
     assert (script.begun.count("grasp"), script.begun.count("place")) == (1, 1)
     assert (fleet.robots["Alice"].holding, fleet.robots["Bob"].calls.count("drive")) == (False, script.steps)
     assert (fleet.judged, fleet.shares, fleet.since_s) == ([("Bob", "success")], [("Alice", 2)], [0.0])
+    assert begun_again(read_events(fleet.out / "log.mcap")) == []
+
+
+def test_a_command_that_was_begun_again_after_it_was_done_is_found_in_the_log(fleet, script):
+    fleet.queue(KITCHEN, BEDROOM)
+    fleet.run()
+    (event,) = (each for each in read_events(fleet.out / "log.mcap") if _begins_first_command(each))
+    events = list(read_events(fleet.out / "log.mcap"))
+    last = max(n for n, each in enumerate(events) if each.topic == "transitions" and each.data["to"] == "SUCCESS")
+    assert begun_again([*events[:last], event, *events[last:]]) == [f"mission 1: {KITCHEN}"]
+
+
+def _begins_first_command(event):
+    return event.topic == "transitions" and event.data["node"].endswith("/1-kitchen") and event.data["to"] == "RUNNING"
 
 
 def test_what_is_in_the_gripper_of_a_robot_that_dies_is_told_and_not_fetched_again(fleet, script, registry):

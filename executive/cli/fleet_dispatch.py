@@ -249,8 +249,9 @@ class FleetDispatch:
         for number in self.waiting:
             given = handed_back.get(number)
             if given is not None and given.robot is not None:
-                reasons = listing([f"{name}: {why}" for name, why in self._gone.items()])
-                self._finish(number, MissionState.FAILURE, f"no robot is left to go on with it ({reasons})")
+                why = {**self._gone, **self.missions[number].tried}
+                reasons = listing([f"{name}: {each}" for name, each in why.items()])
+                self._finish(number, MissionState.FAILURE, f"no robot went on with it ({reasons})")
 
     @property
     def _now_s(self) -> float:

@@ -12,11 +12,12 @@ from executive.fleet.auction import Bid
 from executive.fleet.chain import Chain, Split, soonest, splits
 from executive.mission.command import Command
 from executive.mission.errors import InputError
-from executive.mission.knowledge import Knowledge
+from executive.mission.knowledge import Knowledge, SurfaceFacts
 
 __all__ = ["ChainedMission", "chained"]
 
 BidOn = Callable[[FleetMission, str], Bid]
+TakesFrom = Callable[[str, SurfaceFacts], bool]
 
 
 @dataclass(frozen=True)
@@ -28,15 +29,15 @@ class ChainedMission:
     table: str | None
 
 
-def chained(mission: FleetMission, bid: BidOn) -> ChainedMission | None:
+def chained(mission: FleetMission, bid: BidOn, takes_from: TakesFrom) -> ChainedMission | None:
     """The mission in two parts that is done first by two robots; None: no two can do it, or it has more than commands.
 
-    `bid` is asked what each robot offers for a part.
+    `bid` is asked what each robot offers for a part, `takes_from` whether it reaches what another one puts on a table.
     """
     prepared = next(iter(mission.options.values()))
     if len(mission.options) < 2 or not is_plain(prepared.tree):
         return None
-    parts = _Parts(mission, bid)
+    parts = _Parts(mission, bid, takes_from)
     found = [chain for split in splits(prepared.tree.commands, _tables(prepared.knowledge)) if (chain := parts(split))]
     best = min(found, key=lambda chain: chain.ends_s, default=None)
     if best is None:
@@ -52,8 +53,8 @@ def _tables(knowledge: Knowledge) -> Sequence[str]:
 class _Parts:
     """Asks for bids on parts of one mission; what a robot could not even begin is asked once for all tables."""
 
-    def __init__(self, mission: FleetMission, bid: BidOn) -> None:
-        self._mission, self._bid = mission, bid
+    def __init__(self, mission: FleetMission, bid: BidOn, takes_from: TakesFrom) -> None:
+        self._mission, self._bid, self._takes_from = mission, bid, takes_from
         self._able: dict[tuple[Command, ...], tuple[str, ...]] = {}
 
     def __call__(self, split: Split) -> Chain | None:
@@ -62,7 +63,14 @@ class _Parts:
         if begins not in self._able:
             self._able[begins] = tuple(bid.robot for bid in self._bids(begins, self._mission.options))
         first = self._bids(split.first, self._able[begins])
-        return soonest(split, first, self._bids(split.second, self._mission.options)) if first else None
+        if not first:
+            return None
+        second = self._bids(split.second, self._mission.options)
+        return soonest(split, first, [each for each in second if self._takes(each.robot, split.table)])
+
+    def _takes(self, robot: str, table: str | None) -> bool:
+        surfaces = self._mission.options[robot].knowledge.surfaces
+        return table is None or self._takes_from(robot, surfaces[table])
 
     def options(self, commands: tuple[Command, ...]) -> Mapping[str, Prepared]:
         """What each robot would do; one that has no way to do it at all is left out."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.cli.durable import as_it_was
@@ -17,7 +17,7 @@ from executive.language.robots import Part, Whom
 from executive.mission.command import Command, Task
 from executive.mission.errors import InputError
 from executive.mission.file.model import Mission
-from executive.mission.knowledge import Knowledge, Pose
+from executive.mission.knowledge import Knowledge
 from executive.mission.mission import mission_from_lines
 from executive.mission.request import Request
 from executive.store.missions import MissionStore, StoredMission
@@ -33,6 +33,7 @@ __all__ = [
     "charging_missions",
     "charging_time_s",
     "fleet_mission",
+    "is_way",
     "rest_of",
     "with_commands",
 ]
@@ -45,7 +46,8 @@ URGENT: Final = 0.5
 class FleetMission:
     """A mission of the queue: what each robot that may do it would do. The first `done` commands are done already.
 
-    It began at `since_s` (s on the robots' clock; None: not yet); `shares` are what robots did that had it before.
+    It began at `since_s` (s on the robots' clock; None: not yet); `shares` are what robots did that had it before, and
+    `tried` why one did not do it, by its name.
     """
 
     stored: StoredMission
@@ -53,6 +55,7 @@ class FleetMission:
     done: int = 0
     since_s: float | None = None
     shares: tuple[Share, ...] = ()
+    tried: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -204,15 +207,15 @@ def _out_of_reach(prepared: Prepared, now: RobotNow) -> Iterator[str]:
         place = None if command.goal is None else knowledge.place(command.goal)
         usual = knowledge.usual_surfaces(command.object.name) if place is None else (place,)
         surfaces = [name for spot in usual for name in knowledge.surfaces_in(spot)]
-        if surfaces and not any(
-            _is_way(now, view) for name in surfaces for view in knowledge.surfaces[name].viewpoints
-        ):
+        views = [view for name in surfaces for view in knowledge.surfaces[name].viewpoints]
+        if surfaces and not any(is_way(now.planner, now.pose, Pose2D(each.x, each.y, each.yaw)) for each in views):
             yield f"there is no way to the {place or surfaces[0]}, where the {command.object} is to be taken"
 
 
-def _is_way(now: RobotNow, pose: Pose) -> bool:
+def is_way(planner: RoutePlanner, start: Pose2D, goal: Pose2D) -> bool:
+    """Whether there is a route."""
     try:
-        now.planner.route(now.pose, Pose2D(pose.x, pose.y, pose.yaw))
+        planner.route(start, goal)
     except ValueError:
         return False
     return True

@@ -21,10 +21,11 @@ _TOUCHED: Final = (Status.RUNNING, Status.SUCCESS)
 @dataclass(frozen=True)
 class Progress:
     """What of a tree is done: the first `done` commands for good, and whether what comes after has been `begun`: a
-    skill that changes the world has done its work, or does it."""
+    skill that changes the world has done its work, or does it; with `put`, one that gives away what was taken."""
 
     done: int
-    begun: bool
+    begun: bool = False
+    put: bool = False
 
 
 def is_plain(tree: CompiledTree) -> bool:
@@ -47,8 +48,8 @@ def progress_of(tree: CompiledTree, statuses: Callable[[str], Status | None]) ->
         if after == len(tree.parts) or tree.commands[after].item is None:
             done = after
     over = {part.path_id for part in tree.parts[:done]}
-    begun = any(statuses(leaf.path_id) in _TOUCHED for leaf in _changing(tree.mission, over))
-    return Progress(done, begun)
+    begun = [leaf for leaf in _changing(tree.mission, over) if statuses(leaf.path_id) in _TOUCHED]
+    return Progress(done, bool(begun), any(not leaf.options["skill"].gripper_after for leaf in begun))
 
 
 def is_lost(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> bool:
@@ -72,7 +73,7 @@ class ProgressJournal:
     def __init__(self, tree: CompiledTree, tell: Callable[[Progress], None]) -> None:
         self._tree, self._tell = tree, tell
         self._statuses: dict[str, Status] = {}
-        self.progress = Progress(0, False)
+        self.progress = Progress(0)
 
     def note(self, note: TickNote) -> None:
         """Keep what a tick brought."""

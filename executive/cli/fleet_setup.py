@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from rich.console import Console
 
+from executive.cli.fleet_dispatch import FleetDispatch
 from executive.cli.fleet_missions import charging_missions, fleet_mission
-from executive.cli.fleet_run import FleetDispatch
 from executive.cli.simulated import SimulatedBackend
 from executive.cli.starts import placed_robots
 from executive.cli.worlds import knowledge_of, open_world

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from executive.run.control import Control
 from executive.run.endings import ending_of
+from executive.run.opening import RunEntry
 from executive.run.outcome import Outcome, RobotResult, RobotStatus
 from executive.run.session import Session
 from executive.run.tree_run import Ending
 from executive.run.watchdog import VerbHung
 from executive.tree.compiler import CompiledTree
 from skills.api import Cause, Publish
-
-if TYPE_CHECKING:
-    from executive.run.runner import RunEntry
 
 __all__ = ["Dispatch", "DispatchedSessions", "MissionEnd", "never_began"]
 

@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Final, TypeVar, cast
+from typing import TypeVar
 
 from executive.mission.errors import disk_is_full
 from executive.record.profile import Profile
@@ -17,69 +17,24 @@ from executive.record.work import Work
 from executive.run.control import Control, ControlRequests, Event
 from executive.run.dispatch import Dispatch, DispatchedSessions, never_began
 from executive.run.endings import CancelledError, LastingLog, TimeOverError, ending_of
-from executive.run.guarded_robot import GuardedRobot
-from executive.run.journal import Journal
+from executive.run.opening import Opening, RunEntry, RunSettings
 from executive.run.outcome import Outcome, RobotStatus, RunResult
-from executive.run.resting import HOLDER, Resting, Spare, WithoutWork
+from executive.run.resting import Resting, WithoutWork
 from executive.run.session import Session
 from executive.run.traffic import TrafficTable
 from executive.run.tree_run import Ending
-from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog
-from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.context import RunContext
+from executive.run.watchdog import VerbHung
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.builder import slug
 from executive.tree.snapshot import Snapshot
-from skills.api import Cause, Costmap, Detector, LeavesOthersOut, Localiser, Publish, Worker
-from skills.detection import NO_DETECTOR
-from skills.navigate.footprint import Footprint
-from skills.robot import Clock, Lease, Pose2D, Robot
-from skills.stack import RobotStack, default_stack
-from skills.traffic import NO_TRAFFIC
+from skills.api import Cause, LeavesOthersOut, Publish, Worker
+from skills.robot import Clock
 
 _WAYS_PERIOD_S = 0.5
 ResultT = TypeVar("ResultT")
-_NO_LEASE: Final = Lease("", "", 0)
 
-
-@dataclass(frozen=True)
-class RunEntry:
-    """One robot with its tree, estimators, detector, stack, and the journal of its mission.
-
-    The mission begins when the robots `after` have done theirs, and cannot when one of them fails; whoever asked for it
-    stands at `speaker_W` (world frame; None: where the robot begins).
-    """
-
-    tree: CompiledTree
-    robot: Robot
-    localiser: Localiser
-    costmap: Costmap
-    journal: Journal | None = None
-    detector: Detector = NO_DETECTOR
-    stack: RobotStack = field(default_factory=default_stack)
-    after: tuple[str, ...] = ()
-    speaker_W: Pose2D | None = None
-
-
-@dataclass(frozen=True)
-class RunSettings:
-    """Seed, tick period and limits. `time_limit_s` counts the robots' clock for the whole run, without pauses, and
-    `endings_limit_s` what missions that were cancelled always do in the end. `time_of_day_s` is the time of day (s
-    after midnight) at which the run begins; None: what it is on this machine.
-
-    The other limits are the watchdog's, on the wall clock: for one verb, for taking a picture, for one robot's tick.
-    """
-
-    seed: int = 0
-    tick_period_s: float = 0.05
-    time_limit_s: float = 1200.0
-    endings_limit_s: float = 120.0
-    time_of_day_s: float | None = None
-    verb_limit_s: float = VERB_LIMIT_S
-    image_limit_s: float = IMAGE_LIMIT_S
-    tick_limit_s: float = TICK_LIMIT_S
+__all__ = ["Observer", "Progress", "RunEntry", "RunSettings", "run"]
 
 
 @dataclass(frozen=True)
@@ -103,7 +58,7 @@ def run(
     clock: Clock,
     worker: Worker,
     publish: Publish,
-    settings: RunSettings = RunSettings(),
+    settings: RunSettings | None = None,
     control: Control | None = None,
     observer: Observer | None = None,
     work: Work | None = None,
@@ -128,10 +83,12 @@ def run(
         raise ValueError(f"a run needs robots of different names, not {names}")
     if strangers := {name for entry in entries for name in entry.after} - set(names):
         raise ValueError(f"there is no robot {', '.join(sorted(strangers))} to wait for")
-    control = control or Control(pace=None)
+    settings, control = settings or RunSettings(), control or Control(pace=None)
     control.begin({entry.tree.robot_name: entry.tree for entry in entries})
-    made = _Run(clock, worker, publish, settings, control)
-    made.observer, made.work, made.profile, made.spare = observer, work or Work(), profile, spare
+    traffic = TrafficTable({}, clock.now) if len(names) > 1 or dispatch is not None else None
+    log = LastingLog(publish)
+    made = _Run(Opening(clock, worker, log, settings, control, work or Work(), profile, traffic), log)
+    made.observer, made.spare = observer, spare
     if dispatch is not None:
         made.give_out(dispatch)
     return made.run(entries)
@@ -140,25 +97,21 @@ def run(
 class _Run:
     """The state of one run."""
 
-    def __init__(self, clock: Clock, worker: Worker, publish: Publish, settings: RunSettings, control: Control) -> None:
-        self._clock, self._worker, self._publish = clock, worker, LastingLog(publish)
-        self._settings, self._control = settings, control
+    def __init__(self, opening: Opening, publish: LastingLog) -> None:
+        clock, settings = opening.clock, opening.settings
+        self._opening, self._clock, self._publish = opening, clock, publish
+        self._settings, self._control, self._traffic = settings, opening.control, opening.traffic
+        self._watchdog = opening.watchdog
         self.observer: Observer | None = None
-        self.work = Work()
-        self.profile: Profile | None = None
         self.spare: Sequence[RunEntry] = ()
         self._given: DispatchedSessions | None = None
-        self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
-        self._traffic: TrafficTable | None = None
         self._ways_due_s = clock.now()
         self._resting: Resting | None = None
         self._after: dict[str, tuple[str, ...]] = {}
         self._ticks = 0
-        self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
+        self._meter = TickMeter(publish, clock, limit_s=settings.tick_period_s)
         self._begun_s, self._begun_wall_s = clock.now(), time.perf_counter()
-        told_s = settings.time_of_day_s
-        self._day_began_s = (_time_of_day_s() if told_s is None else told_s) - self._begun_s
         self._time = StoppableTime(clock)
 
     def give_out(self, dispatch: Dispatch) -> None:
@@ -174,15 +127,13 @@ class _Run:
         ending: Ending | None = None
         full: BaseException | None = None
         try:
-            if len(entries) + len(self.spare) > 1 or self._given is not None:
-                self._traffic = TrafficTable({}, self._clock.now)
+            if self._traffic is not None:
                 tick_limit_s = self._settings.tick_limit_s
                 self._resting = Resting(self._traffic, self._watchdog, tick_limit_s, self._sense)
                 for entry in self.spare:
-                    robot = self._guard(entry)
-                    self._resting.rest(Spare(self._context(entry, robot, _NO_LEASE), robot))
+                    self._resting.rest(self._opening.spare(entry))
             for entry in sorted(entries, key=lambda entry: entry.robot.name):
-                self._sessions.append(self._open(entry))
+                self._sessions.append(self._opening.session(entry))
                 self._after[entry.robot.name] = entry.after
             while self._has_work():
                 self._cycle()
@@ -215,7 +166,7 @@ class _Run:
         """Begin a mission that was given out, of a robot that may be resting. Raises what its verbs raise."""
         if self._resting is not None:
             self._resting.leave(entry.robot.name)
-        return self._open(entry)
+        return self._opening.session(entry)
 
     def _for(self, session: Session, call: Callable[[], ResultT], otherwise: ResultT) -> ResultT:
         """What a call for one robot gives. With several robots, one that fails ends only its own mission.
@@ -259,47 +210,6 @@ class _Run:
                     self.observer(self._progress())
         except (Exception, VerbHung, KeyboardInterrupt):
             self._publish(ERROR_TOPIC, {"node": "runner", "traceback": traceback.format_exc()})
-
-    def _guard(self, entry: RunEntry) -> GuardedRobot:
-        """The robot under the watchdog, known to the others."""
-        settings = self._settings
-        if self._traffic is not None:
-            self._traffic.join(entry.robot.name, Footprint.of(entry.robot.capabilities()).discs)
-        return GuardedRobot(
-            entry.robot, self._watchdog, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s
-        )
-
-    def _context(self, entry: RunEntry, robot: GuardedRobot, lease: Lease) -> RunContext:
-        return RunContext(
-            robot=cast(Robot, robot),
-            lease=lease,
-            clock=self._clock,
-            worker=self._worker,
-            localiser=entry.localiser,
-            costmap=entry.costmap,
-            publish=_named(self._publish, entry.robot.name),
-            seed=self._settings.seed,
-            board=Board(slug(entry.tree.robot_name)),
-            ask=lambda question: self._control.ask(question, self._clock, entry.robot.name),
-            stop_pressed=lambda: self._control.stop_pressed(entry.robot.name),
-            presses=lambda: self._control.presses,
-            day_began_s=self._day_began_s,
-            detector=entry.detector,
-            work=self.work,
-            stack=entry.stack,
-            traffic=NO_TRAFFIC if self._traffic is None else self._traffic.view_of(entry.robot.name),
-        )
-
-    def _open(self, entry: RunEntry) -> Session:
-        robot = self._guard(entry)
-        context = self._context(entry, robot, robot.claim(HOLDER))
-        try:
-            return Session(
-                entry.tree, context, robot, self._control, entry.journal, self.profile, speaker_W=entry.speaker_W
-            )
-        except BaseException:
-            robot.give_lease_back()
-            raise
 
     def _cycle(self) -> None:
         """One period: requests are polled, time passes, estimators see, trees tick."""
@@ -458,19 +368,8 @@ class _Run:
         absent = tuple(never_began(e, ending) for e in entries if ending is not None and e.robot.name not in began)
         sim_time_s = self._clock.now() - self._begun_s
         trees = {result.robot_name: tree for result, tree in over}
-        overruns, work = self._meter.overruns, self.work.totals()
+        overruns, work = self._meter.overruns, self._opening.work.totals()
         return RunResult(robots + absent, self._ticks, overruns, sim_time_s, wall_time_s, trees, work)
-
-
-def _named(publish: Publish, robot_name: str) -> Publish:
-    """Every message of a robot carries its name."""
-    return lambda topic, message: publish(topic, {"robot": robot_name, **message})
-
-
-def _time_of_day_s() -> float:
-    """The time of day on this machine (s after midnight)."""
-    now = time.localtime()
-    return 3600.0 * now.tm_hour + 60.0 * now.tm_min + now.tm_sec
 
 
 def _for_robot(session: Session, trees: Sequence[CompiledTree]) -> Sequence[CompiledTree]:

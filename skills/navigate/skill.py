@@ -132,6 +132,7 @@ class Navigate(Skill[NavigateInputs]):
         self._phase: Callable[[], Step] = self._localising
         self._follower: LocalController | None = None
         self._job: Job[Path] | None = None
+        self._map_alone = self._map_leads = False
         self._replans = 0
         self._whole_m: float | None = None
         self._wait_until_s = -math.inf
@@ -204,17 +205,18 @@ class Navigate(Skill[NavigateInputs]):
             self._phase = self._planning
         return Running("finding out where I am")
 
-    def _ask_for_plan(self, start: Pose2D | None = None) -> None:
-        """Sample the costmap now and plan in the Worker, from a pose or from here."""
+    def _ask_for_plan(self, start: Pose2D | None = None, *, map_alone: bool = False) -> None:
+        """Sample the costmap now and plan in the Worker, from a pose or from here; `map_alone`: as if nobody stood
+        about, only to see whether there is a way."""
         if not self._persons():
             self._room_m = self.options.space.room_m
         self._footprint = self._pace.footprint = self._guard.footprint = self._outline.now()
         self._outline_due_s = self._now() + _OUTLINE_PERIOD_S
         speed = max(0.1, self._inputs.max_speed_m_s)
         begin, goal = start or self.context.pose(), self._goal
-        avoided = self._avoided if self._aside is None else Avoided.BODIES
+        avoided, self._map_alone = self._avoided if self._aside is None else Avoided.BODIES, map_alone
         plan = self.context.stack.planner.problem(
-            self._costmap(begin, avoided),
+            self.context.costmap if map_alone else self._costmap(begin, avoided),
             self._footprint,
             begin,
             goal,
@@ -257,6 +259,10 @@ class Navigate(Skill[NavigateInputs]):
             path = job.result()
         except PlanningError as error:
             return self._plan_failed(str(error))
+        if self._map_alone:
+            self._map_alone, self._map_leads = False, True
+            self._wait_until_s = self._now() + self.options.replan_pause_s
+            return None
         controller, speed = self.context.stack.controller, self._inputs.max_speed_m_s
         self._follower = controller.build(path, self._footprint, max_speed_m_s=speed)
         self._whole_m = self._whole_m or max(self._follower.length_m, 1e-3)
@@ -270,19 +276,24 @@ class Navigate(Skill[NavigateInputs]):
     def _plan_failed(self, why: str) -> Step | None:
         """Go nearer to people, or wait and try again when something seen may go away; give up at the bound."""
         self._base.stop()
+        if self._map_alone:  # nobody is in the way: there is none
+            return Failed(Cause.PLANNING, why)
         if self._other_plan():
             return None
         if self._persons() and self._room_m > self.options.space.least_room_m:
             self._room_m = self.options.space.least_room_m
             self._phase = self._planning
             return None
-        self._replans += not (self._neighbour_may_go() or self._people_may_go())
+        neighbour = self._neighbour_may_go()
+        self._replans += not (neighbour or self._people_may_go())
         if self._obstacle is None or self._replans >= self.options.replans:
             who = self._giving.name_at(self._obstacle) or "something seen"
             seen = f" The way is blocked by {who} at {_xy(self._obstacle)}." if self._obstacle else ""
             return Failed(Cause.PLANNING, why + seen)
         self._wait_until_s = self._now() + self.options.replan_pause_s
         self._phase = self._planning
+        if neighbour and not self._map_leads and isinstance(self.context.costmap, ForgettingCostmap):
+            self._ask_for_plan(map_alone=True)
         return None
 
     def _people_may_go(self) -> bool:

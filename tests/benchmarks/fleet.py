@@ -4,9 +4,9 @@
         [--out FOLDER]
 
 `missions`: twelve missions in the queue, whose objects and places the seed draws, for so many Spots and Fetches.
-`killed`: two Spots; Alice dies at a time that the seed draws; her mission is finished by Bob or told as failed,
-and nothing is done twice: no object is lifted by both. `ticks`: the executive's own time per tick for four scripted
-robots against that for one, in the same run.
+`killed`: two Spots; Alice dies at a time that the seed draws; her mission is finished by Bob or told as failed, and
+nothing is done twice: no object is lifted by both, and by the log no command is begun again after it was done.
+`ticks`: the executive's own time per tick for four scripted robots against that for one, in the same run.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from executive.cli.fleet_dispatch import FleetDispatch
 from executive.cli.fleet_report import told
-from executive.cli.fleet_run import FleetDispatch, run_fleet
+from executive.cli.fleet_run import run_fleet
 from executive.cli.fleet_setup import simulated_fleet
 from executive.cli.requests import prepare
 from executive.cli.simulated import SimulatedBackend
@@ -37,6 +38,7 @@ from executive.mission.knowledge import Knowledge
 from executive.mission.request import Request
 from executive.mission.robots import RobotSetup
 from executive.record.event_log import EventLog
+from executive.record.reader import Event, read_events
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
@@ -62,6 +64,7 @@ SURFACES = ("kitchen table", "dresser", "sideboard", "hall console", "desk", "ba
 ROOMS = ("hall", "kitchen", "living room", "bedroom", "bathroom", "workshop", "office")
 KILLED_MISSIONS, KILLED_CARRIES, KILLED_S = 4, 2, (5.0, 110.0)
 STEPS_EACH, ROUNDS = 40, 5
+COMMAND_NODE = re.compile(r"[^/]+/[^/]+/(\d+)-[^/]+")
 
 
 @dataclass(frozen=True)
@@ -139,10 +142,42 @@ def run_killed(seed: int, out: Path, kinds: Sequence[str]) -> Result:
     twice = [name for name, by in lifted_by.items() if len(by) > 1]
     open_still = {MissionState.QUEUED.value, MissionState.RUNNING.value}
     over = all(row["outcome"] not in open_still for row in rows)
+    twice += begun_again(read_events(out / "log.mcap"))
     claimed = [row for row in rows if row["outcome"] == MissionState.SUCCESS.value]
     true = all(row["referee"]["success"] is not False for row in claimed)
     result = result_of("killed", seed, dispatch, rows, wall_s)
     return Result(**{**vars(result), "right": over and true and not twice})
+
+
+def begun_again(events: Iterable[Event]) -> list[str]:
+    """The commands that a log has as begun again, by any robot, after they were done for good.
+
+    A command is done for good when it was the last, or when the next one needs nothing in the gripper.
+    """
+    told: Sequence[str] = ()
+    commands: dict[str, Sequence[str]] = {}
+    missions: dict[str, int] = {}
+    done: set[tuple[int, str]] = set()
+    again: list[str] = []
+    for event in events:
+        data = event.data
+        if event.topic == "run":
+            told = data["commands"]
+        elif event.topic == "tree":
+            commands[data["robot"]] = told
+        elif event.topic == "missions":
+            missions = {each["robot"]: each["id"] for each in data["missions"] if each["outcome"] == "running"}
+        elif event.topic == "transitions" and data["robot"] in missions:
+            node, own = COMMAND_NODE.fullmatch(data["node"]), commands[data["robot"]]
+            number = 0 if node is None else int(node[1])
+            if not 0 < number <= len(own):
+                continue
+            command = (missions[data["robot"]], own[number - 1])
+            if data["to"] == "SUCCESS" and (number == len(own) or parse_command(own[number]).item is None):
+                done.add(command)
+            elif data["to"] == "RUNNING" and command in done:
+                again.append(f"mission {command[0]}: {command[1]}")
+    return again
 
 
 def run_ticks(seed: int, out: Path, kinds: Sequence[str]) -> dict[str, object]:

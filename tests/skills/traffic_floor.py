@@ -50,6 +50,10 @@ class Surveyed:
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
         """Nothing is seen."""
 
+    def forget_seen(self) -> int:
+        """There is nothing to forget."""
+        return 0
+
 
 @dataclass
 class Trip:

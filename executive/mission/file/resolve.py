@@ -101,7 +101,7 @@ class _Resolver:
         """The mission of a file that the files of `chain` led to, itself the last."""
         if file.parts is not None:
             what = "its parts are for several robots, and this is for one"
-            hint = "use `errand run`, and name them: 'robots: {alice: spot, bob: fetch}', or --robots"
+            hint = "run the file by `errand run`, and name them: 'robots: {alice: spot, bob: fetch}', or --robots"
             raise file.error(("parts",), what, hint)
         scope, problems = Scope(file, file.source, chain), Problems()
         steps: tuple[MissionStep, ...] = ()

@@ -1,7 +1,9 @@
 """`errand fleet`: what is left to do in a store, and whose faults are whose."""
 
 import pytest
+from typer.testing import CliRunner
 
+from executive.cli import entry
 from executive.cli.fleet_command import _faults, _to_do
 from executive.mission.errors import InputError
 from executive.mission.request import Request
@@ -67,3 +69,15 @@ def test_a_chain_whose_first_part_was_broken_off_for_good_fails_as_a_whole(store
     with pytest.raises(InputError, match="nothing is queued"):
         _to_do(store)
     assert [store.mission(each).state for each in (whole, first, second)] == [MissionState.FAILURE] * 3
+
+
+def test_a_file_with_parts_for_several_robots_is_refused_by_one_line_and_stays_in_the_queue(store, tmp_path):
+    file = tmp_path / "both.yaml"
+    part = "{steps: [{to: kitchen}]}"
+    file.write_text(f"name: both\nrobots: {{alice: spot, bob: spot}}\nparts: {{alice: {part}, bob: {part}}}\n")
+    store.add(Request(file=file, name="both", world_name="flat"), queued=True)
+    shown = CliRunner().invoke(entry.app, ["fleet", "run", str(store.path), "--robots", "alice=spot,bob=spot"])
+    assert (shown.exit_code, shown.stderr.count("\n")) == (2, 1)
+    assert f"{file.name}:3: mission 1 (both): its parts are for several robots" in shown.stderr
+    assert "run the file by `errand run`" in shown.stderr
+    assert store.mission(1).state is MissionState.QUEUED

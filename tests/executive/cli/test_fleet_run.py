@@ -9,10 +9,11 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from executive.cli import entry, fleet_missions, fleet_run
+from executive.cli import entry, fleet_dispatch, fleet_missions, fleet_robots
+from executive.cli.fleet_dispatch import FleetDispatch
 from executive.cli.fleet_missions import FleetMission
 from executive.cli.fleet_report import told
-from executive.cli.fleet_run import FleetDispatch, run_fleet
+from executive.cli.fleet_run import run_fleet
 from executive.cli.page_view import PageView
 from executive.cli.requests import Prepared
 from executive.fleet.auction import Bid
@@ -28,6 +29,8 @@ from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.faults.faulty_robot import with_faults
 from skills.robot import Pose2D
+from tests.benchmarks.fleet import begun_again
+from tests.executive.conftest import default_end
 
 KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
 BEDROOM = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
@@ -49,8 +52,10 @@ class Fleet:
         self.robots = {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
         self.faults, self.make, self.missions, self.judged = {}, make, {}, []
         self.shares, self.since_s = [], []
-        monkeypatch.setattr(fleet_run, "entry_for", lambda prepared, backend, durable, work: self._entry(prepared))
-        monkeypatch.setattr(fleet_run, "bid_for", self._bid)
+        monkeypatch.setattr(fleet_dispatch, "entry_for", lambda prepared, backend, durable, work: self._entry(prepared))
+        monkeypatch.setattr(fleet_robots, "bid_for", self._bid)
+        self.tables, self.slower_s = None, 0.5
+        monkeypatch.setattr(fleet_robots.Offers, "takes_from", self._takes_from)
         monkeypatch.setattr(fleet_missions, "prepared_for", lambda r, mission, *_: self._prepared(r, mission))
 
     def _entry(self, prepared):
@@ -63,7 +68,10 @@ class Fleet:
         commands = () if prepared is None else prepared.tree.commands
         unable = name in self.unable or any(self.cannot(name, command) for command in commands)
         problems = ("out of reach",) if unable else ()
-        return Bid(mission.stored.id, name, 0.0, 1.0 + 0.5 * ROBOTS.index(name), problems=problems)
+        return Bid(mission.stored.id, name, 0.0, 1.0 + self.slower_s * ROBOTS.index(name), problems=problems)
+
+    def _takes_from(self, name, table):
+        return self.tables is None or table.place in self.tables
 
     def _prepared(self, request, mission):
         tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
@@ -158,6 +166,20 @@ def test_commands_that_are_done_are_not_done_again_by_the_other(fleet, script, r
     assert (script.begun.count("grasp"), script.begun.count("place")) == (1, 1)
     assert (fleet.robots["Alice"].holding, fleet.robots["Bob"].calls.count("drive")) == (False, script.steps)
     assert (fleet.judged, fleet.shares, fleet.since_s) == ([("Bob", "success")], [("Alice", 2)], [0.0])
+    assert begun_again(read_events(fleet.out / "log.mcap")) == []
+
+
+def test_a_command_that_was_begun_again_after_it_was_done_is_found_in_the_log(fleet, script):
+    fleet.queue(KITCHEN, BEDROOM)
+    fleet.run()
+    (event,) = (each for each in read_events(fleet.out / "log.mcap") if _begins_first_command(each))
+    events = list(read_events(fleet.out / "log.mcap"))
+    last = max(n for n, each in enumerate(events) if each.topic == "transitions" and each.data["to"] == "SUCCESS")
+    assert begun_again([*events[:last], event, *events[last:]]) == [f"mission 1: {KITCHEN}"]
+
+
+def _begins_first_command(event):
+    return event.topic == "transitions" and event.data["node"].endswith("/1-kitchen") and event.data["to"] == "RUNNING"
 
 
 def test_what_is_in_the_gripper_of_a_robot_that_dies_is_told_and_not_fetched_again(fleet, script, registry):
@@ -311,6 +333,27 @@ def test_the_first_robot_leaves_the_table_to_the_second_and_goes_to_its_dock(cha
     assert [robot.holder for robot in chain.robots.values()] == [None, None]
 
 
+def test_where_the_second_robot_does_not_reach_what_the_first_puts_down_nothing_is_handed_over(chain):
+    chain.tables = ()
+    assert chain.run() == [(None, "failure", 0)]
+
+
+def test_the_second_part_begins_when_the_first_robot_has_left_the_table(chain, script):
+    begun = []
+
+    def charge(skill):
+        begun.append(len([each for each in script.begun if each == "grasp"]))
+        alice = chain.robots["Alice"]
+        if len(begun) < 5:
+            return Running("on its way")
+        alice.standing = Pose2D(2.0, 0.0, 0.0)
+        return Running("far enough") if len(begun) < 400 else chain.charge(skill)
+
+    script.ends["charge"] = charge
+    assert [outcome for _, outcome, _ in chain.run()] == ["success"] * 3
+    assert (begun[4], begun[-1]) == (1, 2)
+
+
 def test_when_the_first_part_fails_the_second_is_not_begun(chain, script):
     script.ends["place"] = lambda skill: Failed(Cause.EXECUTION, "slipped")
     assert [outcome for _, outcome, _ in chain.run()] == ["failure"] * 3
@@ -390,3 +433,71 @@ def test_a_robot_that_gave_up_finding_its_place_is_lost_whatever_it_believes_aft
 
     script.ends.update(navigate=lose, relocalise=give_up)
     assert fleet.run() == [("Bob", "success", 1)]
+
+
+def sees_nothing(script, *names):
+    """Only robots that are not named see the object."""
+
+    def detect(skill):
+        if skill.context.robot.name in names:
+            return Failed(Cause.POSTCONDITION, "no coke was seen")
+        return default_end(script, "detect")(skill)
+
+    return detect
+
+
+def test_what_one_robot_does_not_find_the_other_is_sent_for(fleet, script):
+    fleet.queue(TAKE)
+    script.ends.update(detect=sees_nothing(script, "Alice"), grasp=fleet.hold)
+    assert fleet.run() == [("Bob", "success", 1)]
+
+
+def test_what_fell_down_is_taken_by_the_other(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT)
+
+    def lose(skill):
+        fleet.robots[skill.context.robot.name].let_go()
+        return Failed(Cause.EXECUTION, "it slipped")
+
+    script.ends["grasp"] = fleet.hold
+    script.ends["place"] = lambda skill: (lose if skill.context.robot.name == "Alice" else fleet.put_down)(skill)
+    assert fleet.run() == [("Bob", "success", 1)]
+    assert fleet.robots["Alice"].holding is fleet.robots["Bob"].holding is False
+
+
+def test_what_the_first_still_holds_is_not_given_to_the_other(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT)
+    script.ends.update(grasp=fleet.hold, place=lambda skill: Failed(Cause.PLANNING, "no place"))
+    assert [outcome for _, outcome, _ in fleet.run()] == ["failure"]
+    assert fleet.rows[0]["reassigned"] == 0
+
+
+def test_what_neither_robot_manages_ends_with_the_words_of_both(fleet, script):
+    fleet.queue(TAKE)
+    script.ends["detect"] = sees_nothing(script, "Alice", "Bob")
+    assert fleet.run() == [("Bob", "failure", 1)]
+    assert "; Alice before: it tried: " in fleet.message(1)
+
+
+def test_what_the_other_cannot_do_stays_with_the_first(fleet, script):
+    fleet.queue(TAKE)
+    fleet.unable = {"Bob"}
+    script.ends["detect"] = sees_nothing(script, "Alice")
+    assert fleet.run() == [("Alice", "failure", 0)]
+
+
+def test_a_mission_does_not_wait_for_a_robot_that_is_late(fleet, script):
+    for line in (KITCHEN, KITCHEN, KITCHEN):
+        fleet.queue(line)
+    fleet.slower_s = 1.5
+
+    def arrive(skill):
+        late = skill.context.robot.name == "Alice" and fleet.clock.now() < 20.0
+        return Running("does not get on") if late else Succeeded("there")
+
+    script.ends["navigate"] = arrive
+    assert [robot for robot, *_ in fleet.run()] == ["Alice", "Bob", "Bob"]

@@ -8,6 +8,7 @@ import pytest
 from planar_robot import TWO_ROOMS
 from traffic_floor import Floor
 
+from skills.api import Failed
 from skills.estimate.grid_map import GridMap
 from skills.robot import BaseKind, Pose2D
 from skills.testing.blocks import Block, grid_of
@@ -70,3 +71,12 @@ def test_one_that_has_nothing_to_do_and_is_in_nobodys_way_stays(rooms: GridMap) 
     floor.send("alice", Pose2D(1.5, 5.5, 0.0), Pose2D(7.4, 5.5, 0.0))
     assert floor.run(until_s=60.0)
     assert floor.robots["bob"].pose.y_m == pytest.approx(1.5, abs=0.1)
+
+
+def test_one_whose_goal_is_beyond_a_wall_does_not_wait_for_another_that_stands_about() -> None:
+    """Bob is in nobody's way; there is no way for Alice on the map, and three attempts are over soon."""
+    floor = Floor(grid_of((*DEAD_END, Block(5.0, 0.0, 5.1, 0.9)), (0.05, 1.0)))
+    floor.send("alice", Pose2D(1.0, 0.45, 0.0), Pose2D(6.5, 3.2, 0.0))
+    floor.add("bob", Pose2D(3.5, 0.45, 0.0))
+    floor.run(until_s=20.0)
+    assert isinstance(floor.trips["alice"].ended, Failed)

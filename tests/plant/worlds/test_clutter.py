@@ -11,7 +11,7 @@ from plant.worlds.clutter import place_clutter, with_passers_by
 from plant.worlds.placement import outline_of, place_objects, place_people, polygon_distance
 from plant.worlds.world import World, load_world
 
-SEEDS = range(1, 8)
+SEEDS = (1, 2)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def test_clutter_lies_on_surfaces_and_touches_nothing(world: World) -> None:
 def test_clutter_is_of_no_class_that_the_mission_speaks_of(world: World) -> None:
     for seed in SEEDS:
         things = place_objects(world, seed)
-        clutter = place_clutter(world, things, 20, seed, spared=("coke", "beer"))
+        clutter = place_clutter(world, things, 12, seed, spared=("coke", "beer"))
         assert not {each.class_name for each in clutter} & {"coke", "beer", "person"}
 
 

@@ -24,6 +24,7 @@ from executive.tree.node_view import NodeView
 from executive.tree.snapshot import NodeState
 from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause
+from skills.robot import Pose2D
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot
@@ -153,11 +154,12 @@ def test_pictures_of_answers_from_before_a_restart_are_found_in_the_log(tmp_path
 
 
 class TwoRobots(ScriptedBackend):
-    """Two scripted robots, each at the origin."""
+    """Two scripted robots, 3 m apart."""
 
     def entry(self, tree, durable):
         robot = ScriptedRobot(self.clock, name=tree.robot_name, capabilities=spot_capabilities())
-        return RunEntry(tree, robot, KnownPlace(), BlockCostmap())
+        place = Pose2D(0.0, 3.0 if tree.robot_name == "Bob" else 0.0, 0.0)
+        return RunEntry(tree, robot, KnownPlace(place), BlockCostmap())
 
 
 def test_a_run_with_two_robots_leaves_the_tree_and_the_steps_of_each(talk):

@@ -182,7 +182,7 @@ class _Run:
                 raise
             ending = ending_of(stop, self._publish)
             session.close(ending)
-            self._leave_way(session)
+            session.context.traffic.release()
             self._end_given(session, ending.message)
             return otherwise
 
@@ -232,7 +232,7 @@ class _Run:
             if session.finished:
                 lost = session.result is not None and session.result.outcome is not Outcome.CANCELLED
                 result = session.close()
-                self._leave_way(session)
+                session.context.traffic.release()
                 self._end_given(session, result.message if lost else None)  # its lease was another's for too long
                 if not lost and self._resting is not None and self._others_go_on(session):
                     self._resting.rest(session)
@@ -274,10 +274,6 @@ class _Run:
         session.sense()
         if self._traffic is not None:
             self._traffic.heard(session.name, session.context.known_pose())
-
-    def _leave_way(self, session: Session) -> None:
-        if self._traffic is not None:
-            self._traffic.release(session.name)
 
     def _is_its_turn(self, session: Session) -> bool:
         """Whether the robots that a mission waits for are done; it ends when one of them has failed."""

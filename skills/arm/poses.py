@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -14,6 +14,7 @@ from skills.arm.kinematics import ArmModel
 from skills.robot import ArmCapabilities, FloatArray
 
 _UP = np.array([0.0, 0.0, 1.0])
+_CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
 
 
 def camera_pose(p_BC: FloatArray, p_BT: FloatArray) -> RigidTransform:
@@ -99,17 +100,12 @@ def carry_configuration(
     Where that tilt cannot be kept, the hand points forward and a little up, so that the object lies on a finger and
     leans to the palm; else level, or down. Raises PlanningError when no pose is free.
     """
-    for rotations in (_turned(R_BH), *map(_forward, _CARRY_PITCHES_RAD)):
-        candidates = [
-            (cost, q)
-            for rotation, x, z in itertools.product(rotations, arm.carry_x_m, arm.carry_z_m)
-            for solution in scene.model.inverse(RigidTransform(rotation, [x, 0.0, z]), margin_rad=0.05)
-            for q in [scene.model.turned_near(solution, q_near_rad)]
-            for cost in [_carry_cost(x - arm.carry_best_x_m, z, q, q_near_rad)]
-        ]
-        for _, q in sorted(candidates, key=lambda candidate: candidate[0]):
-            if scene.free(q) and scene.free_as_usual(q):
-                return q
+    points_down = R_BH.matrix()[2, 0] < -0.8
+    upright = [] if points_down else _turned(R_BH, (0.0, 0.4, -0.4))
+    for rotations in (upright, *map(_forward, _CARRY_PITCHES_RAD)):
+        q = _best_free(scene, rotations, arm.carry_x_m, arm.carry_z_m, arm.carry_best_x_m, q_near_rad)
+        if q is not None:
+            return q
     raise PlanningError("no pose to carry the thing near the body is free of contact")
 
 
@@ -120,35 +116,41 @@ def tucked_configuration(
 
     Raises PlanningError when no such pose is free.
     """
-    x_axis = R_BH.matrix()[:, 0]
-    ahead = -float(np.arctan2(x_axis[1], x_axis[0]))
-    rotations = [RotationMatrix.MakeZRotation(ahead + turn) @ R_BH for turn in (0.5 * np.pi, -0.5 * np.pi)]
+    beside = _turned(R_BH, (0.5 * np.pi, -0.5 * np.pi))
+    q = _best_free(scene, beside, arm.tuck_x_m, arm.carry_z_m, arm.tuck_x_m[0], q_near_rad)
+    if q is None:
+        raise PlanningError("the thing cannot be drawn in to the body")
+    return q
+
+
+def _best_free(
+    scene: ArmScene,
+    rotations: Sequence[RotationMatrix],
+    x_m: Sequence[float],
+    z_m: Sequence[float],
+    best_x_m: float,
+    q_near_rad: FloatArray,
+) -> FloatArray | None:
+    """The cheapest arm angles, free of contact, with the hand turned so at one of the places before B; None: none."""
     candidates = [
-        (_carry_cost(x - arm.tuck_x_m[0], z, q, q_near_rad), q)
-        for rotation, x, z in itertools.product(rotations, arm.tuck_x_m, arm.carry_z_m)
+        (_carry_cost(x - best_x_m, z, q, q_near_rad), q)
+        for rotation, x, z in itertools.product(rotations, x_m, z_m)
         for solution in scene.model.inverse(RigidTransform(rotation, [x, 0.0, z]), margin_rad=0.05)
         for q in [scene.model.turned_near(solution, q_near_rad)]
     ]
-    for _, q in sorted(candidates, key=lambda candidate: candidate[0]):
-        if scene.free(q) and scene.free_as_usual(q):
-            return q
-    raise PlanningError("the thing cannot be drawn in to the body")
-
-
-_CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
+    cheapest = sorted(candidates, key=lambda candidate: candidate[0])
+    return next((q for _, q in cheapest if scene.free(q) and scene.free_as_usual(q)), None)
 
 
 def _carry_cost(off_x_m: float, z_m: float, q_rad: FloatArray, q_near_rad: FloatArray) -> float:
     return 3.0 * abs(off_x_m) + z_m + 0.04 * float(np.max(np.abs(q_rad - q_near_rad))) + 0.05 * abs(float(q_rad[0]))
 
 
-def _turned(R_BH: RotationMatrix) -> list[RotationMatrix]:
-    """R_BH turned about the vertical so that the hand points ahead, or to either side of it."""
+def _turned(R_BH: RotationMatrix, turns_rad: Sequence[float]) -> list[RotationMatrix]:
+    """R_BH turned about the vertical so that the hand points ahead, and further by each of the angles."""
     x_axis = R_BH.matrix()[:, 0]
-    if x_axis[2] < -0.8:
-        return []
     ahead = -float(np.arctan2(x_axis[1], x_axis[0]))
-    return [RotationMatrix.MakeZRotation(ahead + turn) @ R_BH for turn in (0.0, 0.4, -0.4)]
+    return [RotationMatrix.MakeZRotation(ahead + turn) @ R_BH for turn in turns_rad]
 
 
 def _forward(pitches_rad: tuple[float, ...]) -> list[RotationMatrix]:

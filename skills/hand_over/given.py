@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform
 
 from skills.perception.class_forms import PERSON
 from skills.perception.detection_3d import Detection3D
-from skills.perception.point_cloud import camera_pose_W
+from skills.perception.point_cloud import cloud_from_image
 from skills.robot import FloatArray, Image
 
 _TALL_M, _UPPER_PART, _ABOVE_TOP_M = 0.05, 0.5, 0.06
@@ -81,15 +81,10 @@ def stands_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
     tall_m = release.top_m - release.low_m
     if tall_m < _TALL_M:
         return False
-    lens, depth = image.depth_intrinsics, image.depth_m
-    v, u = np.nonzero((depth > 0.0) & np.isfinite(depth))
-    z = depth[v, u].astype(np.float64)
-    points_C = np.column_stack([(u - lens.cx) / lens.fx * z, (v - lens.cy) / lens.fy * z, z])
-    X_WC = camera_pose_W(image, X_WO)
-    p_W = points_C @ X_WC.rotation().matrix().T + X_WC.translation()
+    heights_m = (release.low_m + _UPPER_PART * tall_m, release.top_m + _ABOVE_TOP_M)
+    p_W = cloud_from_image(image, X_WO, heights_m=heights_m).p_W
     beside_m = np.hypot(p_W[:, 0] - release.x_m, p_W[:, 1] - release.y_m)
-    high = (p_W[:, 2] > release.low_m + _UPPER_PART * tall_m) & (p_W[:, 2] < release.top_m + _ABOVE_TOP_M)
-    return int(np.count_nonzero((beside_m < _BESIDE_M) & high)) >= _LEAST_POINTS
+    return int(np.count_nonzero(beside_m < _BESIDE_M)) >= _LEAST_POINTS
 
 
 def names_in(thing: str, class_names: Iterable[str]) -> tuple[str, ...]:

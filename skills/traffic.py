@@ -1,4 +1,4 @@
-"""What robots of one run tell each other about their ways: where they believe to be, and where they are going.
+"""What robots of one run tell each other about their paths: where they believe to be, and where they are going.
 
 Nothing here is the simulator's truth. A robot that says nothing for some seconds is not there any more for this, and
 only an obstacle that others see.
@@ -19,14 +19,14 @@ __all__ = ["NO_TRAFFIC", "Neighbour", "Traffic"]
 class Neighbour:
     """Another robot: its name, its believed pose (3,) and the poses (N, 3) still before it, all x, y, yaw in the world.
 
-    `way` is None while it goes nowhere. `discs` (x, y, radius) cover its outline in the body frame. `first` while it
-    goes before us where the ways of both meet; `yields` while it clears a way that is reserved against it, since it
+    `path` is None while it goes nowhere. `discs` (x, y, radius) cover its outline in the body frame. `first` while it
+    goes before us where the paths of both meet; `yields` while it clears a path that is reserved against it, since it
     drives and goes after us, or has nothing to do. One that is neither works where it stands, and is waited for.
     """
 
     name: str
     pose: FloatArray
-    way: FloatArray | None
+    path: FloatArray | None
     discs: FloatArray
     stamp_s: float
     first: bool = False
@@ -39,14 +39,14 @@ class Traffic(Protocol):
     def claim(self) -> None:
         """Ask for the right to go, from now on; whoever asked first goes first. One that is held already is kept."""
 
-    def announce(self, way: FloatArray, discs: FloatArray) -> None:
+    def announce(self, path: FloatArray, discs: FloatArray) -> None:
         """Tell the poses (N, 3) that lie ahead, and the outline (discs in the body frame) for which they are meant.
 
         With a claim, they are reserved against all who claimed later.
         """
 
     def release(self) -> None:
-        """Give claim and way back. Idempotent."""
+        """Give claim and path back. Idempotent."""
 
     def others(self) -> Sequence[Neighbour]:
         """The other robots that were heard of lately, by name."""
@@ -61,7 +61,7 @@ class _Alone:
     def claim(self) -> None:
         """Nothing."""
 
-    def announce(self, way: FloatArray, discs: FloatArray) -> None:
+    def announce(self, path: FloatArray, discs: FloatArray) -> None:
         """Nothing."""
 
     def release(self) -> None:

@@ -49,7 +49,7 @@ _AHEAD_M: Final[Mapping[str, float]] = MappingProxyType({"hand_over": 0.4})
 
 
 @dataclass
-class Looks:
+class RobotArtifacts:
     """What one robot saw and did that is worth a picture: its first confirmed detection, and when (s) it did what."""
 
     seen: Mapping[str, Any] | None = None
@@ -68,40 +68,40 @@ class Artifacts:
 
     def __init__(self, publish: Publish) -> None:
         self._publish = publish
-        self._looks: dict[str, Looks] = {}
+        self._of_robot: dict[str, RobotArtifacts] = {}
         self.answer: Picture | None = None
         self.pictures: list[bytes] = []
         self.numbers: dict[tuple[str, float], int] = {}
         self.drawn: dict[str, Path] = {}
 
-    def of(self, robot_name: str) -> Looks:
+    def of(self, robot_name: str) -> RobotArtifacts:
         """What is known of a robot."""
-        return self._looks.setdefault(robot_name, Looks())
+        return self._of_robot.setdefault(robot_name, RobotArtifacts())
 
     def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
         """Take note of a message and pass it on."""
-        looks = self.of(str(message.get("robot", "")))
+        own = self.of(str(message.get("robot", "")))
         if topic == DETECTIONS:
-            looks.looked.append(message)
-            looks.seen = message if message["detections"] else looks.seen
+            own.looked.append(message)
+            own.seen = message if message["detections"] else own.seen
         if topic == DESTINATION_TOPIC:
-            looks.confirmed = looks.seen
-            looks.detection = looks.detection or looks.seen
+            own.confirmed = own.seen
+            own.detection = own.detection or own.seen
         if topic == ANSWER_TOPIC:
-            message = self._shown(message, looks)
+            message = self._shown(message, own)
         if topic == TRANSITIONS and message["to"] == "SUCCESS" and not told_before(str(message["message"])):
             name = _MOMENTS.get(str(message["node"]).rsplit("/", 1)[-1])
             if name is not None:
-                looks.moments[name] = float(message["t"])
+                own.moments[name] = float(message["t"])
         self._publish(topic, message)
 
-    def _shown(self, message: Mapping[str, Any], looks: Looks) -> Mapping[str, Any]:
+    def _shown(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
         """The answer with a picture: of what was found, or of all that was looked at in vain."""
-        looked, looks.looked = looks.looked, []
+        looked, own.looked = own.looked, []
         if not looked:
             return message
-        if message["answer"] and looks.confirmed is not None:
-            self.answer = detection_picture(looks.confirmed)
+        if message["answer"] and own.confirmed is not None:
+            self.answer = detection_picture(own.confirmed)
         else:
             self.answer = _sheet([detection_picture(each) for each in looked[-_MOST_LOOKS:]])
         self._keep(message, self.answer)
@@ -140,12 +140,12 @@ def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robots: Sequenc
     pictures = {"map": _map(simulation, robots)}
     begun_s = simulation.recorder.at(0.0).time_s if simulation.recorder is not None else 0.0
     for robot in robots:
-        looks = artifacts.of(robot)
-        if looks.detection is not None:
-            pictures[file_name("detection", robot, robots)] = detection_picture(looks.detection)
+        own = artifacts.of(robot)
+        if own.detection is not None:
+            pictures[file_name("detection", robot, robots)] = detection_picture(own.detection)
         last = simulation.referee.lifts(robot)[-1:]
         lifts = [("grasp", lift.time_s) for lift in last if lift.time_s >= begun_s]
-        for name, time_s in (*lifts, *looks.moments.items()):
+        for name, time_s in (*lifts, *own.moments.items()):
             pictures[file_name(name, robot, robots)] = _view(simulation, robot, time_s, _AHEAD_M.get(name, 0.0))
     paths = [folder / f"{name}.png" for name in pictures]
     artifacts.drawn.update(zip(pictures, paths, strict=True))

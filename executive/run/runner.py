@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from executive.mission.errors import disk_is_full
 from executive.record.profile import Profile
-from executive.record.schemas import CONTROL, WAY
+from executive.record.schemas import CONTROL, RESERVED_PATH
 from executive.record.ticks import TickMeter
 from executive.record.work import Work
 from executive.run.control import Control, ControlRequests, Event
@@ -31,7 +31,7 @@ from executive.tree.snapshot import Snapshot
 from skills.api import Cause, LeavesOthersOut, Publish, Worker
 from skills.robot import Clock
 
-_WAYS_PERIOD_S = 0.5
+_PATHS_PERIOD_S = 0.5
 ResultT = TypeVar("ResultT")
 
 __all__ = ["Observer", "Progress", "RunEntry", "RunSettings", "run"]
@@ -106,7 +106,7 @@ class _Run:
         self.spare: Sequence[RunEntry] = ()
         self._given: DispatchedSessions | None = None
         self._sessions: list[Session] = []
-        self._ways_due_s = clock.now()
+        self._paths_due_s = clock.now()
         self._resting: Resting | None = None
         self._after: dict[str, tuple[str, ...]] = {}
         self._ticks = 0
@@ -219,10 +219,10 @@ class _Run:
         self._clock.advance(self._settings.tick_period_s)
         for session in live:
             self._for(session, partial(self._sense, session), None)
-        if self._traffic is not None and self._clock.now() >= self._ways_due_s:
-            self._ways_due_s = self._clock.now() + _WAYS_PERIOD_S
-            for way in self._traffic.news():
-                self._publish(WAY, way)
+        if self._traffic is not None and self._clock.now() >= self._paths_due_s:
+            self._paths_due_s = self._clock.now() + _PATHS_PERIOD_S
+            for path in self._traffic.news():
+                self._publish(RESERVED_PATH, path)
         turn = [session for session in live if session.result is None and self._is_its_turn(session)]
         free = [session for session in turn if self._for(session, session.may_move, False)]
         moving = [session for session in free if not requests.held(session.name)]

@@ -1,4 +1,4 @@
-"""The robots' ways in one place: who is where by its own belief, where it goes, and who goes first."""
+"""The robots' paths in one place: who is where by its own belief, where it goes, and who goes first."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from skills.traffic import Neighbour, Traffic
 __all__ = ["SILENT_S", "TrafficTable"]
 
 SILENT_S = 2.0
-"""Who was not heard of for so long (s of the run's clock) has no claim and no way any more."""
+"""Who was not heard of for so long (s of the run's clock) has no claim and no path any more."""
 _ABOUT_M = 0.2
 _TOLD_EVERY_M = 0.25
 
@@ -23,13 +23,13 @@ _TOLD_EVERY_M = 0.25
 class _Robot:
     """What is known of one robot. `turn` is its place in the order of claims, None without one.
 
-    `idle` while it has nothing to do and clears ways that others reserve.
+    `idle` while it has nothing to do and clears paths that others reserve.
     """
 
     discs: FloatArray
     pose: FloatArray | None = None
     stamp_s: float = -np.inf
-    way: FloatArray | None = None
+    path: FloatArray | None = None
     turn: int | None = None
     told: Mapping[str, Any] | None = None
     idle: bool = False
@@ -58,7 +58,7 @@ class TrafficTable:
             robot.pose = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
 
     def rest(self, name: str, *, idle: bool) -> None:
-        """A robot has nothing to do and clears ways that others reserve, or has work again."""
+        """A robot has nothing to do and clears paths that others reserve, or has work again."""
         self._robots[name].idle = idle
 
     def view_of(self, name: str) -> Traffic:
@@ -71,17 +71,17 @@ class TrafficTable:
         if robot.turn is None:
             self._turns += 1
             robot.turn = self._turns
-            robot.way = None if robot.pose is None else robot.pose[None, :]
+            robot.path = None if robot.pose is None else robot.pose[None, :]
 
-    def announce(self, name: str, way: FloatArray, discs: FloatArray) -> None:
+    def announce(self, name: str, path: FloatArray, discs: FloatArray) -> None:
         """See `Traffic.announce`."""
         robot = self._robots[name]
-        robot.way, robot.discs = way, discs
+        robot.path, robot.discs = path, discs
 
     def release(self, name: str) -> None:
         """See `Traffic.release`."""
         robot = self._robots[name]
-        robot.way = robot.turn = None
+        robot.path = robot.turn = None
 
     def others(self, name: str) -> Sequence[Neighbour]:
         """See `Traffic.others`."""
@@ -89,7 +89,7 @@ class TrafficTable:
             Neighbour(
                 other,
                 robot.pose,
-                robot.way,
+                robot.path,
                 robot.discs,
                 robot.stamp_s,
                 first=self.goes_before(other, name),
@@ -100,12 +100,12 @@ class TrafficTable:
         )
 
     def news(self) -> Iterator[Mapping[str, Any]]:
-        """For each robot whose way is another than was told before: its name, its turn (None: nothing is reserved), and
-        the way that lies ahead as points x, y (m in the world), for the log.
+        """For each robot whose path has changed since the last call: its name, its turn (None: nothing is reserved),
+        and the path that lies ahead as points x, y (m in the world), for the log.
         """
         for name, robot in self._robots.items():
-            way = np.empty((0, 2)) if robot.way is None or self._silent(robot) else _thinned(robot.way[:, :2])
-            x, y = np.round(way, 2).T.tolist()
+            path = np.empty((0, 2)) if robot.path is None or self._silent(robot) else _thinned(robot.path[:, :2])
+            x, y = np.round(path, 2).T.tolist()
             message = {"robot": name, "turn": robot.turn if x else None, "x": x, "y": y}
             if message != (robot.told or {**message, "turn": None, "x": [], "y": []}):
                 robot.told = message
@@ -141,9 +141,9 @@ class TrafficTable:
 
 
 def _thinned(points: FloatArray) -> FloatArray:
-    """Points (N, 2) of a way without those that are nearer than a quarter of a metre to the one before; its end stays.
+    """Points (N, 2) of a path without those that are nearer than a quarter of a metre to the one before; its end stays.
 
-    Counted from the end, so that a way that grows shorter keeps its points.
+    Counted from the end, so that a path that grows shorter keeps its points.
     """
     back = points[::-1]
     along_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(back, axis=0), axis=1))])
@@ -162,8 +162,8 @@ class _View:
     def claim(self) -> None:
         self.table.claim(self.name)
 
-    def announce(self, way: FloatArray, discs: FloatArray) -> None:
-        self.table.announce(self.name, way, discs)
+    def announce(self, path: FloatArray, discs: FloatArray) -> None:
+        self.table.announce(self.name, path, discs)
 
     def release(self) -> None:
         self.table.release(self.name)

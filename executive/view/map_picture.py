@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from executive.mission.errors import InputError
 from executive.record.reader import Event
-from executive.record.schemas import MAP, NAVIGATION, PATH, POSE, WAY
+from executive.record.schemas import MAP, NAVIGATION, PATH, POSE, RESERVED_PATH
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 
 WIDTH_PX: Final = 1400
@@ -93,9 +93,9 @@ def _draw_robot(
         side = max(1, round(0.5 * _CELL_M * frame.pixels_per_m))
         for column, row in frame.pixels(_pairs(views[-1], "seen")).tolist():
             cv2.rectangle(picture, (column - side, row - side), (column + side, row + side), _SEEN, -1)
-    ways = [event.data for event in events if event.topic == WAY]
-    if ways and ways[-1]["turn"] is not None:
-        _draw_way(picture, frame.pixels(_pairs(ways[-1], "")), colour or _PLAN)
+    reserved = [event.data for event in events if event.topic == RESERVED_PATH]
+    if reserved and reserved[-1]["turn"] is not None:
+        _draw_reserved(picture, frame.pixels(_pairs(reserved[-1], "")), colour or _PLAN)
     places = [(pose["pose"]["position"]["x"], pose["pose"]["position"]["y"]) for pose in poses]
     cv2.polylines(picture, [frame.pixels(places)], False, colour or _TRAIL, 2, cv2.LINE_AA)
     if paths:
@@ -114,7 +114,7 @@ def _draw_robot(
     _write(picture, name, frame.pixels([places[-1]])[0] + [0, -round(0.6 * frame.pixels_per_m)])
 
 
-def _draw_way(picture: NDArray[np.uint8], pixels: NDArray[np.int32], colour: Colour) -> None:
+def _draw_reserved(picture: NDArray[np.uint8], pixels: NDArray[np.int32], colour: Colour) -> None:
     """What is reserved: a broad pale band, and a ring where it ends."""
     pale = tuple(round(0.35 * part + 0.65 * 255) for part in colour)
     cv2.polylines(picture, [pixels], False, pale, 15, cv2.LINE_AA)

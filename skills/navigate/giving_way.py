@@ -172,7 +172,7 @@ class GivingWay:
 
     def ahead_of_us(self) -> Sequence[Neighbour]:
         """Those who go first, and go somewhere."""
-        return [one for one in self._traffic.others() if one.first and one.way is not None]
+        return [one for one in self._traffic.others() if one.first and one.path is not None]
 
     def costmap(self, costmap: Costmap, avoided: Avoided) -> Costmap:
         """The costmap with that of the others which is to be avoided."""
@@ -230,7 +230,7 @@ class GivingWay:
 
     def somebody_goes(self) -> bool:
         """Whether another robot is on its way."""
-        return any(one.way is not None for one in self._traffic.others())
+        return any(one.path is not None for one in self._traffic.others())
 
     def is_robot(self, place_W: tuple[float, float]) -> bool:
         """Whether another robot covers a place (x, y), or ends just before it."""
@@ -307,12 +307,12 @@ def first_that_suits(places_W: FloatArray, suits: Callable[[FloatArray], Pose2D 
 
 def _will_move(one: Neighbour) -> bool:
     """Whether a robot goes on by itself, or clears a way that is reserved against it."""
-    return one.yields or (one.first and one.way is not None)
+    return one.yields or (one.first and one.path is not None)
 
 
 def _thinned(one: Neighbour) -> FloatArray:
     """The poses that a robot still covers: where it is, and its way, not closer than needed."""
-    way = one.way if one.way is not None else np.empty((0, 3))
+    way = one.path if one.path is not None else np.empty((0, 3))
     along = _along(way)
     kept, last = [one.pose], -math.inf
     for pose, at in zip(way, along, strict=True):

@@ -84,7 +84,7 @@
       this.drawGrid(brush, frame);
       for (const [name, robot] of this.view.robots) {
         const style = this.styleOf(name);
-        if (robot.way) this.drawWay(brush, frame, robot.way, style);
+        if (robot.reserved) this.drawReserved(brush, frame, robot.reserved, style);
         this.drawSeen(brush, frame, robot.seen);
         this.drawParticles(brush, frame, robot.particles);
         this.line(brush, frame, robot.trail, style.trail, []);
@@ -124,18 +124,18 @@
     }
 
     // What is reserved: a broad band below the path, to a dot where it ends.
-    drawWay(brush, frame, way, { body }) {
+    drawReserved(brush, frame, path, { body }) {
       brush.save();
       brush.globalAlpha = 0.3;
       brush.lineCap = "round";
       brush.beginPath();
-      way.forEach(([x, y], n) => brush[n ? "lineTo" : "moveTo"](...frame.at(x, y)));
+      path.forEach(([x, y], n) => brush[n ? "lineTo" : "moveTo"](...frame.at(x, y)));
       brush.strokeStyle = body;
       brush.lineWidth = RESERVED_PX;
       brush.stroke();
       brush.globalAlpha = 1;
       brush.beginPath();
-      brush.arc(...frame.at(...way[way.length - 1]), 4, 0, 2 * Math.PI);
+      brush.arc(...frame.at(...path[path.length - 1]), 4, 0, 2 * Math.PI);
       brush.fillStyle = body;
       brush.fill();
       brush.restore();
@@ -183,7 +183,7 @@
       brush.fillText(text, u, v);
     }
 
-    drawRobot(brush, { at, scale }, name, { pose: { x, y, yaw }, held, way }) {
+    drawRobot(brush, { at, scale }, name, { pose: { x, y, yaw }, held, reserved }) {
       const [u, v] = at(x, y), length = Math.max(LENGTH_M * scale, 16), width = Math.max(WIDTH_M * scale, 8);
       brush.save();
       brush.translate(u, v);
@@ -201,7 +201,7 @@
       this.halo(brush, held ? `${name}, holding ${held}` : name, u + 12, v - 10);
       if (held) this.mark(brush, ...at(x + (LENGTH_M / 2) * Math.cos(yaw), y + (LENGTH_M / 2) * Math.sin(yaw)));
       const degrees = Math.round((yaw * 180) / Math.PI);
-      return `${name} at x ${x.toFixed(2)} m, y ${y.toFixed(2)} m, ${degrees}°${held ? `, holding ${held}` : ""}${way ? `, its way to x ${way[way.length - 1][0].toFixed(2)} m, y ${way[way.length - 1][1].toFixed(2)} m reserved` : ""}`;
+      return `${name} at x ${x.toFixed(2)} m, y ${y.toFixed(2)} m, ${degrees}°${held ? `, holding ${held}` : ""}${reserved ? `, its way to x ${reserved[reserved.length - 1][0].toFixed(2)} m, y ${reserved[reserved.length - 1][1].toFixed(2)} m reserved` : ""}`;
     }
   }
 

@@ -20,7 +20,7 @@
   }
 
   function robotOf(view, name) {
-    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null, particles: [], seen: [], way: null, detections: null });
+    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null, particles: [], seen: [], reserved: null, detections: null });
     return view.robots.get(name);
   }
 
@@ -62,7 +62,7 @@
       robotOf(view, data.robot).path = data.poses.map((pose) => [pose.position.x, pose.position.y]);
     },
     // What a robot has reserved; a turn says that it has the right of way against all who came later.
-    way(view, data) { robotOf(view, data.robot).way = data.turn === null ? null : data.x.map((x, n) => [x, data.y[n]]); },
+    reserved_path(view, data) { robotOf(view, data.robot).reserved = data.turn === null ? null : data.x.map((x, n) => [x, data.y[n]]); },
     missions(view, data) { view.missions = data.missions; },
     detections(view, data, t) {
       view.detections = { ...data, t };

@@ -62,7 +62,7 @@ def test_a_claim_that_is_given_back_is_free_for_the_next() -> None:
     made.claim("bob")
     made.release("alice")
     assert made.goes_before("bob", "alice")
-    assert made.others("bob")[0].way is None
+    assert made.others("bob")[0].path is None
 
 
 def test_a_robot_that_falls_silent_loses_its_right_and_is_not_heard_of() -> None:
@@ -83,7 +83,7 @@ def test_a_robot_does_not_see_itself() -> None:
     made.view_of("alice").claim()
     made.view_of("alice").announce(WAY, DISCS)
     (seen,) = made.view_of("bob").others()
-    assert seen.name == "alice" and seen.first and seen.way is WAY
+    assert seen.name == "alice" and seen.first and seen.path is WAY
 
 
 def test_turns_can_be_changed() -> None:
@@ -184,10 +184,10 @@ def test_a_goal_is_reserved_until_it_is_given_back_or_the_robot_falls_silent() -
         made.claim("alice")
         made.announce("alice", WAY, DISCS)
         (seen,) = made.others("bob")
-        assert seen.first and seen.way is not None and seen.way[-1].tolist() == WAY[-1].tolist()
+        assert seen.first and seen.path is not None and seen.path[-1].tolist() == WAY[-1].tolist()
         if end == "release":
             made.release("alice")
-            assert made.others("bob")[0].way is None
+            assert made.others("bob")[0].path is None
         else:
             time.now_s += SILENT_S + 0.1
             assert made.others("bob") == ()

@@ -71,8 +71,8 @@ def test_a_log_without_a_map_is_refused():
 def test_each_of_several_robots_is_drawn_in_its_own_colour_with_what_it_has_reserved():
     bob = {"robot": "Bob", "pose": {"position": {"x": 1.0, "y": -0.5, "z": 0.5}}, "yaw_rad": 0.0}
     way = {"robot": "Bob", "turn": 2, "x": [1.0, 5.0], "y": [-0.5, -0.5]}
-    given_back = Event("way", 4.0, {"robot": "Bob", "turn": None, "x": [], "y": []})
-    events = (*EVENTS, Event("pose", 2.0, bob), Event("way", 3.0, way), given_back)
+    given_back = Event("reserved_path", 4.0, {"robot": "Bob", "turn": None, "x": [], "y": []})
+    events = (*EVENTS, Event("pose", 2.0, bob), Event("reserved_path", 3.0, way), given_back)
     blue, orange = (rgb_of(colour)[::-1] for colour in ROBOT_COLOURS[:2])
     then = map_picture(events, 3.0)
     assert (colour_at(then, 2.0, 0.0), colour_at(then, 0.9, -0.4)) == (blue, orange)

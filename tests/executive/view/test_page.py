@@ -664,7 +664,7 @@ def two(knowledge, registry, control):
         position = {"x": -2.0 + 3.0 * number, "y": 1.5 - 2.0 * number, "z": 0.0}
         feed("pose", 0.5, {"robot": name, "pose": {"position": position, "orientation": turn}})
         feed("state", 0.5, {**state(), "robot": name, "charge": 0.9 - 0.5 * number})
-    feed("way", 0.5, {"robot": "Bob", "turn": 1, "x": [1.0, 3.0], "y": [-0.5, -0.5]})
+    feed("reserved_path", 0.5, {"robot": "Bob", "turn": 1, "x": [1.0, 3.0], "y": [-0.5, -0.5]})
     with PageServer(PageContent(feed, {**control_actions(control), "say": lambda values: str(dict(values))})) as server:
         yield feed, trees, server.url
     control.end()

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from executive.cli.backend import Backend
 from executive.cli.fleet_chain import chained
-from executive.cli.fleet_missions import FleetMission, charging_time_s, rest_of
+from executive.cli.fleet_missions import FleetMission, charging_time_s, rest_of, surfaces_of
 from executive.cli.fleet_progress import Progress, ProgressJournal, is_lost, is_plain
 from executive.cli.fleet_report import EndedMission, missions_message, told
 from executive.cli.fleet_robots import FleetRobot, Offers
@@ -65,7 +65,7 @@ class FleetDispatch:
 
     def __post_init__(self) -> None:
         self._given = GivenMissions(self.store)
-        self._dispatcher = Dispatcher((), self.robots)
+        self._dispatcher = Dispatcher((), self.robots, self._surfaces)
         self._parts = {number: each for number, each in self._given.all().items() if each.part_of is not None}
         for number in self.missions:
             follows = self._parts[number].follows if number in self._parts else None
@@ -256,6 +256,10 @@ class FleetDispatch:
     @property
     def _now_s(self) -> float:
         return self.backend.clock.now()
+
+    def _surfaces(self, number: int) -> frozenset[str]:
+        """Where a mission puts something down, or takes it from by name."""
+        return surfaces_of(next(iter(self.missions[number].options.values())))
 
     def _bid(self, mission: int, name: str) -> Bid:
         resting = name in self._dispatcher.resting

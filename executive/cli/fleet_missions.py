@@ -35,6 +35,7 @@ __all__ = [
     "fleet_mission",
     "is_way",
     "rest_of",
+    "surfaces_of",
     "with_commands",
 ]
 
@@ -130,6 +131,12 @@ def _for_robot(name: str, filed: Prepared, world: World, robots: Mapping[str, Pl
 def rest_of(prepared: Prepared, done: int) -> Prepared:
     """What is left of a mission of plain commands of which the first `done` are done."""
     return with_commands(prepared, prepared.tree.commands[done:]) if done else prepared
+
+
+def surfaces_of(prepared: Prepared) -> frozenset[str]:
+    """The surfaces that a mission's commands name, at each of which one robot works at a time."""
+    goals = {command.goal for command in prepared.tree.commands if command.goal is not None}
+    return frozenset(filter(None, map(prepared.knowledge.place, goals))) & prepared.knowledge.surfaces.keys()
 
 
 def with_commands(prepared: Prepared, commands: Sequence[Command]) -> Prepared:

@@ -10,6 +10,7 @@ from executive.fleet.auction import Award, Bid, award
 __all__ = ["Dispatcher", "Round"]
 
 BidOf = Callable[[int, str], Bid]
+PlacesOf = Callable[[int], frozenset[str]]
 
 
 @dataclass(frozen=True)
@@ -25,8 +26,12 @@ class Round:
 class Dispatcher:
     """Gives each mission to one robot at a time. No mission is given out again once it is over."""
 
-    def __init__(self, missions: Iterable[int], robots: Iterable[str]) -> None:
-        """`missions` are those to be done, in the order in which they came; `robots` those that are there."""
+    def __init__(
+        self, missions: Iterable[int], robots: Iterable[str], places: PlacesOf = lambda mission: frozenset()
+    ) -> None:
+        """`missions` are those to be done, in the order in which they came; `robots` those that are there; `places`
+        those at which a mission has work for one robot at a time."""
+        self._places = places
         self._waiting: list[int] = list(dict.fromkeys(missions))
         self._robots: list[str] = list(dict.fromkeys(robots))
         self._under_way: dict[str, int] = {}
@@ -57,25 +62,34 @@ class Dispatcher:
         """One round of the auction, in which robots that are busy bid as well; `bid` is asked for each pair.
 
         A mission that goes to a busy robot, or to one that has to charge first, waits, and is put up again when any
-        robot is free. Without a robot that can be given work, nothing is refused.
+        robot is free; so does one with work at a place where a robot is at work. Without a robot that can be given
+        work, nothing is refused.
         """
         free = [robot for robot in self._robots if robot not in self._under_way and robot not in self._resting]
-        up = [mission for mission in self._waiting if mission not in self._after]
-        if not up or not free:
+        taken = self._taken if free else frozenset[str]()
+        up = [each for each in self._waiting if free and each not in self._after and not taken & self._places(each)]
+        if not up:
             return Round((), {})
         bids = {mission: [bid(mission, robot) for robot in self._robots] for mission in up}
         awards = award(one for each in bids.values() for one in each)
         given = {each.mission for each in awards}
         refused = {mission: _why(each) for mission, each in bids.items() if mission not in given}
         next_up = [each for each in awards if each.first and each.robot in free]
-        begun = [each for each in next_up if not each.charges]
+        begun: list[Award] = []
+        for each in next_up:
+            if not each.charges and not self._taken & self._places(each.mission):
+                begun.append(each)
+                self._under_way[each.robot] = each.mission
         charging = [each.robot for each in next_up if each.charges]
         self._resting.update(charging)
-        for each in begun:
-            self._under_way[each.robot] = each.mission
         gone = {each.mission for each in begun} | set(refused)
         self._waiting = [mission for mission in self._waiting if mission not in gone]
         return Round(begun, refused, charging)
+
+    @property
+    def _taken(self) -> frozenset[str]:
+        """The places where robots are at work."""
+        return frozenset[str]().union(*map(self._places, self._under_way.values()))
 
     def add(self, mission: int, *, after: int | None = None) -> None:
         """One more mission, which is put up when the one that it comes `after` has been done."""

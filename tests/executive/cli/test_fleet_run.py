@@ -36,6 +36,7 @@ KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
 BEDROOM = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
 TAKE = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
 PUT = "Take [coke] to [bedroom] and do [Nothing] to [Nothing]"
+ON_TABLE = "Take [coke] to [shelf] and do [Nothing] to [Nothing]"
 START = Pose2D(0.0, 0.0, 0.0)
 ROBOTS = ("Alice", "Bob")
 
@@ -501,3 +502,20 @@ def test_a_mission_does_not_wait_for_a_robot_that_is_late(fleet, script):
 
     script.ends["navigate"] = arrive
     assert [robot for robot, *_ in fleet.run()] == ["Alice", "Bob", "Bob"]
+
+
+def test_two_robots_do_not_put_things_on_one_surface_at_once(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, ON_TABLE)
+    fleet.queue(TAKE, ON_TABLE)
+    fleet.queue(BEDROOM)
+    at_work = []
+
+    def put_down(skill):
+        at_work.append({row["robot"] for row in told(fleet.store, [1, 2]) if row["outcome"] == "running"})
+        return fleet.put_down(skill)
+
+    script.ends.update(grasp=fleet.hold, place=put_down)
+    assert [robot for robot, *_ in fleet.run()] == ["Alice", "Alice", "Bob"]
+    assert at_work == [{"Alice"}, {"Alice"}]

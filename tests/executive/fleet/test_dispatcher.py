@@ -90,3 +90,22 @@ def test_a_mission_that_goes_to_a_robot_that_has_to_charge_waits_until_it_has():
     dispatcher.wake("Alice")
     charged = dispatcher.assign(lambda mission, robot: Bid(mission, robot, 0.0, 10.0))
     assert [(each.mission, each.robot) for each in charged.begun] == [(1, "Alice")]
+
+
+def test_a_mission_with_work_where_a_robot_is_at_work_waits_while_others_begin():
+    places = {1: {"desk"}, 2: {"desk", "shelf"}, 3: {"shelf"}}
+    dispatcher = Dispatcher([1, 2, 3], NAMES[:2], lambda mission: frozenset(places[mission]))
+    bid = bid_of([10.0], {(3, "Alice")})
+    assert [(each.mission, each.robot) for each in begun_now(dispatcher, bid)] == [(1, "Alice"), (3, "Bob")]
+    dispatcher.over("Alice")
+    assert not begun_now(dispatcher, bid)  # the shelf is still taken
+    dispatcher.over("Bob")
+    assert [(each.mission, each.robot) for each in begun_now(dispatcher, bid)] == [(2, "Alice")]
+
+
+def begun_now(dispatcher, bid):
+    """What begins in rounds of the auction until nothing more does."""
+    begun = []
+    while turn := dispatcher.assign(bid).begun:
+        begun += turn
+    return begun

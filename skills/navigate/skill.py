@@ -561,7 +561,3 @@ class Navigate(Skill[NavigateInputs]):
 
 def _xy(place: tuple[float, float] | None) -> str:
     return "an unknown place" if place is None else f"({place[0]:.2f}, {place[1]:.2f})"
-
-
-def _place(pose: Pose2D) -> str:
-    return f"({pose.x_m:.2f}, {pose.y_m:.2f})"

@@ -23,6 +23,7 @@ AROUND: Final = "around"
 """The name of the body that stands for all boxes."""
 EDGE_STEP_RAD = 0.05
 """How far apart (rad, all joints together) the configurations of a motion are checked."""
+_LINK_RADIUS_M = 0.06
 _SCENES_KEPT, _FAR_M = 4, 100.0
 
 
@@ -83,6 +84,11 @@ class ArmScene:
             yield
         finally:
             self._now, self._X_BF, self._opening = before, X_BF, opening_before_rad
+
+    def beside_body_m(self, q_rad: FloatArray) -> float:
+        """How far the arm sticks out to a side of the body's footprint (m); 0 where it does not."""
+        half_m = float(np.max(np.abs(np.asarray(self._capabilities.footprint_m)[:, 1])))
+        return max(0.0, float(np.max(np.abs(self.model.points_B(q_rad)[:, 1]))) + _LINK_RADIUS_M - half_m)
 
     def hold(self, boxes: Sequence[Box]) -> None:
         """Replace the boxes fixed to the hand (frame H), for a thing held."""

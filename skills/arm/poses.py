@@ -133,13 +133,17 @@ def _best_free(
 ) -> FloatArray | None:
     """The cheapest arm angles, free of contact, with the hand turned so at one of the places before B; None: none."""
     candidates = [
-        (_carry_cost(x - best_x_m, z, q, q_near_rad), q)
+        (_carry_cost(x - best_x_m, z, q, q_near_rad) + _WIDE_COST * scene.beside_body_m(q), q)
         for rotation, x, z in itertools.product(rotations, x_m, z_m)
         for solution in scene.model.inverse(RigidTransform(rotation, [x, 0.0, z]), margin_rad=0.05)
         for q in [scene.model.turned_near(solution, q_near_rad)]
     ]
     cheapest = sorted(candidates, key=lambda candidate: candidate[0])
     return next((q for _, q in cheapest if scene.free(q) and scene.free_as_usual(q)), None)
+
+
+_WIDE_COST = 1.0
+"""For each metre that the arm sticks out beside the body, where walls are near as one drives up to furniture."""
 
 
 def _carry_cost(off_x_m: float, z_m: float, q_rad: FloatArray, q_near_rad: FloatArray) -> float:

@@ -250,7 +250,7 @@ def _put_on_plan(builder: PlanBuilder, item: Thing, surface: str, to: str) -> No
     place = builder.skill("place", {"surface": builder.surface(surface)})
     return builder.sequence(
         f"put it on {surface}",
-        _holding(carry, item, to, carry.navigate(view, f"the {surface}")),
+        _holding(carry, item, to, go_near_plan(carry, view, f"the {surface}")),
         _holding(builder.at("put"), item, to, place, until_put_down=True),
     )
 

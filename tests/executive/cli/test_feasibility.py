@@ -2,8 +2,10 @@
 
 import pytest
 
-from executive.cli.feasibility import abilities_of, reached_heights_m
+from executive.cli.feasibility import abilities_of, reached_heights_m, route_planner_of
 from plant.kinds import robot_kind
+from plant.worlds.world import load_world
+from skills.robot import Pose2D
 from skills.testing.robot import BASE_ONLY
 
 
@@ -27,3 +29,11 @@ def test_the_payload_and_the_gripper_are_those_of_the_kind():
         capabilities = robot_kind(kind).capabilities()
         able = abilities_of(kind)
         assert (able.lift_kg, able.opens_m) == (capabilities.arm.max_payload_kg, capabilities.gripper.max_grasp_m)
+
+
+# how far (m) the start lies aside: the planner's grid begins there
+@pytest.mark.parametrize("aside_m", [0.0, 0.02, 0.04, 0.06, 0.08])
+def test_a_fetch_gets_through_the_narrowest_door_of_a_world_wherever_it_begins(aside_m):
+    planner = route_planner_of(load_world("lab"), kind="fetch", kept=False)
+    route = planner.route(Pose2D(14.38 + aside_m, 10.52, -2.671), Pose2D(15.0, 9.1, 0.0))
+    assert 3.0 < route.length_m < 5.0

@@ -45,6 +45,15 @@ def test_what_sticks_out_ahead_is_drawn_in_beside_the_body_as_upright_as_it_was(
     assert scene.free(drawn_in)
 
 
+# how the hand was tilted as it took what it carries (rad below level)
+@pytest.mark.parametrize("tilt_rad", [0.0, 0.35, 0.7])
+def test_an_arm_that_carries_keeps_its_elbow_near_the_body(tilt_rad):
+    fetch, model = fetch_capabilities(), arm_model(fetch_capabilities())
+    scene = ArmScene(fetch, model, {fetch.lift_joint: fetch.standing_height_m - fetch.height_range_m[0]})
+    q = carry_configuration(scene, fetch.arm, hand_rotation(tilt_rad, 0.0, 1.0), model.stowed_rad)
+    assert scene.beside_body_m(q) < 0.04  # 0.14 where nothing is said about it
+
+
 def test_what_cannot_be_drawn_in_is_told():
     fetch, model = fetch_capabilities(), arm_model(fetch_capabilities())
     scene = ArmScene(fetch, model, {})

@@ -83,6 +83,13 @@ def test_going_is_given_up_after_all_poses_nearby(compiled, run_tree, script, fa
     assert script.begun.count("clear_costmap") == script.begun.count("back_off") == 4
 
 
+def test_what_is_put_down_is_brought_beside_the_goal_where_there_is_no_way_to_it(compiled, run_tree, fails, robot):
+    robot.holding = True
+    navigate = fails("navigate", *[Cause.PLANNING] * 3)
+    run_tree(compiled("Take [coke] to [counter] and do [Nothing] to [Nothing]"))
+    assert [inputs.goal for inputs in navigate.inputs] == [Pose2D(4.5, -1.0, 0.0)] * 3 + [Pose2D(4.0, -1.0, 0.0)]
+
+
 # ---- not seen
 
 

@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.approach.standing import free_places, reachable
-from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill
+from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill, Goal
 from skills.arm.collision import ArmScene, Box, box_corners
 from skills.arm.kinematics import ArmModel
 from skills.arm.poses import carry_configuration, overview_viewpoints, tucked_configuration
@@ -349,7 +349,22 @@ class Place(ArmSkill[PlaceInputs]):
         self.boxes = [*surface_boxes([surface], X_WB), *beside]
         letting_go = Release(beside, self.release_rad())
         goal = above_goal(on_top, held, self.context.stack.arm_planner, letting_go)
-        return (yield from self.move_to(goal, f"bringing the object over the {surface.name}", speed_rad_s=0.8))
+        return (yield from self._bring(goal, held, f"bringing the object over the {surface.name}"))
+
+    def _bring(self, goal: Goal, held: HeldObject, message: str) -> Routine[FloatArray]:
+        """Go to a goal on a path on which what is held touches nothing; where there is none, the arm at least."""
+        found: list[FloatArray] = []
+
+        def noted(scene: ArmScene, q: FloatArray) -> FloatArray:
+            found.append(goal(scene, q))
+            return found[0]
+
+        try:
+            return (yield from self.move_to(with_held(noted, held.box_H), message, speed_rad_s=0.8))
+        except SkillFailure as failure:
+            if failure.cause is not Cause.PLANNING or not found:
+                raise
+        return (yield from self.move_to(lambda scene, q: found[0], message, speed_rad_s=0.8))
 
     def _lower(self, surface: Surface, q_above_rad: FloatArray) -> Routine[None]:
         """Go down slowly until the hand is held up, by contact, or the height is that of the surface.
@@ -508,6 +523,19 @@ def above_goal(
         raise PlanningError("no free spot is within the arm's reach")
 
     return goal
+
+
+def with_held(goal: Goal, box_H: Box) -> Goal:
+    """That goal; on the path to it the box is in the hand, unless that touches something at the path's very ends."""
+
+    def chosen(scene: ArmScene, q: FloatArray) -> FloatArray:
+        q_goal = goal(scene, q)
+        scene.hold([box_H])
+        if not (scene.free(q) and scene.free(q_goal)):
+            scene.hold(())
+        return q_goal
+
+    return chosen
 
 
 def _reaches(model: ArmModel, X_BH: RigidTransform) -> bool:

@@ -31,7 +31,7 @@ class Fallen(ExplainedLeaf):
     fell (`spot_key`); the square of floor about it, `half_m` to each side (`floor_key`); that square with those of
     `surfaces` that lie within `within_m` of the robot, onto which it may have fallen as well (`around_key`). What the
     gripper still holds by then has slipped, and is not yet lost: a smaller square of free floor says where to
-    set it down (`set_down_key`).
+    set it down (`set_down_key`), and all else is written anew for there: it is picked up from where it is set down.
     """
 
     thing: str
@@ -54,36 +54,45 @@ class Fallen(ExplainedLeaf):
         """Write where it is looked for: where the robot stands just now."""
         self.clear_explanation()
         self._end_s = self.context.clock.now() + self.settle_s
-        pose, board = self.context.pose(), self.context.board
+        pose = self.context.pose()
         here = (pose.x_m, pose.y_m)
-        near = (surface for surface in self.surfaces if distance_m(surface.polygon_W, here) <= self.within_m)
-        floor = floor_square(pose, self.ahead_m, self.half_m)
-        board.put(self.pose_key, pose)
-        spot = compose(pose, Pose2D(self.ahead_m, 0.0, 0.0))
-        board.put(self.spot_key, (spot.x_m, spot.y_m, 0.0))
-        board.put(self.floor_key, (floor,))
-        board.put(self.around_key, (floor, *near))
+        self._near = [surface for surface in self.surfaces if distance_m(surface.polygon_W, here) <= self.within_m]
+        self._write(pose, self.ahead_m)
 
     def update(self) -> Status:
         """Feel for a moment whether the gripper still holds something."""
         if self.context.clock.now() < self._end_s:
             self.message = f"feels whether the {self.thing} is still held"
             return Status.RUNNING
-        self.context.board.put(self.set_down_key, self._free_floor())
+        towards = self._towards_free_floor()
+        self.context.board.put(self.set_down_key, floor_square(towards, self.set_down_ahead_m, self.set_down_half_m))
         slipped = self.context.robot.gripper().holding
+        if slipped:
+            self._write(towards, self.set_down_ahead_m)
         happened = "slips in the gripper" if slipped else "fell"
         then = "is set down and gripped anew" if slipped else "is picked up again"
         self.cause, self.message = None, f"the {self.thing} {happened} on the way {self.to}; it {then}"
         return Status.SUCCESS
 
-    def _free_floor(self) -> Surface:
-        """Floor on which nothing stands, as straight ahead as may be: a robot at a table has the table ahead."""
+    def _write(self, pose: Pose2D, ahead_m: float) -> None:
+        """Write where the object lies: so far (m) before the body at a pose."""
+        board, spot = self.context.board, compose(pose, Pose2D(ahead_m, 0.0, 0.0))
+        floor = floor_square(pose, ahead_m, self.half_m)
+        board.put(self.pose_key, pose)
+        board.put(self.spot_key, (spot.x_m, spot.y_m, 0.0))
+        board.put(self.floor_key, (floor,))
+        board.put(self.around_key, (floor, *self._near))
+
+    def _towards_free_floor(self) -> Pose2D:
+        """The robot's pose, turned to floor on which nothing stands, as little as may be.
+
+        A robot at a table has the table ahead.
+        """
         pose, costmap = self.context.pose(), self.context.costmap
         turned = [compose(pose, Pose2D(0.0, 0.0, turn)) for turn in _TURNS_RAD]
         middles = [compose(each, Pose2D(self.set_down_ahead_m, 0.0, 0.0)) for each in turned]
         clear_m = costmap.clearance_m(np.array([[middle.x_m, middle.y_m] for middle in middles]))
-        first = int(np.argmax(clear_m >= self.set_down_half_m))
-        return floor_square(turned[first], self.set_down_ahead_m, self.set_down_half_m)
+        return turned[int(np.argmax(clear_m >= self.set_down_half_m))]
 
 
 def floor_square(pose: Pose2D, ahead_m: float, half_m: float) -> Surface:

@@ -10,7 +10,7 @@ from skills.api import Cause, Failed, Running, Surface
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model
 from skills.arm.motion import RrtConnect
-from skills.place.skill import HeldObject, Place, PlaceInputs, Release, above_goal, clear_heights
+from skills.place.skill import HeldObject, Place, PlaceInputs, Release, above_goal, clear_heights, with_held
 from skills.robot import Pose2D
 
 MODEL = arm_model(spot_capabilities())
@@ -100,6 +100,19 @@ def test_a_spot_is_left_out_where_the_open_hand_would_touch_a_tall_thing_beside_
     goal = above_goal(spots_B, HeldObject(LEVEL_FORWARD, can_H), RrtConnect(), Release(beside, 0.7))
     above = MODEL.X_BH(goal(scene, CARRYING)).translation()
     assert int(np.argmin([abs(above[1] - spot[1]) for spot in spots_B])) == taken
+
+
+# How high (m) a surface below the hand at its goal is -> whether the path is planned with the object in the hand
+@pytest.mark.parametrize(("top_m", "held"), [(-0.3, True), (0.1, False)])
+def test_what_is_held_keeps_clear_on_the_way_unless_it_touches_something_at_an_end(top_m, held):
+    scene, can = ArmScene(spot_capabilities(), MODEL, {}), Box(RigidTransform([0.2, -0.08, 0.0]), (0.06, 0.16, 0.06))
+    above_B = RigidTransform(LEVEL_FORWARD, [0.8, 0.0, 0.25])
+    (q_goal, *_) = MODEL.inverse(above_B)
+    scene.set_boxes([Box(RigidTransform([1.0, 0.0, top_m - 0.05]), (0.3, 0.6, 0.1))])
+    with_held(lambda scene, q: q_goal, can)(scene, CARRYING)
+    lower = MODEL.inverse(RigidTransform(LEVEL_FORWARD, [0.8, 0.0, top_m + 0.1]))[0]
+    assert scene.free(q_goal)
+    assert scene.free(lower) is not held
 
 
 BENCH = Surface("bench", ((0.0, -0.5), (0.6, -0.5), (0.6, 0.5), (0.0, 0.5)), 0.82)

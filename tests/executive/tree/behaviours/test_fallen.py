@@ -65,6 +65,19 @@ def test_it_is_set_down_before_where_the_robot_has_come_to_rest(leaf, clock, rob
     assert (min(xs), max(xs)) == pytest.approx((1.35, 1.95))
 
 
+def test_what_slips_is_looked_for_where_it_is_set_down(leaf, clock, robot, context):
+    robot.holding = True
+    leaf.context = replace(context, costmap=BlockCostmap([Block(0.75, -0.4, 1.55, 0.4, z1=1.0)]))
+    ended(leaf, clock)
+    turn = math.radians(60)
+    middle = [1.15 * math.cos(turn), 1.15 * math.sin(turn)]
+    (floor,) = context.board.get("alice/floor")
+    assert [sum(axis) / 4 for axis in zip(*floor.polygon_W, strict=True)] == pytest.approx(middle)
+    assert context.board.get("alice/spot") == pytest.approx((*middle, 0.0))
+    assert context.board.get("alice/pose").yaw_rad == pytest.approx(turn)
+    assert [surface.name for surface in context.board.get("alice/around")] == ["floor", "bench"]
+
+
 def test_it_begins_anew_with_where_the_robot_is_then(leaf, clock, robot, context):
     ended(leaf, clock)
     robot.standing = Pose2D(3.0, 0.0, 0.0)

@@ -23,7 +23,7 @@ AROUND: Final = "around"
 """The name of the body that stands for all boxes."""
 EDGE_STEP_RAD = 0.05
 """How far apart (rad, all joints together) the configurations of a motion are checked."""
-_LINK_RADIUS_M = 0.06
+_LINK_RADIUS_M, _PARALLEL = 0.06, 1e-6
 _SCENES_KEPT, _FAR_M = 4, 100.0
 
 
@@ -33,6 +33,28 @@ class Box:
 
     X_FG: RigidTransform
     size_m: tuple[float, float, float]
+
+
+def gaps_m(box: Box, boxes: Sequence[Box], moves: FloatArray) -> FloatArray:
+    """How far (m) a box is at least from each of N others after each of K moves (K, 3): (K, N).
+
+    It is negative where they overlap. All are in one frame. By the fifteen axes that separate boxes (Gottschalk, Lin
+    and Manocha, "OBBTree", 1996).
+    """
+    if not boxes:
+        return np.empty((len(moves), 0))
+    poses = np.array([other.X_FG.GetAsMatrix34() for other in boxes])
+    own, others = box.X_FG.rotation().matrix().T, np.swapaxes(poses[:, :, :3], 1, 2)  # rows are the sides' directions
+    crossed = np.cross(own[None, :, None, :], others[:, None, :, :]).reshape(-1, 9, 3)
+    lengths = np.linalg.norm(crossed, axis=2, keepdims=True)
+    crossed = np.where(lengths > _PARALLEL, crossed / np.maximum(lengths, _PARALLEL), own[0])
+    axes = np.concatenate([np.broadcast_to(own, others.shape), others, crossed], axis=1)
+    spans = np.abs(axes @ own.T) @ (0.5 * np.array(box.size_m))
+    spans += np.einsum(
+        "nas,ns->na", np.abs(axes @ np.swapaxes(others, 1, 2)), 0.5 * np.array([b.size_m for b in boxes])
+    )
+    apart = np.einsum("nac,nc->na", axes, poses[:, :, 3] - box.X_FG.translation())
+    return np.asarray(np.max(np.abs(apart - np.einsum("nac,kc->kna", axes, moves)) - spans, axis=2))
 
 
 def box_corners(box: Box) -> FloatArray:

@@ -51,7 +51,8 @@ def solid_boxes(
 ) -> list[Box]:
     """Boxes in the body frame about the cells within a reach, but those whose middles p_W (N, 3) are `left_out`.
 
-    What is behind a cell, up to 32 cm, is unknown and counts as solid, too: of a board only the edge is seen.
+    What is behind a cell, up to 32 cm and within the reach, is unknown and counts as solid, too: of a board only the
+    edge is seen.
     """
     middles, origin_W = _middles(cells), X_WB.translation()
     middles = middles[np.linalg.norm((middles - origin_W)[:, :2], axis=1) < reach_m]
@@ -61,6 +62,7 @@ def solid_boxes(
     away = (middles - origin_W) * [1.0, 1.0, 0.0]
     away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
     deep = np.concatenate([middles + n * CELL_M * away for n in range(_SHADOW_CELLS)])
+    deep = deep[np.linalg.norm(deep - origin_W, axis=1) < reach_m]
     X_BW = X_WB.inverse()
     solid = np.floor(deep[~left_out(deep)] / CELL_M).astype(np.int64)
     return [_box(low, high, X_BW) for low, high in merged(solid)]

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import ObjectObservation, PlanningError
-from skills.arm.collision import ArmScene, Box
+from skills.arm.collision import ArmScene, Box, gaps_m
 from skills.arm.kinematics import ArmModel
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.quantities import Margin, TurnRate
@@ -23,7 +23,9 @@ PREGRASPS_M = (0.12, 0.07, 0.045)
 LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0), (0.03, 0.0))
 """Ways to lift, up and back towards the shoulder, the best first."""
 _SLOW_POINTS, _OTHERS_TRIED, _ASKED, _OUT_OF_REACH = 3, 3, 40, "out of reach"
-_OFF_M = 0.015
+_OFF_M, _LIFT_STEP_M, _LIFT_MARGIN_M = 0.015, 0.01, 0.002
+_ALIKE_RAD = 0.3
+"""What cannot be lifted from one posture of an arm with a joint to spare cannot be from one so near to it."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,17 @@ class Surroundings:
     others: Sequence[Obstacle] = ()
     thing: str = "object"
     reach_m: float = np.inf
+
+    def lets_rise(self, lift_B: FloatArray) -> bool:
+        """Whether the object meets nothing on a straight way up.
+
+        It is taken a little smaller than its box, so that what it stands on and beside is off it. What overlaps it all
+        the same is a part of it: seen from high up, a screwdriver's shaft is an object of its own beside the handle.
+        """
+        steps = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(lift_B) / _LIFT_STEP_M))
+        x, y, z = (max(side - 2.0 * _OFF_M, 0.005) for side in self.target.size_m)
+        gaps = gaps_m(Box(self.target.X_FG, (x, y, z)), self.boxes, steps[:, None] * lift_B)
+        return bool(np.all((gaps > _LIFT_MARGIN_M) | (gaps[0] < 0.0)))
 
     def without(self, others: Sequence[Obstacle]) -> Surroundings:
         """As if some of the other objects were not there."""
@@ -162,7 +175,7 @@ class GeometricGraspPlanner:
         """The straight approach path from the pre-grasp, and the lift (frame B). Raises PlanningError."""
         scene.set_boxes(around.boxes)
         scene.set_padding(self.final_padding_m)
-        reason = _OUT_OF_REACH
+        reason, no_lift_rad = _OUT_OF_REACH, list[FloatArray]()
         for distance in PREGRASPS_M:
             solutions = scene.model.inverse(candidate.retreated(distance), margin_rad=0.06)
             turned = [scene.model.turned_near(q, q_near_rad) for q in solutions]
@@ -172,7 +185,9 @@ class GeometricGraspPlanner:
                     continue
                 try:
                     approach = arm_planner.line(scene.model, q, candidate.X_BH, scene)
-                    return approach, _lift(scene, approach[-1], around, arm_planner)
+                    if not any(np.max(np.abs(approach[-1] - other)) < _ALIKE_RAD for other in no_lift_rad):
+                        no_lift_rad.append(approach[-1])
+                        return approach, _lift(scene, approach[-1], around, arm_planner)
                 except PlanningError as error:
                     reason = str(error)
         raise PlanningError(reason)
@@ -216,21 +231,13 @@ def _lift(scene: ArmScene, q_rad: FloatArray, around: Surroundings, arm_planner:
     Raises PlanningError.
     """
     X_BH = scene.model.X_BH(q_rad)
-    scene.hold([_off_surface(X_BH.inverse(), around)])
-    try:
-        for lift_B in lifts(scene.model, X_BH, around.up_B):
-            try:
-                lifted = RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B)
-                arm_planner.line(scene.model, q_rad, lifted, scene)
-            except PlanningError:
-                continue
-            return lift_B
-    finally:
-        scene.hold(())
+    for lift_B in lifts(scene.model, X_BH, around.up_B):
+        if not around.lets_rise(lift_B):
+            continue
+        try:
+            lifted = RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B)
+            arm_planner.line(scene.model, q_rad, lifted, scene)
+        except PlanningError:
+            continue
+        return lift_B
     raise PlanningError("the arm cannot lift the object from there")
-
-
-def _off_surface(X_HB: RigidTransform, around: Surroundings) -> Box:
-    """The object in the hand (frame H): a little less than its box, so that what it stands on and beside is off it."""
-    x, y, z = (max(side - 2.0 * _OFF_M, 0.005) for side in around.target.size_m)
-    return Box(X_HB @ around.target.X_FG, (x, y, z))

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from plant.fetch.capabilities import fetch_capabilities
 from plant.spot.capabilities import spot_capabilities
-from skills.arm.collision import AROUND, ArmScene, Box
+from skills.arm.collision import AROUND, ArmScene, Box, gaps_m
 from skills.arm.kinematics import arm_model
 
 CAPABILITIES = spot_capabilities()
@@ -90,3 +90,21 @@ def test_what_is_free_with_the_torso_up_may_touch_once_it_is_down() -> None:
 def test_without_a_lift_free_as_usual_says_nothing_against_it(scene: ArmScene) -> None:
     scene.set_boxes([AT_HAND])
     assert scene.free_as_usual(AHEAD)
+
+
+# a cube with sides of 0.2 m at the origin: where another stands, how it is turned about z, how far it is off
+@pytest.mark.parametrize(
+    ("place", "turn_rad", "gap_m"),
+    [
+        ((1.0, 0.0, 0.0), 0.0, 0.8),
+        ((0.0, 0.0, -0.5), 0.0, 0.3),
+        ((0.5, 0.0, 0.0), np.pi / 4, 0.4 - 0.1 * np.sqrt(2.0)),
+        ((0.15, 0.0, 0.0), 0.0, -0.05),
+    ],
+)
+def test_boxes_are_as_far_apart_as_along_the_axis_that_separates_them_best(place, turn_rad, gap_m):
+    side_m = (0.2, 0.2, 0.2)
+    other = Box(RigidTransform(RotationMatrix.MakeZRotation(turn_rad), place), side_m)
+    gaps = gaps_m(Box(RigidTransform(), side_m), [other], np.array([[0.0, 0.0, 0.0], [0.0, 3.0, 0.0]]))
+    assert gaps[0] == pytest.approx([gap_m])
+    assert gaps[1, 0] > 2.5  # moved away

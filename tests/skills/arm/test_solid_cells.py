@@ -32,6 +32,13 @@ def test_what_is_seen_is_solid_and_what_is_behind_it_too():
     assert not inside(boxes, (0.8, 0.0, 0.95))
 
 
+def test_what_is_behind_it_ends_where_the_arm_does_not_reach():
+    can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
+    boxes = solid_boxes(with_picture(NOTHING, picture(can), RigidTransform(), nothing_of), BODY, 1.1, nothing_of)
+    assert inside(boxes, (0.97, 0.0, 0.9))
+    assert not inside(boxes, (1.15, 0.0, 0.9))
+
+
 def test_what_was_taken_away_is_forgotten_once_it_is_seen_past():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
     cells = with_picture(NOTHING, picture(can), RigidTransform(), nothing_of)

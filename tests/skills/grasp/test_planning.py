@@ -91,3 +91,19 @@ def test_why_there_is_no_grasp_is_asked_of_a_bounded_number_of_candidates():
     with pytest.raises(PlanningError):
         Counted().plan(scene, MODEL.stowed_rad, candidates, around, RrtConnect(), np.random.default_rng(0))
     assert 100 < len(asked) < 200
+
+
+# what else is there (m, frame B) about a can on a table, and whether it rises by 0.12 m
+@pytest.mark.parametrize(
+    ("place", "size_m", "rises"),
+    [
+        ((0.85, 0.0, 0.1), (1.0, 1.0, 0.2), True),  # the table
+        ((0.85, 0.0, 0.4), (0.3, 0.3, 0.02), False),  # the next board of a shelf
+        ((0.95, 0.0, 0.3), (0.06, 0.06, 0.3), True),  # what stands beside it
+        ((0.87, 0.0, 0.27), (0.05, 0.2, 0.03), True),  # a part of it that was seen as an object of its own
+    ],
+)
+def test_an_object_rises_where_nothing_is_over_it(place, size_m, rises):
+    can = Box(RigidTransform([0.85, 0.0, 0.26]), (0.07, 0.07, 0.12))
+    around = Surroundings([Box(RigidTransform(place), size_m)], can, UP)
+    assert around.lets_rise(np.array([0.0, 0.0, 0.12])) == rises

@@ -107,10 +107,12 @@ class ArmScene:
         finally:
             self._now, self._X_BF, self._opening = before, X_BF, opening_before_rad
 
-    def beside_body_m(self, q_rad: FloatArray) -> float:
-        """How far the arm sticks out to a side of the body's footprint (m); 0 where it does not."""
-        half_m = float(np.max(np.abs(np.asarray(self._capabilities.footprint_m)[:, 1])))
-        return max(0.0, float(np.max(np.abs(self.model.points_B(q_rad)[:, 1]))) + _LINK_RADIUS_M - half_m)
+    def beyond_body_m(self, q_rad: FloatArray) -> tuple[float, float]:
+        """How far the arm sticks out of the body's footprint ahead and to a side (m); 0 where it does not."""
+        most_m = np.max(np.abs(np.asarray(self._capabilities.footprint_m)), axis=0)
+        x, y, _ = self.model.points_B(q_rad).T
+        ahead_m, beside_m = float(np.max(x) - most_m[0]), float(np.max(np.abs(y)) - most_m[1])
+        return max(0.0, ahead_m + _LINK_RADIUS_M), max(0.0, beside_m + _LINK_RADIUS_M)
 
     def hold(self, boxes: Sequence[Box]) -> None:
         """Replace the boxes fixed to the hand (frame H), for a thing held."""

@@ -40,6 +40,7 @@ def test_what_sticks_out_ahead_is_drawn_in_beside_the_body_as_upright_as_it_was(
     tips_m = [model.X_BH(q) @ np.array([fetch.gripper.tip_x_m, 0.0, 0.0]) for q in (ahead, drawn_in)]
     assert tips_m[0][0] > 0.65
     assert np.hypot(*tips_m[1][:2]) < 0.42
+    assert scene.beyond_body_m(drawn_in)[0] < 0.1
     tilts = [model.X_BH(q).rotation().matrix()[2] for q in (ahead, drawn_in)]
     assert tilts[0] == pytest.approx(tilts[1], abs=1e-6)
     assert scene.free(drawn_in)
@@ -51,7 +52,7 @@ def test_an_arm_that_carries_keeps_its_elbow_near_the_body(tilt_rad):
     fetch, model = fetch_capabilities(), arm_model(fetch_capabilities())
     scene = ArmScene(fetch, model, {fetch.lift_joint: fetch.standing_height_m - fetch.height_range_m[0]})
     q = carry_configuration(scene, fetch.arm, hand_rotation(tilt_rad, 0.0, 1.0), model.stowed_rad)
-    assert scene.beside_body_m(q) < 0.04  # 0.14 where nothing is said about it
+    assert scene.beyond_body_m(q)[1] < 0.04  # 0.14 where nothing is said about it
 
 
 def test_what_cannot_be_drawn_in_is_told():

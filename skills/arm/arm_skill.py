@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -51,6 +52,7 @@ _RELEASE_RAD = 0.4
 _ASIDE_M, _LEVEL = 0.018, 0.5
 """Fixed finger and palm leave the object by so much before the hand is drawn back, or it would drag it along."""
 _BACK_M = (0.16, 0.12, 0.08, 0.05)
+_UP_B = np.array([0.0, 0.0, 1.0])
 _AT_ARM_M = 0.12
 _BEYOND_M = 0.5
 _HEAD_EXPIRY_S, _HELD_RADIUS_M = 5.0, 0.2
@@ -408,12 +410,12 @@ class ArmSkill(RoutineSkill[InputsT]):
 
         Fingers that both open are off it already.
         """
-        fingers, _, closing = self.model.X_BH(self.q_rad()).rotation().matrix().T
+        X_BH = self.model.X_BH(self.q_rad())
+        fingers, _, closing = X_BH.rotation().matrix().T
         if abs(closing[2]) < _LEVEL and self.gripper.kind is GripperKind.HINGED:
             aside = -_ASIDE_M * (closing * [1.0, 1.0, 0.0] + fingers)
             yield from self.try_shift_hand(aside, "letting go")
-        up_B = np.array([0.0, 0.0, 1.0])
-        for way_B in (*(-back_m * fingers for back_m in _BACK_M), *(back_m * up_B for back_m in _BACK_M)):
+        for way_B in ways_back_B(X_BH, self.model.p_BS):
             if (yield from self.try_shift_hand(way_B, "drawing the hand back")):
                 return True
         return False
@@ -499,3 +501,14 @@ class ArmSkill(RoutineSkill[InputsT]):
             yield from self.stow("stowing the arm after the failure")
         except SkillFailure:
             return
+
+
+def ways_back_B(X_BH: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
+    """Shifts of the hand away from what it has let go of, the best first: back along the fingers, up, up and back.
+
+    The last ways are towards the shoulder at p_BS: an arm that is stretched out has no other.
+    """
+    home_B = (p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
+    home_B = home_B / max(float(np.linalg.norm(home_B)), 1e-6)
+    ways_B = (-X_BH.rotation().matrix()[:, 0], _UP_B, math.sqrt(0.5) * (_UP_B + home_B))
+    return [back_m * way_B for way_B in ways_B for back_m in _BACK_M]

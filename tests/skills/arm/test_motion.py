@@ -1,13 +1,16 @@
 """Planned arm paths: free of contact, within limits, refused where they must be."""
 
+from contextlib import suppress
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from plant.fetch.capabilities import fetch_capabilities
 from plant.spot.capabilities import spot_capabilities
 from skills.api import PlanningError
+from skills.arm.arm_skill import ways_back_B
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model
 from skills.arm.motion import RrtConnect
@@ -142,3 +145,17 @@ def test_a_start_in_contact_is_left_without_touching_anything_else(scene):
     touched = {pair for q in np.linspace(path[0], path[1], 8) for pair in scene.contacts(q)}
     assert scene.free(path[1])
     assert touched <= set(scene.contacts(LEFT))
+
+
+def test_a_hand_leaves_what_it_has_put_down_with_the_arm_stretched_out():
+    # a Fetch put a screwdriver down on a workbench, the hand pointing down
+    q = np.array([-0.191, -0.163, -5.484, 0.295, 5.498, 1.515, 1.754])
+    model = arm_model(fetch_capabilities())
+    X_BH = model.X_BH(q)
+    free = []
+    for way_B in ways_back_B(X_BH, model.p_BS):
+        with suppress(PlanningError):
+            RrtConnect().line(model, q, RigidTransform(X_BH.rotation(), X_BH.translation() + way_B))
+            free.append(way_B)
+    assert free
+    assert free[0] == pytest.approx([-0.113, 0.011, 0.113], abs=0.003)  # up and towards the shoulder

@@ -28,7 +28,7 @@ from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
 from executive.tree.snapshot import Snapshot
-from skills.api import Cause, LeavesOthersOut, Publish, Worker
+from skills.api import Cause, Publish, Worker
 from skills.robot import Clock
 
 _PATHS_PERIOD_S = 0.5
@@ -266,11 +266,10 @@ class _Run:
 
     def _sense(self, session: WithoutWork) -> None:
         """Bring a robot's estimators up to date, and tell the others where it believes to be."""
-        if self._traffic is not None:
+        if self._traffic is not None and (estimators := session.context.leave_others_out):
             covered_W = self._traffic.covered_W(session.name)
-            for estimator in (session.context.localiser, session.context.costmap):
-                if isinstance(estimator, LeavesOthersOut):
-                    estimator.leave_out(covered_W)
+            for estimator in estimators:
+                estimator.leave_out(covered_W)
         session.sense()
         if self._traffic is not None:
             self._traffic.heard(session.name, session.context.known_pose())

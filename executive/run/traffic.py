@@ -33,6 +33,18 @@ class _Robot:
     turn: int | None = None
     told: Mapping[str, Any] | None = None
     idle: bool = False
+    _covered: tuple[FloatArray, FloatArray, FloatArray] | None = None
+
+    def covered_W(self) -> FloatArray:
+        """What it covers where it believes to be: discs (N, 3) of x, y and radius (m, world), a little wider."""
+        if self.pose is None:
+            return np.empty((0, 3))
+        if self._covered is None or self._covered[0] is not self.pose or self._covered[1] is not self.discs:
+            c, s = np.cos(self.pose[2]), np.sin(self.pose[2])
+            centres = self.pose[:2] + self.discs[:, :2] @ np.array([[c, s], [-s, c]])
+            about_W = np.column_stack([centres, self.discs[:, 2] + _ABOUT_M])
+            self._covered = self.pose, self.discs, about_W
+        return self._covered[2]
 
 
 class TrafficTable:
@@ -116,12 +128,8 @@ class TrafficTable:
 
         What a robot sees there is one of them.
         """
-        covered = [np.empty((0, 3))]
-        for one in self.others(name):
-            c, s = np.cos(one.pose[2]), np.sin(one.pose[2])
-            centres = one.pose[:2] + one.discs[:, :2] @ np.array([[c, s], [-s, c]])
-            covered.append(np.column_stack([centres, one.discs[:, 2] + _ABOUT_M]))
-        return np.vstack(covered)
+        others = [robot for other, robot in self._robots.items() if other != name and not self._silent(robot)]
+        return np.vstack([np.empty((0, 3)), *(robot.covered_W() for robot in others)])
 
     def goes_before(self, one: str, other: str) -> bool:
         """Whether one has the right of way: it claimed first, and still answers."""

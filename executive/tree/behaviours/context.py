@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 
 from py_trees.behaviour import Behaviour
 
 from executive.tree.behaviours.board import Board
-from skills.api import SkillContext
+from skills.api import LeavesOthersOut, SkillContext
 from skills.robot import Pose2D
 
 
@@ -78,6 +79,11 @@ class RunContext(SkillContext):
     presses: Callable[[], Mapping[str, int]] = no_presses
     day_began_s: float = 0.0
     endings: Endings = field(default_factory=Endings)
+
+    @cached_property
+    def leave_others_out(self) -> tuple[LeavesOthersOut, ...]:
+        """The estimators that leave other robots to those who know where they are."""
+        return tuple(each for each in (self.localiser, self.costmap) if isinstance(each, LeavesOthersOut))
 
     def known_pose(self) -> Pose2D | None:
         """Where the robot believes to be, the planar part of X_WB; None while it is not localised."""

@@ -103,7 +103,7 @@ def carry_configuration(
     points_down = R_BH.matrix()[2, 0] < -0.8
     upright = [] if points_down else _turned(R_BH, (0.0, 0.4, -0.4))
     for rotations in (upright, *map(_forward, _CARRY_PITCHES_RAD)):
-        q = _best_free(scene, rotations, arm.carry_x_m, arm.carry_z_m, arm.carry_best_x_m, q_near_rad, _NARROW)
+        q = _best_free(scene, rotations, arm.carry_x_m, arm.carry_z_m, arm.carry_best_x_m, q_near_rad)
         if q is not None:
             return q
     raise PlanningError("no pose to carry the thing near the body is free of contact")
@@ -117,7 +117,7 @@ def tucked_configuration(
     Raises PlanningError when no such pose is free.
     """
     beside = _turned(R_BH, (0.5 * np.pi, -0.5 * np.pi))
-    q = _best_free(scene, beside, arm.tuck_x_m, arm.carry_z_m, arm.tuck_x_m[0], q_near_rad, _SHORT)
+    q = _best_free(scene, beside, arm.tuck_x_m, arm.carry_z_m, arm.tuck_x_m[0], q_near_rad)
     if q is None:
         raise PlanningError("the thing cannot be drawn in to the body")
     return q
@@ -130,24 +130,19 @@ def _best_free(
     z_m: Sequence[float],
     best_x_m: float,
     q_near_rad: FloatArray,
-    beyond_cost: FloatArray,
 ) -> FloatArray | None:
     """The cheapest arm angles, free of contact, with the hand turned so at one of the places before B; None: none.
 
-    `beyond_cost` is for each metre that the arm sticks out of the body, ahead and beside it.
+    One drives along walls and up to furniture with them, so the arm is to stick out of the body as little as may be.
     """
     candidates = [
-        (_carry_cost(x - best_x_m, z, q, q_near_rad) + float(beyond_cost @ scene.beyond_body_m(q)), q)
+        (_carry_cost(x - best_x_m, z, q, q_near_rad) + sum(scene.beyond_body_m(q)), q)
         for rotation, x, z in itertools.product(rotations, x_m, z_m)
         for solution in scene.model.inverse(RigidTransform(rotation, [x, 0.0, z]), margin_rad=0.05)
         for q in [scene.model.turned_near(solution, q_near_rad)]
     ]
     cheapest = sorted(candidates, key=lambda candidate: candidate[0])
     return next((q for _, q in cheapest if scene.free(q) and scene.free_as_usual(q)), None)
-
-
-_NARROW, _SHORT = np.array([0.0, 1.0]), np.array([1.0, 0.0])
-"""One drives along walls with what is carried ahead, and up to furniture with what is drawn in."""
 
 
 def _carry_cost(off_x_m: float, z_m: float, q_rad: FloatArray, q_near_rad: FloatArray) -> float:

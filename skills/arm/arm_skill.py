@@ -17,7 +17,7 @@ from skills.arm.collision import ArmScene, Box
 from skills.arm.gaze import head_angles, without_arm
 from skills.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.arm.kinematics import ArmModel, arm_model
-from skills.arm.poses import look_configuration
+from skills.arm.poses import UP_B, look_configuration, towards_shoulder
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.arm.solid_cells import solid_boxes, with_picture, with_view
 from skills.estimate.self_filter import segment_distance
@@ -52,7 +52,6 @@ _RELEASE_RAD = 0.4
 _ASIDE_M, _LEVEL = 0.018, 0.5
 """Fixed finger and palm leave the object by so much before the hand is drawn back, or it would drag it along."""
 _BACK_M = (0.16, 0.12, 0.08, 0.05)
-_UP_B = np.array([0.0, 0.0, 1.0])
 _AT_ARM_M = 0.12
 _BEYOND_M = 0.5
 _HEAD_EXPIRY_S, _HELD_RADIUS_M = 5.0, 0.2
@@ -415,8 +414,8 @@ class ArmSkill(RoutineSkill[InputsT]):
         if abs(closing[2]) < _LEVEL and self.gripper.kind is GripperKind.HINGED:
             aside = -_ASIDE_M * (closing * [1.0, 1.0, 0.0] + fingers)
             yield from self.try_shift_hand(aside, "letting go")
-        for way_B in ways_back_B(X_BH, self.model.p_BS):
-            if (yield from self.try_shift_hand(way_B, "drawing the hand back")):
+        for shift_B in retreats_B(X_BH, self.model.p_BS):
+            if (yield from self.try_shift_hand(shift_B, "drawing the hand back")):
                 return True
         return False
 
@@ -503,12 +502,14 @@ class ArmSkill(RoutineSkill[InputsT]):
             return
 
 
-def ways_back_B(X_BH: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
+def retreats_B(X_BH: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
     """Shifts of the hand away from what it has let go of, the best first: back along the fingers, up, up and back.
 
-    The last ways are towards the shoulder at p_BS: an arm that is stretched out has no other.
+    The last are towards the shoulder at p_BS: an arm that is stretched out has no other.
     """
-    home_B = (p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
-    home_B = home_B / max(float(np.linalg.norm(home_B)), 1e-6)
-    ways_B = (-X_BH.rotation().matrix()[:, 0], _UP_B, math.sqrt(0.5) * (_UP_B + home_B))
-    return [back_m * way_B for way_B in ways_B for back_m in _BACK_M]
+    directions_B = (
+        -X_BH.rotation().matrix()[:, 0],
+        UP_B,
+        math.sqrt(0.5) * (UP_B + towards_shoulder(p_BS, X_BH.translation())),
+    )
+    return [back_m * direction_B for direction_B in directions_B for back_m in _BACK_M]

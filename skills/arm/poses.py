@@ -13,14 +13,14 @@ from skills.arm.collision import ArmScene
 from skills.arm.kinematics import ArmModel
 from skills.robot import ArmCapabilities, FloatArray
 
-_UP = np.array([0.0, 0.0, 1.0])
+UP_B = np.array([0.0, 0.0, 1.0])
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
 
 
 def camera_pose(p_BC: FloatArray, p_BT: FloatArray) -> RigidTransform:
     """X_BC of a camera at p_BC that looks at p_BT with the picture upright."""
     forward = (p_BT - p_BC) / np.linalg.norm(p_BT - p_BC)
-    right = np.cross(forward, _UP)
+    right = np.cross(forward, UP_B)
     right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.array([0.0, -1.0, 0.0])
     return RigidTransform(RotationMatrix(np.stack([right, np.cross(forward, right), forward], axis=1)), p_BC)
 
@@ -48,7 +48,7 @@ def overview_viewpoints(model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.
     direction = np.arctan2(p_BT[1] - model.p_BS[1], p_BT[0] - model.p_BS[0]) + shift_rad
     heading = np.array([np.cos(direction), np.sin(direction), 0.0])
     return [
-        model.p_BS + radius * heading + height * _UP
+        model.p_BS + radius * heading + height * UP_B
         for height, radius in itertools.product((0.5, 0.44, 0.36), (0.22, 0.32, 0.42))
     ]
 
@@ -83,13 +83,19 @@ def viewpoints_beside(p_BS: FloatArray, p_BC: FloatArray, p_BT: FloatArray, asid
     """
     left, left_of_shoulder = _left_of(p_BC, p_BT), _left_of(p_BS, p_BT)
     outwards = left if (p_BC - p_BS) @ left_of_shoulder >= 0.0 else -left
-    return [p_BC + aside_m * step for step in (outwards, outwards - _UP, _UP, -outwards, -outwards - _UP)]
+    return [p_BC + aside_m * step for step in (outwards, outwards - UP_B, UP_B, -outwards, -outwards - UP_B)]
 
 
 def _left_of(p_B: FloatArray, p_BT: FloatArray) -> FloatArray:
     """The level unit vector to the left when looking from one point to another."""
     ahead = (p_BT - p_B)[:2] / max(float(np.linalg.norm((p_BT - p_B)[:2])), 1e-6)
     return np.array([-ahead[1], ahead[0], 0.0])
+
+
+def towards_shoulder(p_BS: FloatArray, p_B: FloatArray) -> FloatArray:
+    """The level unit vector from a point towards the shoulder at p_BS; zero straight above or below it."""
+    home_B = (p_BS - p_B) * [1.0, 1.0, 0.0]
+    return np.asarray(home_B / max(float(np.linalg.norm(home_B)), 1e-6))
 
 
 def carry_configuration(

@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform
 from skills.api import ObjectObservation, PlanningError
 from skills.arm.collision import ArmScene, Box, gaps_m
 from skills.arm.kinematics import ArmModel
+from skills.arm.poses import towards_shoulder
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.quantities import Margin, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities
@@ -220,8 +221,7 @@ def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, m
 
 def lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[FloatArray]:
     """Ways to lift from a grasp, the best first."""
-    back = (model.p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
-    back = back / max(float(np.linalg.norm(back)), 1e-6)
+    back = towards_shoulder(model.p_BS, X_BH.translation())
     return [up_m * up_B + back_m * back for up_m, back_m in LIFTS_M]
 
 

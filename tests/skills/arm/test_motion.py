@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from plant.fetch.capabilities import fetch_capabilities
 from plant.spot.capabilities import spot_capabilities
 from skills.api import PlanningError
-from skills.arm.arm_skill import ways_back_B
+from skills.arm.arm_skill import retreats_B
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model
 from skills.arm.motion import RrtConnect
@@ -153,9 +153,9 @@ def test_a_hand_leaves_what_it_has_put_down_with_the_arm_stretched_out():
     model = arm_model(fetch_capabilities())
     X_BH = model.X_BH(q)
     free = []
-    for way_B in ways_back_B(X_BH, model.p_BS):
+    for shift_B in retreats_B(X_BH, model.p_BS):
         with suppress(PlanningError):
-            RrtConnect().line(model, q, RigidTransform(X_BH.rotation(), X_BH.translation() + way_B))
-            free.append(way_B)
+            RrtConnect().line(model, q, RigidTransform(X_BH.rotation(), X_BH.translation() + shift_B))
+            free.append(shift_B)
     assert free
     assert free[0] == pytest.approx([-0.113, 0.011, 0.113], abs=0.003)  # up and towards the shoulder

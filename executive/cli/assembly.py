@@ -10,7 +10,6 @@ from pathlib import Path
 from executive.cli.goal_conditions import Share, verdict_of
 from executive.cli.grids import grid_at
 from executive.cli.starts import PlacedRobot
-from executive.mission.errors import InputError
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
 from executive.tree.compiler import CompiledTree
@@ -21,6 +20,7 @@ from plant.variation import AS_IT_IS, Variation
 from plant.worlds.world import World, WorldError
 from skills.detection import Detector
 from skills.estimate.grid_map import MapError
+from skills.files.errors import InputError
 from skills.perception.detector.network_file import ModelFileError
 from skills.robot import Pose2D
 from skills.stack import DetectorComponent, RobotStack, default_stack

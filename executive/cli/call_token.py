@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from executive.mission.errors import InputError
 from executive.store.database import told
+from skills.files.errors import InputError
 
 __all__ = ["CallToken", "call_token"]
 

@@ -17,7 +17,6 @@ from executive.cli.output import BAD_INPUT, console_for, print_json, refusals
 from executive.cli.requests import Prepared, prepare
 from executive.cli.run_options import ROBOTS, SET, START, robots_of
 from executive.cli.stack_command import STACK
-from executive.mission.errors import InputError
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
 from executive.tree.compiler import CompiledTree
@@ -25,6 +24,7 @@ from executive.tree.estimate import Estimate, RoutePlanner
 from executive.tree.node_view import node_view
 from executive.view.collapse import folded_to
 from executive.view.text import to_rich
+from skills.files.errors import InputError
 
 SHOWN_NODES: Final = 40
 MOST_LETTERS: Final = 300

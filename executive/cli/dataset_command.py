@@ -20,8 +20,8 @@ from executive.cli.score_command import score_command
 from executive.cli.train_command import train_command
 from executive.cli.worker_pool import Pool
 from executive.evaluation.workers import Workers
-from executive.mission.errors import InputError
 from plant.dataset.errors import DatasetError
+from skills.files.errors import InputError
 
 if TYPE_CHECKING:
     from plant.dataset.shards import Summary

@@ -16,8 +16,8 @@ from rich.console import Console
 from executive.cli.detector_choice import detector_of, drawn
 from executive.cli.output import BAD_INPUT, console_for, print_json, refusals, show_table
 from executive.cli.picture_files import read_picture, write_picture
-from executive.mission.errors import InputError
 from skills.detection import Detection, Detector
+from skills.files.errors import InputError
 from skills.perception.detector.onnx_detector import DetectorOptions
 
 __all__ = ["detect"]

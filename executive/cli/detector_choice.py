@@ -8,8 +8,8 @@ from typing import Final
 
 import cv2
 
-from executive.mission.errors import InputError
 from skills.detection import Detection
+from skills.files.errors import InputError
 from skills.perception.detector.cascade_files import MODEL_FILE
 from skills.perception.detector.network_file import ModelFileError
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector, load_detector

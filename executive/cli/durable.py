@@ -11,7 +11,6 @@ from typing import Final
 
 from executive.cli.report import RunReport
 from executive.cli.requests import Prepared, commanded, prepare, prepared_for, replacing
-from executive.mission.errors import InputError, disk_is_full
 from executive.mission.request import Request
 from executive.record.reader import Event, read_events
 from executive.record.schemas import RUN
@@ -21,6 +20,7 @@ from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.recollection import Recollection
 from executive.store.records import Replacement
 from executive.store.resuming import ended_tree, resumed_tree
+from skills.files.errors import InputError, disk_is_full
 from skills.robot import Pose2D
 
 STORE: Final = "missions.sqlite"

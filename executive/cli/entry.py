@@ -17,7 +17,7 @@ from typer.main import get_command
 
 from executive.cli.run_options import StartCommand
 from executive.cli.wake_check import refuse_unaddressed
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 __all__ = ["app", "loaded", "main"]
 

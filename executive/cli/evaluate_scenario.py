@@ -25,7 +25,7 @@ from executive.evaluation.runs import Evaluation, RunSpec
 from executive.evaluation.scenario import load_evaluation
 from executive.evaluation.summary import Case, group_rows, groups_of, totals_of
 from executive.evaluation.workers import Workers
-from executive.mission.errors import Problems
+from skills.files.errors import Problems
 
 __all__ = ["command_of", "evaluate_scenario", "give_out_runs"]
 

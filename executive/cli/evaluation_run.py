@@ -21,10 +21,10 @@ from executive.cli.simulated import run_simulated
 from executive.evaluation.evidence import evidence_of, steps_of
 from executive.evaluation.outcome import RunOutcome
 from executive.evaluation.runs import RunSpec
-from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
 from executive.record.reader import read_events
+from skills.files.errors import InputError
 
 __all__ = ["lost_outcome", "request_of", "run_one"]
 

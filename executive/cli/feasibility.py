@@ -10,7 +10,6 @@ from pathlib import Path
 from executive.cli.requests import Prepared
 from executive.cli.route_cache import route_cache_of
 from executive.cli.starts import DEFAULT_KIND
-from executive.mission.errors import InputError, Problems
 from executive.mission.stack_file import load_stack
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
 from executive.tree.estimate import Route, RoutePlanner, load_estimates
@@ -18,6 +17,7 @@ from plant.kinds import robot_kind
 from plant.models.catalogue import load_catalogue
 from plant.worlds.world import World
 from skills.arm.kinematics import arm_model
+from skills.files.errors import InputError, Problems
 from skills.perception.attributes import known_attributes
 from skills.perception.class_forms import class_forms
 from skills.robot import Capabilities, Pose2D

@@ -22,10 +22,10 @@ from executive.cli.run_options import (
     time_limit_s,
 )
 from executive.cli.serve_command import AsJson
-from executive.mission.errors import InputError
 from executive.mission.robots import display_name, robot_called
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
+from skills.files.errors import InputError
 
 __all__ = ["fleet"]
 

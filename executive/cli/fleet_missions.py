@@ -15,7 +15,6 @@ from executive.cli.starts import PlacedRobot, knowledge_for
 from executive.fleet.auction import Bid
 from executive.language.robots import Part, Whom
 from executive.mission.command import Command, Task
-from executive.mission.errors import InputError
 from executive.mission.file.model import Mission
 from executive.mission.knowledge import Knowledge
 from executive.mission.mission import mission_from_lines
@@ -24,6 +23,7 @@ from executive.store.missions import MissionStore, StoredMission
 from executive.tree.check import Checked
 from executive.tree.estimate import RoutePlanner, load_estimates
 from plant.worlds.world import World
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 __all__ = [

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 from py_trees.common import Status
 
-from executive.mission.errors import listing
 from executive.mission.goal import Area, GoalCondition, GoalKind
 from executive.run.outcome import Outcome, RobotResult
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.tree.node import NodeSpec
 from plant import referee
+from skills.files.errors import listing
 from skills.speak.skill import Speak
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from executive.mission.errors import InputError
 from skills.estimate.grid_map import GridMap, MapError, load_grid_map
+from skills.files.errors import InputError
 
 __all__ = ["grid_at"]
 

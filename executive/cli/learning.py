@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from executive.cli.output import print_json
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 from skills.perception.training.labels import TrainingDataError, read_split
 from skills.perception.training.schedule import Budget, Report
 

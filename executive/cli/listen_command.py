@@ -20,7 +20,6 @@ from executive.cli.signals import interrupted_by_hang_up
 from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Status, Understanding, load_parser
 from executive.language.robots import Part
-from executive.mission.errors import InputError, listing
 from executive.mission.file.model import DEFAULT_WORLD
 from executive.mission.knowledge import Knowledge
 from executive.mission.robots import RobotSetup, display_name
@@ -31,6 +30,7 @@ from executive.speech.microphone import Hearing, follow, microphone_blocks
 from executive.speech.vocabulary import Vocabulary, of_world, read_vocabulary
 from executive.speech.voice import Voice, installed_voice
 from executive.speech.whisper import load_whisper
+from skills.files.errors import InputError, listing
 
 __all__ = ["answer_line", "called_robots", "hear_request", "heard_sentence", "listen", "listener_for", "show_hearing"]
 

@@ -12,10 +12,10 @@ from pathlib import Path
 
 from executive.cli.call_token import CallToken, call_token
 from executive.cli.trigger_calls import TriggerCalls
-from executive.mission.errors import InputError
 from executive.store.trigger_source import TriggerSource, trigger_source
 from executive.store.triggers import OnCall, OnTopic, Trigger
 from executive.view.calls import CallServer
+from skills.files.errors import InputError
 
 __all__ = ["CallAddress", "Listeners"]
 

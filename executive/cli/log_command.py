@@ -15,7 +15,6 @@ from rich.console import Console
 from rich.text import Text
 
 from executive.cli.output import console_for, refusals, show_table
-from executive.mission.errors import InputError
 from executive.record.history import History, read_history
 from executive.record.ros2 import write_ros2
 from executive.record.schemas import ERRORS
@@ -23,6 +22,7 @@ from executive.record.timeline import Entry, timeline
 from executive.view.map_picture import map_picture
 from executive.view.styles import style_of
 from executive.view.text import printable
+from skills.files.errors import InputError
 
 
 def log(

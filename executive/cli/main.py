@@ -56,7 +56,6 @@ from executive.cli.sweep import (
 from executive.evaluation.scenario import is_evaluation
 from executive.evaluation.seeds import seed_range
 from executive.language.questions import QuestionPolicy
-from executive.mission.errors import InputError
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
 from executive.mission.scenario import Scenario
@@ -64,6 +63,7 @@ from executive.mission.variation import NORMAL_LIGHT, Variation
 from executive.record.profile import Profile, lines
 from executive.speech.voice import Voice
 from executive.store.missions import MissionStore
+from skills.files.errors import InputError
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
 Say = Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')]

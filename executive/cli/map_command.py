@@ -16,8 +16,8 @@ import yaml
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.signals import cancelled_by_signals
 from executive.cli.worlds import open_world
-from executive.mission.errors import InputError
 from executive.run.control import Control
+from skills.files.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console

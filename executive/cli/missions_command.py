@@ -9,7 +9,7 @@ from typing import Annotated, Final
 import typer
 
 from executive.cli.output import console_for, refusals, show_table
-from executive.mission.errors import InputError, did_you_mean
+from skills.files.errors import InputError, did_you_mean
 
 __all__ = ["init", "mission_file", "missions", "shipped_missions"]
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from executive.cli.output import print_json, refusals
-from executive.mission.errors import InputError
 from plant.models.imported import ImportedFolderError, ImportedObject, read_imported
+from skills.files.errors import InputError
 from skills.perception.class_forms import class_forms
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 NOT_ACHIEVED = 1
 BAD_INPUT = 2

@@ -16,7 +16,6 @@ from executive.cli.replay_command import served, wait
 from executive.cli.requests import Prepared, prepare
 from executive.cli.talk import Talk, load_ahead
 from executive.conversation import ReplyKind
-from executive.mission.errors import InputError
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
@@ -30,6 +29,7 @@ from executive.view.feed import Feed
 from executive.view.server import PageContent, PageServer
 from executive.view.watch import ControlWatch, ProgressWatch
 from skills.estimate.grid_map import load_grid_map
+from skills.files.errors import InputError
 
 
 class PageView:

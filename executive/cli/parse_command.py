@@ -13,9 +13,9 @@ from executive.cli.output import BAD_INPUT, print_json, refusals
 from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Status, Understanding, explain, load_parser, parse_lines
 from executive.language.explain_views import arcs_svg, explanation_lines
-from executive.mission.errors import InputError
 from executive.mission.file.model import DEFAULT_WORLD
 from executive.mission.written import written
+from skills.files.errors import InputError
 
 __all__ = ["parse"]
 

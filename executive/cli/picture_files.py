@@ -11,7 +11,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 from skills.robot import Picture
 
 __all__ = ["MOST_PIXELS", "read_picture", "write_picture"]

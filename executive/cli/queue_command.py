@@ -17,7 +17,6 @@ from executive.cli.requests import prepare
 from executive.cli.run_options import ROBOTS, SET, robots_of
 from executive.cli.serve_command import AsJson, Out, Store, serve
 from executive.cli.stack_command import STACK
-from executive.mission.errors import InputError
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
@@ -26,6 +25,7 @@ from executive.store.standing import StandingMission, StandingMissions
 from executive.store.trigger_source import refuse_missing_source
 from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, local, schedule_of
 from executive.store.wakeup import wake_server
+from skills.files.errors import InputError
 
 __all__ = ["queue"]
 

@@ -12,10 +12,10 @@ from executive.cli.durable import Durable, as_it_was, kept, new_run, next_run, p
 from executive.cli.requests import Prepared, prepare
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.simulated import run_simulated
-from executive.mission.errors import InputError
 from executive.run.control import Control
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.tree.compiling.builder import slug
+from skills.files.errors import InputError
 
 _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCELLED, MissionState.ERROR)
 

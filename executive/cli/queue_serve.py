@@ -11,11 +11,11 @@ from rich.console import Console
 
 from executive.cli.queue_run import broken_off, go_on, next_queued, start_of
 from executive.cli.shown import control_for
-from executive.mission.errors import InputError
 from executive.run.control import Control
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.standing import StandingMissions
 from executive.store.triggers import Trigger
+from skills.files.errors import InputError
 
 MOST_STARTS: Final = 3
 """A mission that has been started so often is not taken up by itself: what ends the process would end it for ever."""

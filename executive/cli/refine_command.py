@@ -11,7 +11,7 @@ from rich.console import Console
 
 from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, print_trained, trained
 from executive.cli.output import console_for, refusals
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 from skills.perception.detector.cascade_files import MODEL_FILE
 from skills.perception.training.schedule import REFINEMENT_RATE, RefineOptions, Schedule
 

@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from executive.cli.output import console_for, refusals
-from executive.mission.errors import InputError
 from executive.record.history import History, read_history
 from executive.view.replay import fed, to_html
 from executive.view.server import PageContent, PageServer
+from skills.files.errors import InputError
 
 RECORDING = "recording.html"
 

@@ -23,7 +23,7 @@ from executive.evaluation.summary import (
     time_rows,
     totals_of,
 )
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 __all__ = ["report"]
 

@@ -16,7 +16,6 @@ from executive.cli.artifacts import Artifacts, detection_picture, file_name, to_
 from executive.cli.picture_files import read_picture
 from executive.cli.report import VERDICTS, RobotReport, RunReport, counts_text
 from executive.cli.requests import Prepared
-from executive.mission.errors import InputError
 from executive.record.reader import Event
 from executive.record.schemas import TRANSITIONS
 from executive.run.outcome import Outcome
@@ -36,6 +35,7 @@ from executive.view.report_page import (
 )
 from executive.view.styles import ROBOT_COLOURS, Styles, style_of
 from executive.view.svg import to_svg
+from skills.files.errors import InputError
 
 __all__ = ["REPORT", "EndedTree", "map_of", "part_of", "save_report", "step_rows", "write_report"]
 

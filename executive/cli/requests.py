@@ -14,7 +14,6 @@ from executive.cli.starts import DEFAULT_KIND, PlacedRobot
 from executive.cli.worlds import knowledge_of, open_world, refuse_blocked, with_map
 from executive.language import Understanding, load_parser
 from executive.language.questions import Answerer
-from executive.mission.errors import InputError, Problems
 from executive.mission.file.model import DEFAULT_WORLD, Mission
 from executive.mission.file.objects import import_folders
 from executive.mission.file.overrides import overridden
@@ -25,9 +24,10 @@ from executive.mission.knowledge import Knowledge, Pose
 from executive.mission.mission import lines_of, mission_from_lines, mission_from_meaning, understood
 from executive.mission.request import Request
 from executive.mission.robots import RobotSetup, display_name, robots_in
-from executive.mission.yaml_source import read_yaml
 from executive.tree.compiler import CompiledTree, compile_mission
 from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
+from skills.files.errors import InputError, Problems
+from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
 
 __all__ = [

@@ -10,8 +10,8 @@ import typer
 from executive.cli.durable import STORE
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.queue_run import go_on, run_queue
-from executive.mission.errors import InputError, listing
 from executive.store.missions import MissionState, MissionStore, StoredMission
+from skills.files.errors import InputError, listing
 
 __all__ = ["resume"]
 

@@ -111,8 +111,8 @@ def _joined(arguments: list[str]) -> Iterator[str]:
 
 def time_of_day(text: str | None) -> str | None:
     """The time of day of an option. Raises InputError: it is none."""
-    from executive.mission.errors import InputError
     from executive.mission.expression import TIME_OF_DAY as PATTERN
+    from skills.files.errors import InputError
 
     if text is not None and not PATTERN.fullmatch(text):
         raise InputError(f"--time-of-day {text[:20]}: it is no time of day", hint='write it as "08:30"')
@@ -121,8 +121,8 @@ def time_of_day(text: str | None) -> str | None:
 
 def time_limit_s(text: str | None) -> float | None:
     """The seconds of an option. Raises InputError: it is no time span above zero, or more than a week."""
-    from executive.mission.errors import InputError
     from executive.mission.file.condition_schema import in_seconds
+    from skills.files.errors import InputError
 
     seconds = None if text is None else in_seconds(text)
     if seconds is not None and not (isinstance(seconds, float) and 0.0 < seconds <= 604_800.0):

@@ -8,7 +8,7 @@ from typing import Final
 
 import yaml
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 from skills.teleop.driver import SavedPose
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,59}")

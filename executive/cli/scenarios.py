@@ -8,7 +8,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from executive.mission.errors import InputError
 from executive.mission.knowledge import Knowledge
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
@@ -17,6 +16,7 @@ from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import DoorRule, MoveRule, RouteRule, World, WorldError
 from skills.estimate.grid_map import GridMap, MapError, load_grid_map
 from skills.faults.words import random_faults
+from skills.files.errors import InputError
 from skills.robot import FloatArray
 
 __all__ = ["with_happenings", "with_scenario"]

@@ -20,8 +20,8 @@ from executive.cli.output import console_for, print_json, refusals
 from executive.cli.picture_files import read_picture, write_picture
 from executive.cli.score_report import scores_json, show_scores
 from executive.cli.worst_sheet import Shown, contact_sheet
-from executive.mission.errors import InputError
 from skills.detection import Detection
+from skills.files.errors import InputError
 from skills.perception.detector.augmentation import AugmentedDetector
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector
 from skills.perception.detector.upright import turned, turned_back

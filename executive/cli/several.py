@@ -13,7 +13,6 @@ from executive.cli.worlds import knowledge_of, with_map
 from executive.language import Status, Understanding, load_parser
 from executive.language.questions import Answerer
 from executive.language.robots import Addressed, Part, Whom, understand_for_robots_asking
-from executive.mission.errors import InputError, Problems, listing, suggestion
 from executive.mission.file.model import KeyPath, Mission
 from executive.mission.file.resolve import for_robot
 from executive.mission.file.schema import MissionFile, PartFile
@@ -22,6 +21,7 @@ from executive.mission.mission import mission_from_steps, steps_of
 from executive.mission.request import Request
 from executive.mission.robots import robot_called
 from plant.worlds.world import World
+from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.robot import Pose2D
 
 __all__ = ["prepare_several", "prepared_part", "understood_for_robots"]

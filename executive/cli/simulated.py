@@ -17,7 +17,6 @@ from executive.cli.report import RefereeReport
 from executive.cli.requests import Prepared
 from executive.cli.starts import PlacedRobot, alone
 from executive.cli.variations import plant_variation
-from executive.mission.errors import InputError
 from executive.record.event_log import Listener
 from executive.record.profile import Profile
 from executive.run.control import Control
@@ -27,6 +26,7 @@ from executive.tree.compiler import CompiledTree
 from plant.referee import Referee
 from plant.variation import AS_IT_IS, Variation
 from plant.worlds.world import World
+from skills.files.errors import InputError
 from skills.robot import Clock
 
 __all__ = ["SimulatedBackend", "run_simulated"]

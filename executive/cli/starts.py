@@ -11,7 +11,6 @@ from typing import Final
 import numpy as np
 
 from executive.cli.grids import grid_at
-from executive.mission.errors import InputError
 from executive.mission.knowledge import Knowledge, Pose, RobotFacts
 from executive.mission.request import Start
 from executive.mission.robots import RobotSetup, display_name
@@ -20,6 +19,7 @@ from plant.kinds import robot_kind
 from plant.worlds.placement import people_stand_W, place_people
 from plant.worlds.world import World
 from skills.estimate.grid_map import GridMap
+from skills.files.errors import InputError
 from skills.navigate.footprint import Footprint
 from skills.robot import Capabilities, FloatArray, Pose2D
 from skills.stack import RobotStack

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from executive.cli.report import VERDICTS, RefereeReport, RunReport
-from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.mission.scenario import NO_SCENARIO, Scenario
 from executive.tree.compiling.builder import slug
+from skills.files.errors import InputError
 
 COUNTS: Final = ("successes", "referee_successes", "false_claims")
 _MOST_LETTERS: Final = 60

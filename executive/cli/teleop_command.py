@@ -22,7 +22,6 @@ from executive.cli.run_options import START
 from executive.cli.saved_pose import save_pose
 from executive.cli.starts import alone
 from executive.cli.worlds import open_world, refuse_blocked
-from executive.mission.errors import InputError
 from executive.mission.request import Start
 from executive.run.worker import LockStepWorker
 from executive.view.actions import Action, RefusedError
@@ -31,6 +30,7 @@ from executive.view.server import PageContent
 from plant.worlds.world import World
 from skills.api import SkillContext
 from skills.estimate.grid_map import MapError, load_grid_map
+from skills.files.errors import InputError
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack
 from skills.teleop.driver import Teleop, TeleopOptions

@@ -15,7 +15,6 @@ import typer
 from executive.cli.missions_command import shipped_missions
 from executive.cli.output import refusals
 from executive.cli.requests import prepare
-from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.record.history import read_history
 from executive.tree.node_view import NodeView, node_view, to_json
@@ -24,6 +23,7 @@ from executive.view.collapse import DRAWN_NODES, MANY_NODES, folded_below, folde
 from executive.view.mermaid import to_mermaid
 from executive.view.svg import to_svg
 from executive.view.text import to_text
+from skills.files.errors import InputError
 
 LOG_SUFFIX: Final = ".mcap"
 

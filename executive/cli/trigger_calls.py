@@ -12,7 +12,6 @@ from typing import Any
 from executive.cli.durable import as_it_was
 from executive.cli.feasibility import refuse_impossible
 from executive.cli.requests import prepare
-from executive.mission.errors import InputError
 from executive.mission.file.parameters import values_in_json
 from executive.mission.request import Request
 from executive.store.missions import MissionStore, StoredMission
@@ -20,6 +19,7 @@ from executive.store.standing import StandingMission, StandingMissions, TooManyE
 from executive.store.triggers import OnCall, OnTopic
 from executive.store.wakeup import wake_server
 from executive.view.calls import CallError
+from skills.files.errors import InputError
 
 __all__ = ["TriggerCalls"]
 

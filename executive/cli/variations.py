@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from executive.cli.requests import Prepared
-from executive.mission.errors import InputError, suggestion
 from executive.mission.request import Request
 from plant.variation import Variation
 from plant.worlds.clutter import with_passers_by
 from plant.worlds.lights import LIGHTS, Light, light_of
 from plant.worlds.world import World, WorldError
+from skills.files.errors import InputError, suggestion
 
 __all__ = ["plant_variation", "with_people"]
 

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 import yaml
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 __all__ = ["refuse_unaddressed"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from executive.evaluation.cluster import local_cluster, scheduler_at
 from executive.evaluation.workers import LocalWorkers, Workers
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 __all__ = ["Pool"]
 

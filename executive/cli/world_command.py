@@ -17,9 +17,9 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from executive.cli.output import refusals
 from executive.cli.run_options import START, StartCommand, start_pose
 from executive.cli.worlds import knowledge_of, open_world
-from executive.mission.errors import InputError
 from plant.worlds.world import WorldError
 from skills.estimate.grid_map import GridMap, MapError, load_grid_map
+from skills.files.errors import InputError
 from skills.robot import Picture, Pose2D
 
 __all__ = ["world"]

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from executive.mission.errors import InputError, known_names, suggestion
 from executive.mission.knowledge import Knowledge, load_knowledge
 from plant.worlds.world import World, WorldError, known_worlds, load_world
+from skills.files.errors import InputError, known_names, suggestion
 
 if TYPE_CHECKING:
     from skills.robot import Pose2D

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from executive.evaluation.installed import installed_code
 from executive.evaluation.workers import MOST_DEATHS, Finished, Item, Result
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 __all__ = ["ClusterWorkers", "local_cluster", "scheduler_at"]
 

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.evaluation.outcome import Evidence
-from executive.mission.errors import InputError
 from executive.record.reader import Event
 from executive.record.schemas import TRANSITIONS, TREE
 from executive.record.timeline import timeline
 from executive.view.map_picture import map_picture
+from skills.files.errors import InputError
 
 __all__ = ["evidence_of", "steps_of"]
 

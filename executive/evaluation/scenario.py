@@ -11,9 +11,9 @@ from typing import Any, Final
 from executive.evaluation.runs import Evaluation, RunSpec
 from executive.evaluation.scenario_schema import EvaluationFile, FaultsFile, MissionEntry, VariationsFile
 from executive.evaluation.seeds import seed_range
-from executive.mission.errors import InputError
 from executive.mission.variation import Variation
-from executive.mission.yaml_source import KeyPath, YamlSource, read_yaml, validate
+from skills.files.errors import InputError
+from skills.files.yaml_source import KeyPath, YamlSource, read_yaml, validate
 
 __all__ = ["FileFinder", "is_evaluation", "load_evaluation"]
 

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictInt, model_validator
 
 from executive.mission.file.condition_schema import Span
 from executive.mission.variation import MOST_CLUTTER, MOST_PEOPLE, NORMAL_LIGHT
-from executive.mission.yaml_source import Name, Text
+from skills.files.yaml_source import Name, Text
 
 __all__ = ["EvaluationFile", "FaultsFile", "MissionEntry", "VariationsFile"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 __all__ = ["seed_range"]
 

@@ -13,8 +13,8 @@ from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
 from executive.language.reference import ResolvedAction
 from executive.language.roles import HERE, Location
-from executive.mission.errors import listing
 from executive.mission.knowledge import Knowledge
+from skills.files.errors import listing
 
 __all__ = ["check_feasible", "not_understood"]
 

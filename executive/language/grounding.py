@@ -20,8 +20,8 @@ from executive.language.relations import check_relation
 from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
 from executive.mission.command import Command, Task, Thing
-from executive.mission.errors import known_names, listing
 from executive.mission.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
+from skills.files.errors import known_names, listing
 
 __all__ = ["ABLE", "Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]
 

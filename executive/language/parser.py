@@ -19,7 +19,7 @@ import numpy.typing as npt
 from executive.language.nouns import FloatArray, NounKind, NounKinds, noun_examples
 from executive.language.parse_correction import corrected_parse
 from executive.language.tokens import Token
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 if TYPE_CHECKING:
     from spacy.language import Language

@@ -14,7 +14,7 @@ from typing import Any, Final
 from rapidfuzz.distance import OSA
 
 from executive.language.sounds import nearest_by_sound
-from executive.mission.errors import listing
+from skills.files.errors import listing
 
 __all__ = [
     "Answerer",

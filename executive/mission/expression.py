@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
-from executive.mission.errors import suggestion
+from skills.files.errors import suggestion
 
 __all__ = ["FUNCTIONS", "Expression", "ExpressionError", "Kind", "Template", "Value", "kind_of", "literal"]
 

@@ -9,9 +9,9 @@ from typing import Annotated, Final
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.mission.command import Task
-from executive.mission.errors import InputError, suggestion
 from executive.mission.robots import RobotsFile
-from executive.mission.yaml_source import Name, YamlSource, read_yaml, validate
+from skills.files.errors import InputError, suggestion
+from skills.files.yaml_source import Name, YamlSource, read_yaml, validate
 from skills.perception.class_forms import PERSON, THING, class_forms
 from skills.quantities import Angle, Coordinate
 

@@ -9,10 +9,10 @@ from executive.language import DependencyParser, Status, Understanding
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
 from executive.language.understand import understand_asking
 from executive.mission.command import Command, parse_command
-from executive.mission.errors import InputError
 from executive.mission.file.model import Mission, MissionStep
 from executive.mission.knowledge import Knowledge
 from executive.mission.written import parse_written, written
+from skills.files.errors import InputError
 
 __all__ = [
     "lines_of",

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from executive.language.questions import QuestionPolicy
-from executive.mission.errors import InputError
 from executive.mission.robots import RobotSetup
 from executive.mission.scenario import NO_SCENARIO, Scenario
 from executive.mission.variation import NO_VARIATION, Variation
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 __all__ = ["Request", "Start"]

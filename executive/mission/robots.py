@@ -11,8 +11,8 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from executive.mission.errors import InputError, SourceLine, known_names, suggestion
-from executive.mission.yaml_source import Name, YamlSource
+from skills.files.errors import InputError, SourceLine, known_names, suggestion
+from skills.files.yaml_source import Name, YamlSource
 from skills.quantities import Angle, Coordinate, in_range
 from skills.robot import Pose2D
 

@@ -12,12 +12,12 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, model_validator
 
-from executive.mission.errors import InputError, Problems, suggestion
 from executive.mission.file.people import StopFile
 from executive.mission.knowledge import Corner, Knowledge
 from executive.mission.scenario import Scenario
-from executive.mission.yaml_source import KeyPath, Name, Text, YamlSource, read_yaml, validate
 from skills.faults.words import parse_fault
+from skills.files.errors import InputError, Problems, suggestion
+from skills.files.yaml_source import KeyPath, Name, Text, YamlSource, read_yaml, validate
 from skills.quantities import Coordinate, Delay, Height, Speed
 
 __all__ = ["EventFile", "ScenarioFile", "checked_fault", "load_scenario", "scenario_of"]

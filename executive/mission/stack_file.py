@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from executive.mission.yaml_source import read_yaml
+from skills.files.yaml_source import read_yaml
 from skills.stack import RobotStack, StackError, default_stack, stack_of
 
 __all__ = ["load_stack"]

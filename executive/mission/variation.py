@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Final
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 __all__ = ["MOST_CLUTTER", "MOST_PEOPLE", "NORMAL_LIGHT", "NO_VARIATION", "Variation"]
 

@@ -9,13 +9,13 @@ from typing import Any
 
 from py_trees.common import Status
 
-from executive.mission.errors import InputError
 from executive.mission.robots import robot_called
 from executive.record.reader import Event, read_events
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.tree.node_view import NodeView, logged_view
 from executive.tree.snapshot import NodeState
 from skills.api import Cause
+from skills.files.errors import InputError
 
 TRANSITION_KEYS = ("t", "node", "from", "to", "cause", "message")
 

@@ -13,8 +13,8 @@ from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
 from zstandard import ZstdError
 
-from executive.mission.errors import InputError
 from executive.record.schemas import TOPIC
+from skills.files.errors import InputError
 
 _DAMAGE = (McapError, struct.error, ZstdError, ValueError)
 

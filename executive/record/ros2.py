@@ -13,11 +13,11 @@ from typing import Any, Final
 
 from mcap_ros2.writer import Writer
 
-from executive.mission.errors import InputError
 from executive.record.drawable import stamp
 from executive.record.reader import Event
 from executive.record.schemas import BOXES, DETECTIONS, PATH, POSE
 from executive.tree.compiling.builder import slug
+from skills.files.errors import InputError
 
 _RULE: Final = "=" * 80
 _TIME: Final = f"{_RULE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TypeVar
 
-from executive.mission.errors import disk_is_full
 from executive.record.profile import Profile
 from executive.record.schemas import CONTROL, RESERVED_PATH
 from executive.record.ticks import TickMeter
@@ -29,6 +28,7 @@ from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
 from executive.tree.snapshot import Snapshot
 from skills.api import Cause, Publish, Worker
+from skills.files.errors import disk_is_full
 from skills.robot import Clock
 
 _PATHS_PERIOD_S = 0.5

@@ -18,8 +18,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from executive.mission.errors import InputError
 from executive.speech.model_file import ModelFile
+from skills.files.errors import InputError
 
 __all__ = ["Adapter", "LowRank", "packaged_adapter", "read_adapter"]
 

@@ -6,7 +6,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import Final
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 __all__ = ["speech_module"]
 

@@ -10,7 +10,6 @@ from typing import Any, Final
 from executive.language import Status
 from executive.language.robots import Part
 from executive.mission.command import Command
-from executive.mission.errors import InputError
 from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Utterance
 from executive.speech.alikes import SoundAlikes
 from executive.speech.calling import opening_as_heard
@@ -20,6 +19,7 @@ from executive.speech.recogniser import Recogniser
 from executive.speech.sound import Loudness, Samples, joined
 from executive.speech.vocabulary import Vocabulary
 from executive.speech.wav import read_wav
+from skills.files.errors import InputError
 
 __all__ = ["HeardUtterance", "Listener", "Recording", "together"]
 

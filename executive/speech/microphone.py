@@ -10,10 +10,10 @@ from typing import Final
 
 import numpy as np
 
-from executive.mission.errors import InputError
 from executive.speech.activity import Endpointer
 from executive.speech.listener import HeardUtterance, Listener
 from executive.speech.sound import RATE_HZ, Samples, level_db
+from skills.files.errors import InputError
 
 __all__ = ["Hearing", "follow", "microphone_blocks"]
 

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 __all__ = ["ModelFile", "read_model_file"]
 

@@ -8,8 +8,8 @@ from itertools import cycle
 from pathlib import Path
 from typing import Final
 
-from executive.mission.errors import InputError
 from executive.mission.knowledge import Knowledge
+from skills.files.errors import InputError
 
 __all__ = ["Vocabulary", "of_world", "read_vocabulary"]
 

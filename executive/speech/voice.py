@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 __all__ = ["EspeakVoice", "QueuedVoice", "Silence", "Voice", "installed_voice", "queued_voice"]
 

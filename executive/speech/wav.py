@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from executive.mission.errors import InputError
 from executive.speech.sound import RATE_HZ, Samples
+from skills.files.errors import InputError
 
 if TYPE_CHECKING:
     from soundfile import SoundFile

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from executive.mission.errors import InputError, disk_is_full
+from skills.files.errors import InputError, disk_is_full
 
 VERSION: Final = 9
 APPLICATION_ID: Final = 0x45525244  # "ERRD"

@@ -17,7 +17,6 @@ from typing import Final, TextIO
 
 from py_trees.common import Status
 
-from executive.mission.errors import InputError, listing
 from executive.mission.request import Request
 from executive.store.database import connect, told, transaction
 from executive.store.journal import StoreJournal, of_robot, prefix_of
@@ -32,6 +31,7 @@ from executive.store.records import (
 )
 from executive.store.values import from_text
 from skills.api import Cause
+from skills.files.errors import InputError, listing
 from skills.robot import Pose2D
 
 __all__ = ["MissionState", "MissionStore", "StoredMission", "insert", "utc_now"]

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta, tzinfo
 from typing import Final
 
-from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.store.missions import MissionState, MissionStore, StoredMission, insert
 from executive.store.records import request_of, row_of
 from executive.store.triggers import Every, Missed, OnBatteryFull, Once, Schedule, Timed, Trigger, local, trigger_of
+from skills.files.errors import InputError
 
 __all__ = ["LATE", "MOST_WAITING", "StandingMission", "StandingMissions", "TooManyError"]
 

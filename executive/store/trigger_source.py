@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final, Protocol
 
-from executive.mission.errors import InputError, listing
+from skills.files.errors import InputError, listing
 
 __all__ = ["GROUP", "Fire", "TriggerSource", "refuse_missing_source", "trigger_source"]
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from datetime import UTC, date, datetime, time, timedelta, tzinfo
 from typing import Final
 
-from executive.mission.errors import InputError, listing, suggestion
+from skills.files.errors import InputError, listing, suggestion
 
 __all__ = [
     "Every",

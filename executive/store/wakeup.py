@@ -14,9 +14,9 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Final
 
-from executive.mission.errors import InputError
 from executive.store.database import told
 from executive.store.missions import MissionStore
+from skills.files.errors import InputError
 
 __all__ = ["LONGEST_WAIT", "WakeupPipe", "wake_server"]
 

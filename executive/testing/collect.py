@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.testing.skill_test import SkillTestFile, load_skill_tests
 from executive.testing.suite import PARTS, SuiteCase
 from executive.testing.trial import BenchMakers, carry_out, scripted
 from skills.api import Skill
 from skills.faults.kinds import STANDARD_FAULTS, FaultKind
+from skills.files.errors import InputError
 from skills.robot import Capabilities
 
 

@@ -13,8 +13,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
 
-from executive.mission.errors import InputError
-from executive.mission.yaml_source import YamlSource, read_yaml, validate
 from executive.testing.small_room import room_knowledge
 from executive.tree.port_values import PortValueError, gathered, port_value
 from executive.tree.registry import missing
@@ -22,6 +20,8 @@ from executive.tree.types import describe_type, field_types, required
 from skills.api import Cause, Skill
 from skills.faults.kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.words import parse_fault
+from skills.files.errors import InputError
+from skills.files.yaml_source import YamlSource, read_yaml, validate
 
 SUFFIX = ".skilltest.yaml"
 _Positive = Annotated[float, Field(gt=0.0)]

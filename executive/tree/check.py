@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from executive.mission.command import Task
-from executive.mission.errors import InputError, listing, suggestion
 from executive.mission.gripper import InGripper, cannot_take, objection
 from executive.mission.knowledge import Knowledge
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, estimate_tree
 from skills.api import Costmap, PlanningError, Skill
+from skills.files.errors import InputError, listing, suggestion
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import path_length
 from skills.robot import Pose2D

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from py_trees.behaviour import Behaviour
 
 from executive.mission.command import Command
-from executive.mission.errors import InputError
 from executive.mission.file.model import Mission, MissionStep
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.context import RunContext
@@ -18,6 +17,7 @@ from executive.tree.compiling.interrupts import watched
 from executive.tree.compiling.wiring import check_wiring
 from executive.tree.kinds import build
 from executive.tree.node import NodeSpec
+from skills.files.errors import InputError
 
 __all__ = ["CompiledTree", "StepPart", "compile_mission", "step_name"]
 

@@ -13,10 +13,10 @@ from typing import Annotated, Final, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from executive.mission.errors import InputError
-from executive.mission.yaml_source import read_yaml, validate
 from executive.tree.behaviours.board import Constant, FromBoard
 from executive.tree.node import NodeSpec
+from skills.files.errors import InputError
+from skills.files.yaml_source import read_yaml, validate
 from skills.robot import Pose2D
 
 __all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "expected", "load_estimates"]

@@ -11,7 +11,7 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from executive.mission.errors import SourceLine
+from skills.files.errors import SourceLine
 
 __all__ = ["NodeKind", "NodeSpec"]
 

@@ -7,10 +7,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from executive.mission.errors import SourceLine
 from executive.tree.node import NodeSpec
 from executive.tree.ports import Port, ports_of
 from executive.tree.snapshot import NodeState
+from skills.files.errors import SourceLine
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,10 @@ from types import MappingProxyType
 from typing import Any, Final, Union
 
 from executive.mission.command import thing
-from executive.mission.errors import listing, suggestion
 from executive.mission.knowledge import Knowledge
 from executive.tree.types import describe_type, field_types, required
 from skills.api import Surface, Thing
+from skills.files.errors import listing, suggestion
 from skills.quantities import bounds, in_range, range_text, without_range, without_unit
 from skills.robot import Pose2D
 

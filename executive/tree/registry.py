@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final
 
-from executive.mission.errors import InputError, suggestion
 from executive.tree.types import describe_type, field_types
 from skills.api import Cause, Skill
+from skills.files.errors import InputError, suggestion
 
 GROUP: Final = "errand.skills"
 DISTRIBUTION: Final = "spot-errand"

@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.mission.errors import InputError
 from executive.record.reader import Event
 from executive.record.schemas import MAP, NAVIGATION, PATH, POSE, RESERVED_PATH
 from executive.view.styles import ROBOT_COLOURS, rgb_of
+from skills.files.errors import InputError
 
 WIDTH_PX: Final = 1400
 FOOTPRINT_M: Final = (1.1, 0.5)

@@ -18,12 +18,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from executive.language import load_parser
-from executive.mission.errors import InputError
 from executive.mission.file.overrides import overridden
 from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
 from executive.mission.knowledge import load_knowledge
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
+from skills.files.errors import InputError
 from tests.executive.mission.file.mutations import mutated_files
 
 ROOT = Path(__file__).parents[2]

@@ -25,7 +25,6 @@ from typing import Any
 
 from executive.mission.command import parse_command
 from executive.mission.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
-from executive.mission.errors import InputError
 from executive.mission.expression import Expression, Template
 from executive.mission.file.blocks import (
     Ask,
@@ -63,6 +62,7 @@ from executive.store.resuming import resumed_tree
 from executive.tree.compiler import CompiledTree, compile_mission
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectObservation, Part, Running, Skill, Succeeded, Thing
 from skills.check_door.skill import CheckDoorInputs
+from skills.files.errors import InputError
 from skills.speak.skill import SpeakInputs
 from tests.executive.conftest import KNOWLEDGE, PORTS, EmptyCostmap, ManualClock, Script, ScriptedRobot, StillLocaliser
 from tests.executive.conftest import default_end as usual_end

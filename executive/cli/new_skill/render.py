@@ -9,7 +9,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from string import Template
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 _SUFFIX = ".template"
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")

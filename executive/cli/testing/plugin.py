@@ -51,7 +51,7 @@ def _settings(config: pytest.Config) -> SkillTestSettings:
         }
         try:
             skills = import_module("executive.tree.registry").installed_skills()
-        except import_module("executive.mission.errors").InputError as error:
+        except import_module("skills.files.errors").InputError as error:
             raise pytest.UsageError(str(error)) from error
         settings = import_module("executive.testing.collect").SkillTestSettings(skills, makers, capabilities)
         config.stash[_SETTINGS] = settings

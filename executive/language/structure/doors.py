@@ -8,8 +8,8 @@ from typing import Final
 from executive.language.questions import RefusalError, Slot, which
 from executive.language.similar import synonyms_of
 from executive.mission.condition import Condition, DoorOpen, Not
-from executive.mission.errors import listing
 from executive.mission.knowledge import Knowledge
+from skills.files.errors import listing
 
 __all__ = ["door_condition"]
 

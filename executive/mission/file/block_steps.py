@@ -9,7 +9,6 @@ from typing import Final, Protocol
 from executive.language import Understanding
 from executive.mission.command import Command, Task
 from executive.mission.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
-from executive.mission.errors import listing, suggestion
 from executive.mission.expression import Expression, ExpressionError, Template, Value, literal
 from executive.mission.file.blocks import (
     Ask,
@@ -31,6 +30,7 @@ from executive.mission.file.model import KeyPath, MissionStep
 from executive.mission.file.schema import HandlerFile, StepFile
 from executive.mission.file.scope import Scope
 from executive.mission.knowledge import ANYBODY, Knowledge
+from skills.files.errors import listing, suggestion
 
 __all__ = ["Reader", "condition_of", "plain_value", "read_block", "round_values"]
 

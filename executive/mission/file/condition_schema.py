@@ -7,9 +7,9 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictInt, model_validator
 
-from executive.mission.errors import listing
 from executive.mission.expression import TIME_OF_DAY
-from executive.mission.yaml_source import Name, Text
+from skills.files.errors import listing
+from skills.files.yaml_source import Name, Text
 from skills.quantities import Duration, Share
 
 __all__ = ["CONDITION", "DockFile", "RepeatFile", "Rounds", "Span", "Strict", "WaitFile", "WhileFile", "in_seconds"]

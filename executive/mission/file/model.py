@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from executive.mission.command import Command
-from executive.mission.errors import InputError, SourceLine
 from executive.mission.expression import Value
 from executive.mission.file.blocks import Block, Group, steps_of
+from skills.files.errors import InputError, SourceLine
 
 __all__ = [
     "DEFAULT_WORLD",

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from executive.mission.command import START, TIME_UNITS_S, Command, Task, Thing, parse_command
-from executive.mission.errors import InputError, Problems, suggestion
 from executive.mission.file.model import KeyPath
 from executive.mission.file.schema import StepFile
 from executive.mission.file.scope import Scope
 from executive.mission.knowledge import Knowledge
+from skills.files.errors import InputError, Problems, suggestion
 
 __all__ = ["typed_command"]
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import Knowledge, knowledge_of_source
-from executive.mission.yaml_source import YamlSource
+from skills.files.yaml_source import YamlSource
 
 __all__ = ["overridden"]
 

@@ -17,10 +17,10 @@ from typing import Any, Final
 
 import yaml
 
-from executive.mission.errors import InputError, did_you_mean, listing, suggestion
 from executive.mission.expression import Value
 from executive.mission.file.model import KeyPath
-from executive.mission.yaml_source import YamlSource
+from skills.files.errors import InputError, did_you_mean, listing, suggestion
+from skills.files.yaml_source import YamlSource
 
 __all__ = ["Given", "given_values", "part_source", "round_source", "values_in_json", "with_parameters"]
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from executive.mission.errors import Problems, suggestion
 from executive.mission.knowledge import Corner, Knowledge
-from executive.mission.yaml_source import Name
+from skills.files.errors import Problems, suggestion
+from skills.files.yaml_source import Name
 from skills.quantities import Delay, Speed
 
 if TYPE_CHECKING:

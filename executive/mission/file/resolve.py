@@ -14,7 +14,6 @@ from executive.language.questions import Answerer, QuestionPolicy, answer_by
 from executive.language.understand import understand_asking
 from executive.mission.command import START, Command
 from executive.mission.condition import Condition
-from executive.mission.errors import InputError, Problems, suggestion
 from executive.mission.file.block_steps import condition_of, plain_value, read_block, round_values
 from executive.mission.file.blocks import Block, Group, Handler
 from executive.mission.file.condition_schema import ConditionFile
@@ -25,7 +24,8 @@ from executive.mission.file.parameters import Given, part_source, round_source, 
 from executive.mission.file.schema import HandlerFile, MissionFile, ParameterFile, RoundFile, StepFile, with_source
 from executive.mission.file.scope import Scope
 from executive.mission.knowledge import Knowledge
-from executive.mission.yaml_source import read_yaml, validate
+from skills.files.errors import InputError, Problems, suggestion
+from skills.files.yaml_source import read_yaml, validate
 
 __all__ = ["for_robot", "load_mission", "mission_from_file"]
 

@@ -20,7 +20,6 @@ from pydantic import (
 
 from executive.language.questions import QuestionPolicy
 from executive.mission.command import Task
-from executive.mission.errors import InputError, listing
 from executive.mission.file.condition_schema import (
     Condition,
     DockFile,
@@ -44,7 +43,8 @@ from executive.mission.file.model import (
 from executive.mission.file.objects import ObjectFile
 from executive.mission.file.people import RouteFile
 from executive.mission.robots import RobotsFile
-from executive.mission.yaml_source import Name, Text, YamlSource
+from skills.files.errors import InputError, listing
+from skills.files.yaml_source import Name, Text, YamlSource
 from skills.quantities import Duration, bounds, without_range, without_unit
 
 __all__ = [

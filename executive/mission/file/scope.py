@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from executive.mission.errors import InputError, SourceLine
 from executive.mission.file.model import KeyPath
 from executive.mission.file.schema import MissionFile
-from executive.mission.yaml_source import YamlSource
+from skills.files.errors import InputError, SourceLine
+from skills.files.yaml_source import YamlSource
 
 __all__ = ["Scope"]
 

@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from executive.mission.errors import InputError
 from executive.speech.training.extra import needs_torch
+from skills.files.errors import InputError
 
 _BAD_INPUT = 2
 

@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from executive.mission.errors import InputError
 from executive.speech.sound import RATE_HZ, Samples
 from executive.speech.training.grammar import Grammar, load_grammar
 from executive.speech.training.voices import Speaker, drawn_speaker, speakers, speech
+from skills.files.errors import InputError
 
 __all__ = ["SpokenSentence", "spoken_sentences", "usual"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 __all__ = ["needs_torch"]
 

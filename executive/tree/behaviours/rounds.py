@@ -11,7 +11,6 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.mission.errors import listing
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.composites import MemoryComposite
 from executive.tree.behaviours.explained import cause_of, message_of
@@ -19,6 +18,7 @@ from executive.tree.behaviours.policies import FINAL_CAUSES
 from executive.tree.node import NodeKind
 from skills.api import Cause, ObjectObservation
 from skills.detect.words import numbered
+from skills.files.errors import listing
 from skills.robot import Robot
 
 SAME_PLACE_M: Final = 0.15

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from executive.mission.command import START, Command, Task
-from executive.mission.errors import InputError, Problems, SourceLine, listing
 from executive.mission.expression import kind_of, literal
 from executive.mission.file.model import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from executive.mission.goal import GoalCondition, clearing_goals, command_goal, drive_goal
@@ -35,6 +34,7 @@ from executive.tree.compiling.steps import step_plan
 from executive.tree.compiling.trips import are_trips, refuse_several, trips_plan
 from executive.tree.node import NodeSpec
 from skills.api import Skill
+from skills.files.errors import InputError, Problems, SourceLine, listing
 from skills.robot import Pose2D
 
 __all__ = ["Assembled", "StepPart", "assemble", "step_name"]

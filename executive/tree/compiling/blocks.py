@@ -9,7 +9,6 @@ from typing import Any, Final, Protocol
 
 from executive.mission.command import Command, Task
 from executive.mission.condition import READINGS, Condition, Look, ValueIs, parts_of
-from executive.mission.errors import InputError, suggestion
 from executive.mission.expression import Expression, Kind, Template, Value, kind_of
 from executive.mission.file.blocks import (
     Ask,
@@ -44,6 +43,7 @@ from executive.tree.compiling.interrupts import HANDLING, dock_plan
 from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.node import NodeSpec
 from skills.api import Part
+from skills.files.errors import InputError, suggestion
 
 __all__ = [
     "PYTHON_TYPES",

@@ -10,13 +10,13 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from executive.mission.command import Command, Task, Thing
-from executive.mission.errors import InputError, SourceLine, suggestion
 from executive.mission.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
 from executive.tree.behaviours.recovery import Recovery, Trigger
 from executive.tree.node import NodeSpec
 from executive.tree.registry import missing
 from skills.api import Cause, Skill, Surface
+from skills.files.errors import InputError, SourceLine, suggestion
 from skills.perception.class_forms import THING
 from skills.robot import Pose2D
 

@@ -17,7 +17,6 @@ from executive.mission.condition import (
     ValueIs,
     parts_of,
 )
-from executive.mission.errors import InputError
 from executive.mission.expression import Expression, ExpressionError, Kind, Template, kind_of
 from executive.tree.behaviours.decisions import (
     AllHold,
@@ -33,6 +32,7 @@ from executive.tree.compiling.doors import door_plan
 from executive.tree.compiling.steps import find_plan
 from executive.tree.compiling.trips import refuse_several
 from executive.tree.node import NodeSpec
+from skills.files.errors import InputError
 
 __all__ = ["Decided", "Named", "decide_plan", "decision_of", "instant_decision", "keys_of", "kind_in"]
 

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from itertools import product
 from typing import Final
 
-from executive.mission.errors import InputError
 from executive.mission.geometry import Point, distance_m, fits, nearest_side
 from executive.mission.knowledge import Door, Knowledge
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.node import NodeSpec
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 CHECK_DOOR: Final = "check_door"

@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import Final
 
 from executive.mission.command import Thing
-from executive.mission.errors import listing
 from executive.mission.geometry import inside
 from executive.mission.goal import surfaces_to_search
 from executive.mission.knowledge import Knowledge, Pose
@@ -16,6 +15,7 @@ from executive.tree.behaviours.board import FromBoard, SurfaceOfDetection, besid
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.node import NodeSpec
 from skills.api import Cause
+from skills.files.errors import listing
 
 Ports = Mapping[str, object]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from executive.mission.errors import SourceLine, listing, suggestion
 from executive.mission.file.model import SkillCall
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
@@ -15,6 +14,7 @@ from executive.tree.port_values import FROM_KEY, PortValueError, gathered, port_
 from executive.tree.registry import missing
 from executive.tree.types import field_types
 from skills.api import Skill
+from skills.files.errors import SourceLine, listing, suggestion
 
 __all__ = ["skill_plan"]
 

@@ -9,8 +9,8 @@ from executive.cli import answers, entry
 from executive.cli.answers import answerer, ask_at_terminal
 from executive.cli.requests import prepare
 from executive.language.questions import ClarifyingQuestion, QuestionPolicy, Slot
-from executive.mission.errors import InputError
 from executive.mission.request import Request
+from skills.files.errors import InputError
 
 TABLE = "put the cube on the table"
 QUESTION = ClarifyingQuestion("Which table?", Slot.PLACE, ("kitchen table", "coffee table"), "kitchen table", "table")

@@ -9,11 +9,11 @@ from tiny_detector import CLASSES, model_bytes, write_model
 from executive.cli.assembly import shared_detector
 from executive.cli.starts import TURNING_M, stand_at
 from executive.cli.worlds import refuse_blocked
-from executive.mission.errors import InputError
 from executive.mission.request import Start
 from plant.worlds.placement import place_people
 from plant.worlds.world import load_world
 from skills.estimate.grid_map import load_grid_map
+from skills.files.errors import InputError
 from skills.perception.cascade import Cascade
 from skills.robot import Pose2D
 from skills.stack import default_stack

@@ -5,7 +5,7 @@ import stat
 import pytest
 
 from executive.cli.call_token import CallToken, call_token
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 
 @pytest.fixture

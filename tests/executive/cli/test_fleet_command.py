@@ -5,10 +5,10 @@ from typer.testing import CliRunner
 
 from executive.cli import entry
 from executive.cli.fleet_command import _faults, _to_do
-from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore
+from skills.files.errors import InputError
 
 REQUEST = Request(commands=("Take ...",), name="work", world_name="flat")
 

@@ -12,9 +12,9 @@ import executive.cli.listen_command as listen_command
 from executive.cli.entry import app
 from executive.cli.listen_command import answer_line, hear_request, show_hearing
 from executive.language import Status, Understanding
-from executive.mission.errors import InputError
 from executive.mission.robots import RobotSetup
 from executive.speech.microphone import follow
+from skills.files.errors import InputError
 
 GO = "Hey Alice, go to the kitchen."
 KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"

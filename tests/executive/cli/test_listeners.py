@@ -6,8 +6,8 @@ import pytest
 
 from executive.cli import listeners as listeners_module
 from executive.cli.listeners import CallAddress, Listeners
-from executive.mission.errors import InputError
 from executive.store.triggers import OnCall, OnTopic, trigger_of
+from skills.files.errors import InputError
 
 TOKEN = "a-token-of-the-test"
 

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 from executive.cli import entry
 from executive.cli.map_command import _route_points
-from executive.mission.errors import InputError
 from skills.estimate.grid_map import load_grid_map
+from skills.files.errors import InputError
 
 KEYS = {
     "world",

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from executive.cli import entry
 from executive.cli.missions_command import mission_file, shipped_missions
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 MISSIONS = Path(__file__).parents[3] / "missions"
 

@@ -15,11 +15,11 @@ from websockets.sync.client import connect
 from executive.cli.page_view import PageView, queueing
 from executive.cli.page_view import said as sentence_action
 from executive.cli.requests import prepare
-from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.run.control import Mode
 from executive.store.missions import MissionState, MissionStore
 from executive.view.actions import RefusedError
+from skills.files.errors import InputError
 
 
 @pytest.fixture(scope="module")

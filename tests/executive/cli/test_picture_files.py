@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cli.picture_files import read_picture, write_picture
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 
 def noise(*shape, dtype=np.uint8):

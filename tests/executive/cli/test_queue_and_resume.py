@@ -15,7 +15,6 @@ from executive.cli import entry, main, queue_run, requests
 from executive.cli.mission_run import Finished
 from executive.cli.report import RefereeReport, RunReport
 from executive.mission.command import Command
-from executive.mission.errors import InputError
 from executive.mission.mission import mission_from_commands
 from executive.run.journal import TickNote
 from executive.store.missions import MissionStore
@@ -24,6 +23,7 @@ from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
 from executive.tree.registry import installed_skills
 from executive.tree.snapshot import Change, NodeState
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 

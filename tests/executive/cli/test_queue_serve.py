@@ -13,12 +13,12 @@ from rich.console import Console
 
 from executive.cli import queue_serve
 from executive.cli.queue_serve import MOST_STARTS, Ended, MissionRunner, QueueServer
-from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.run.journal import TickNote
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.triggers import Missed, OnCall, trigger_of
+from skills.files.errors import InputError
 
 REQUEST = Request("go to the kitchen", name="go kitchen", world_name="flat", robot="Alice", commands=("Take",))
 ROOT = Path(__file__).parents[3]

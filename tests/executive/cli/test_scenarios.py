@@ -7,10 +7,10 @@ import pytest
 
 from executive.cli.scenarios import doorway, with_happenings, with_scenario
 from executive.cli.worlds import knowledge_of, open_world
-from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
 from skills.estimate.grid_map import load_grid_map
+from skills.files.errors import InputError
 
 WORLD = open_world("flat")
 KNOWLEDGE = knowledge_of(WORLD)

@@ -8,9 +8,9 @@ import pytest
 from executive.cli.requests import prepare
 from executive.cli.wake_check import refuse_unaddressed
 from executive.cli.worlds import open_world
-from executive.mission.errors import InputError
 from executive.mission.request import Request, Start
 from executive.mission.robots import RobotSetup
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 TWO = {"alice": RobotSetup("spot"), "bob": RobotSetup("spot")}

@@ -6,8 +6,8 @@ import pytest
 from rich.console import Console
 
 from executive.cli.shown import SILENCE, speech_heard, voice_for
-from executive.mission.errors import InputError
 from executive.speech import voice as voices
+from skills.files.errors import InputError
 
 
 class Heard:

@@ -6,9 +6,9 @@ import pytest
 
 from executive.cli.starts import PlacedRobot, alone, knowledge_for, placed_robots
 from executive.cli.worlds import knowledge_of, open_world
-from executive.mission.errors import InputError
 from executive.mission.robots import RobotSetup
 from plant.worlds.placement import place_people
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 WORLD = open_world("flat")

@@ -9,9 +9,9 @@ import pytest
 from executive.cli import sweep as module
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.sweep import condition_rows, conditions, folders, rows, sweep, totals
-from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
+from skills.files.errors import InputError
 
 
 def report(seed: int, outcome: str = "success") -> RunReport:

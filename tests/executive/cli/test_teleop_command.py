@@ -14,11 +14,11 @@ from executive.cli.saved_pose import save_pose
 from executive.cli.starts import alone
 from executive.cli.teleop_command import TerminalKeys, context_for, page_actions, period
 from executive.cli.worlds import open_world
-from executive.mission.errors import InputError
 from executive.mission.file.resolve import load_mission
 from executive.mission.request import Start
 from executive.view.actions import RefusedError
 from skills.arm.kinematics import arm_model
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 from skills.teleop.driver import SavedPose, Teleop, TeleopOptions
 

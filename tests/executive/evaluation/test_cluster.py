@@ -9,7 +9,7 @@ import pytest
 
 from executive.evaluation import cluster
 from executive.evaluation.cluster import scheduler_at
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 distributed = pytest.importorskip("distributed")
 

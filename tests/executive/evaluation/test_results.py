@@ -8,7 +8,7 @@ import pytest
 from executive.evaluation.outcome import Evidence, RunOutcome
 from executive.evaluation.results import ResultsFile
 from executive.evaluation.runs import Evaluation, RunSpec
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 RUNS = tuple(RunSpec("go", seed, sentence="go") for seed in range(3))
 EVALUATION = Evaluation(Path("scenario.yaml"), RUNS)

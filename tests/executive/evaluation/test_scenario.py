@@ -3,7 +3,7 @@
 import pytest
 
 from executive.evaluation.scenario import is_evaluation, load_evaluation
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 
 def load(tmp_path, text):

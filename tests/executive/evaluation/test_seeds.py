@@ -3,7 +3,7 @@
 import pytest
 
 from executive.evaluation.seeds import seed_range
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 
 @pytest.mark.parametrize(("text", "seeds"), [("1-3", (1, 2, 3)), ("7", (7,)), ("1,4,7-8", (1, 4, 7, 8))])

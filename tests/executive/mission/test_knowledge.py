@@ -1,8 +1,8 @@
 import pytest
 
 from executive.mission.command import Task
-from executive.mission.errors import InputError
 from executive.mission.knowledge import load_knowledge
+from skills.files.errors import InputError
 
 WORLD = """\
 robot: {name: Alice}

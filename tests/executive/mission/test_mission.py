@@ -4,7 +4,6 @@ import pytest
 
 from executive.language import load_parser
 from executive.mission.command import Command, parse_command
-from executive.mission.errors import InputError
 from executive.mission.file.blocks import Repeat
 from executive.mission.file.model import MissionStep, SourceLine
 from executive.mission.file.resolve import load_mission, mission_from_file
@@ -17,6 +16,7 @@ from executive.mission.mission import (
     understood,
 )
 from executive.mission.written import written
+from skills.files.errors import InputError
 
 WORLD = Path(__file__).parents[1] / "language" / "world.yaml"
 MISSION = """\

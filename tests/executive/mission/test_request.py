@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.mission.request import Request, Start
 from executive.mission.robots import RobotSetup
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 

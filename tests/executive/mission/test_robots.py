@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.mission.robots import RobotSetup, display_name, parse_robots, robot_called
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 KINDS = ("fetch", "spot")

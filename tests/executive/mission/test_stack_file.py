@@ -2,8 +2,8 @@
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.mission.stack_file import load_stack
+from skills.files.errors import InputError
 from skills.stack import default_stack
 
 

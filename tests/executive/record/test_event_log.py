@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from executive.mission.errors import InputError
 from executive.record.event_log import EventLog, plain_values
 from executive.record.reader import read_events
 from executive.record.schemas import WALL
 from skills.api import Cause
+from skills.files.errors import InputError
 
 
 @dataclass(frozen=True)

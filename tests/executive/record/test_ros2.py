@@ -7,10 +7,10 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from executive.mission.errors import InputError
 from executive.record.event_log import EventLog
 from executive.record.reader import read_events
 from executive.record.ros2 import write_ros2
+from skills.files.errors import InputError
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 from tests.benchmarks.random_missions import ran
 
 MISSIONS, GROUP = 300, 30

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from executive.mission.errors import InputError
 from executive.speech import adapter
 from executive.speech.adapter import Adapter, LowRank, packaged_adapter, read_adapter
 from executive.speech.model_file import read_model_file
 from executive.speech.whisper import BASE_SHA256
+from skills.files.errors import InputError
 
 BASE = "0123"
 DRAW = np.random.default_rng(1)

@@ -8,12 +8,12 @@ import pytest
 from made_speech import LoudIsSpeech, ScriptedRecogniser, silence, speech_like, tone, write_wav
 
 from executive.language import Status
-from executive.mission.errors import InputError
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener
 from executive.speech.sound import RATE_HZ
 from executive.speech.vocabulary import of_world
+from skills.files.errors import InputError
 
 GO = "Hey Alice, go to the kitchen."
 

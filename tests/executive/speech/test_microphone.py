@@ -7,12 +7,12 @@ import pytest
 from made_speech import LoudIsSpeech, ScriptedRecogniser, speech_like
 
 from executive.language import Status
-from executive.mission.errors import InputError
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener
 from executive.speech.microphone import follow, microphone_blocks
 from executive.speech.sound import RATE_HZ
 from executive.speech.vocabulary import of_world
+from skills.files.errors import InputError
 
 BLOCK = RATE_HZ // 10
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from executive.mission.errors import InputError
 from executive.speech.model_file import read_model_file
+from skills.files.errors import InputError
 
 VARIABLES = {
     "encoder/weight": np.arange(12, dtype="<f2").reshape(3, 4),

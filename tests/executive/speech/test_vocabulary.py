@@ -1,7 +1,7 @@
 import pytest
 
-from executive.mission.errors import InputError
 from executive.speech.vocabulary import Vocabulary, of_world, read_vocabulary
+from skills.files.errors import InputError
 
 
 def test_a_world_gives_all_its_names_and_the_robots_own_last(flat):

@@ -2,8 +2,8 @@ import time
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.speech.voice import EspeakVoice, Silence, installed_voice, queued_voice
+from skills.files.errors import InputError
 
 
 def test_without_a_synthesiser_nothing_is_said():

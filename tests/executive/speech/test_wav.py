@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from made_speech import tone, write_raw_wav, write_wav
 
-from executive.mission.errors import InputError
 from executive.speech.sound import RATE_HZ, joined
 from executive.speech.wav import read_wav
+from skills.files.errors import InputError
 
 PCM, FLOAT, UNKNOWN, EXTENSIBLE = 1, 3, 0x4242, 0xFFFE
 EDGE = 400  # samples at either end, where a change of the rate has no neighbours to look at

@@ -7,7 +7,6 @@ import pytest
 from made_speech import silence
 
 import executive.speech.extra as extra
-from executive.mission.errors import InputError
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener
@@ -15,6 +14,7 @@ from executive.speech.sound import joined
 from executive.speech.vocabulary import of_world
 from executive.speech.wav import read_wav
 from executive.speech.whisper import load_whisper
+from skills.files.errors import InputError
 
 pytest.importorskip("faster_whisper")
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 from py_trees.common import Status
 
-from executive.mission.errors import InputError
 from executive.mission.request import Request, Start
 from executive.mission.robots import RobotSetup
 from executive.mission.scenario import Scenario
@@ -18,6 +17,7 @@ from executive.store.database import VERSION
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.snapshot import Change, NodeState
 from skills.api import Cause
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 REQUEST = Request(

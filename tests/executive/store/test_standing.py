@@ -5,13 +5,13 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.run.journal import TickNote
 from executive.store import standing as standing_module
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing import MOST_WAITING, StandingMissions, TooManyError
 from executive.store.triggers import Missed, trigger_of
+from skills.files.errors import InputError
 
 REQUEST = Request("go to the kitchen", seed=3, name="go kitchen", world_name="flat", robot="Alice", commands=("Take",))
 START = datetime(2026, 11, 24, 8, 0, tzinfo=UTC)  # a Tuesday

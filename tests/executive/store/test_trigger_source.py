@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.store.trigger_source import refuse_missing_source, trigger_source
+from skills.files.errors import InputError
 
 MODULE = """
 class Source:

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.mission.errors import InputError
 from executive.store.triggers import (
     Day,
     Every,
@@ -21,6 +20,7 @@ from executive.store.triggers import (
     schedule_of,
     trigger_of,
 )
+from skills.files.errors import InputError
 
 BERLIN = ZoneInfo("Europe/Berlin")
 ANCHOR = datetime(2026, 1, 1, tzinfo=UTC)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.store import wakeup as wakeup_module
 from executive.store.missions import MissionStore
 from executive.store.standing import LATE
 from executive.store.wakeup import LONGEST_WAIT, WakeupPipe, wake_server
+from skills.files.errors import InputError
 
 ROOT = Path(__file__).parents[3]
 

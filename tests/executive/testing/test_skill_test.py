@@ -6,10 +6,10 @@ from typing import ClassVar
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.testing.skill_test import load_skill_tests
 from executive.testing.trial import carry_out, scripted_maker
 from skills.api import Cause, Failed, Running, Skill, Succeeded
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 from skills.testing.robot import BASE_ONLY
 

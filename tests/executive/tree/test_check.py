@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from executive.mission.command import parse_command
-from executive.mission.errors import SourceLine
 from executive.mission.file.blocks import Together, Wait
 from executive.mission.file.model import Mission, MissionStep, SkillCall
 from executive.tree.check import Abilities, PlannedRoutes, check_tree
@@ -14,6 +13,7 @@ from executive.tree.compiler import compile_mission
 from executive.tree.estimate import Route, load_estimates
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap
+from skills.files.errors import SourceLine
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import LatticePlanner
 from skills.robot import Pose2D

@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 import skills
-from executive.mission.errors import InputError
 from executive.tree.registry import GROUP, built_in_skills, installed_skills, missing, skills_of
 from skills.api import Skill
+from skills.files.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[3]
 GOOD = '''

@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 import pytest
 
-from executive.mission.errors import InputError
 from executive.record.reader import Event
 from executive.view.map_picture import WIDTH_PX, map_picture
 from executive.view.styles import ROBOT_COLOURS, rgb_of
+from skills.files.errors import InputError
 
 SCALE = WIDTH_PX / 7.0
 """Pixels per metre of the map below, 7 m x 3.5 m from (-1, -1)."""

@@ -6,7 +6,6 @@ import pytest
 
 from executive.mission.command import Command, Task, Thing
 from executive.mission.condition import AllOf, AnyOf, ButtonPressed, Look, Not, ValueIs
-from executive.mission.errors import InputError
 from executive.mission.expression import Expression, Template
 from executive.mission.file.blocks import (
     Ask,
@@ -24,6 +23,7 @@ from executive.mission.file.blocks import (
     steps_of,
 )
 from executive.mission.file.resolve import MAX_NESTING, MAX_STEPS, mission_from_file
+from skills.files.errors import InputError
 
 KITCHEN, HALL = Command(goal="kitchen"), Command(goal="hall")
 BEER = Look(Command(goal="kitchen", task=Task.FIND, object=Thing("beer")))

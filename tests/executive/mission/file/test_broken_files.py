@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from executive.cli.check_command import Checker
-from executive.mission.errors import InputError
+from skills.files.errors import InputError
 
 _spec = importlib.util.spec_from_file_location("mission_mutations", Path(__file__).with_name("mutations.py"))
 mutations = importlib.util.module_from_spec(_spec)

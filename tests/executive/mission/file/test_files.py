@@ -2,10 +2,10 @@
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.mission.file.overrides import overridden
 from executive.mission.file.resolve import MAX_DEPTH, MAX_STEPS, load_mission, mission_from_file
 from executive.tree.behaviours.board import Constant, FromBoard
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 VISIT = """\

@@ -2,9 +2,9 @@
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.mission.file.parameters import given_values
 from executive.mission.file.resolve import load_mission, mission_from_file
+from skills.files.errors import InputError
 
 FILE = """name: trial
 parameters:

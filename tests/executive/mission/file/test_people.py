@@ -2,9 +2,9 @@
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.mission.file.people import routes_in
 from executive.mission.file.resolve import load_mission
+from skills.files.errors import InputError
 
 WALKS = """\
 name: busy

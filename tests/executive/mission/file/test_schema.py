@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.mission.file.model import OnFailure, OperatorQuestion, StaleData, StepGuards, StepPolicy
 from executive.mission.file.resolve import load_mission
 from executive.mission.file.schema import MissionFile, mission_json_schema
+from skills.files.errors import InputError
 
 GOOD = """\
 name: round

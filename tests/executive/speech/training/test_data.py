@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from made_speech import tone
 
-from executive.mission.errors import InputError
 from executive.speech.training import data
 from executive.speech.training.data import spoken_sentences
 from executive.speech.training.voices import Speaker
+from skills.files.errors import InputError
 
 
 @pytest.fixture

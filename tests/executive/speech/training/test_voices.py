@@ -4,10 +4,10 @@ import random
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.speech.sound import RATE_HZ
 from executive.speech.training import voices
 from executive.speech.training.voices import drawn_speaker, speakers, speech
+from skills.files.errors import InputError
 
 HELD_OUT = ("scotland", "rp", "+f3", "awb", "slt", "ked")
 

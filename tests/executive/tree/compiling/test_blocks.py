@@ -4,7 +4,6 @@ import pytest
 
 from executive.mission.command import parse_command
 from executive.mission.condition import ButtonPressed, Condition, Look, Not, ValueIs
-from executive.mission.errors import InputError
 from executive.mission.expression import Expression, Template
 from executive.mission.file.blocks import (
     Ask,
@@ -22,6 +21,7 @@ from executive.mission.file.blocks import (
 )
 from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from executive.tree.compiler import compile_mission
+from skills.files.errors import InputError
 
 HOLDING, PRESSED = ValueIs(Expression("holding")), ButtonPressed("go")
 LOOK = Look(parse_command("Take [Nothing] to [kitchen] and do [find] to [beer]"))

@@ -3,11 +3,11 @@
 import pytest
 
 from executive.cli.goal_conditions import conditions_of
-from executive.mission.errors import InputError
 from executive.run.outcome import Outcome
 from executive.tree.behaviours.board import Constant
 from plant.referee import GoalKind
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
+from skills.files.errors import InputError
 
 GET = "Take [Nothing] to [counter] and do [grasp] to [everything]"
 BRING = "Take [everything] to [bedside table] and do [Nothing] to [Nothing]"

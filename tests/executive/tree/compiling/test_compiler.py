@@ -3,7 +3,6 @@
 import pytest
 
 from executive.mission.command import parse_command
-from executive.mission.errors import InputError, SourceLine
 from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.mission.goal import surfaces_to_search
 from executive.run.outcome import Outcome
@@ -11,6 +10,7 @@ from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiler import compile_mission
 from executive.tree.estimate import expected
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
+from skills.files.errors import InputError, SourceLine
 from skills.robot import Pose2D
 
 

@@ -5,13 +5,13 @@ import math
 import pytest
 
 from executive.mission.command import Command
-from executive.mission.errors import InputError
 from executive.mission.knowledge import Door, Knowledge
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.compiling.doors import door_plan, view_of
 from skills.back_off.skill import BackOff
 from skills.check_door.skill import CheckDoor
 from skills.clear_costmap.skill import ClearCostmap
+from skills.files.errors import InputError
 from skills.navigate.skill import Navigate
 from skills.robot import Pose2D
 

@@ -3,11 +3,11 @@
 import pytest
 
 from executive.cli.goal_conditions import conditions_of
-from executive.mission.errors import InputError
 from executive.run.outcome import Outcome
 from executive.tree.behaviours.board import Constant
 from plant.referee import GoalKind
 from skills.api import Succeeded
+from skills.files.errors import InputError
 
 TWO = (
     "Take [Nothing] to [kitchen] and do [grasp] to [2 drink]",

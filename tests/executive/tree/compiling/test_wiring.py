@@ -5,12 +5,12 @@ from typing import Any, ClassVar
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.tree.behaviours.board import Constant, FromBoard
 from executive.tree.compiling.builder import skill_spec
 from executive.tree.compiling.wiring import check_wiring
 from executive.tree.node import NodeSpec
 from skills.api import Skill, Succeeded
+from skills.files.errors import InputError
 
 
 @dataclass(frozen=True)

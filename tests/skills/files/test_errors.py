@@ -1,6 +1,6 @@
 """The error that bad input gives, as a user reads it."""
 
-from executive.mission.errors import MOST_LETTERS, InputError
+from skills.files.errors import MOST_LETTERS, InputError
 
 
 def test_a_message_that_repeats_an_endless_name_is_cut_off():

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from executive.mission.errors import InputError
 from executive.mission.file.resolve import load_mission
 from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import load_knowledge
 from executive.mission.stack_file import load_stack
-from executive.mission.yaml_source import MAX_BYTES, read_yaml
+from skills.files.errors import InputError
+from skills.files.yaml_source import MAX_BYTES, read_yaml
 
 LOADERS = (load_mission, load_stack, load_knowledge)
 

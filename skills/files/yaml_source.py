@@ -14,7 +14,7 @@ import yaml
 from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from executive.mission.errors import InputError, did_you_mean, listing, suggestion
+from skills.files.errors import InputError, did_you_mean, listing, suggestion
 from skills.quantities import range_text, without_range
 
 __all__ = ["Name", "Text", "YamlSource", "read_yaml", "validate"]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType, UnionType
@@ -15,9 +14,11 @@ from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from skills.files.errors import InputError, did_you_mean, listing, suggestion
+from skills.files.outside import read_text
+from skills.files.yaml_nodes import MOST_NESTED, KeyPath, data_and_lines, quoted
 from skills.quantities import range_text, without_range
 
-__all__ = ["Name", "Text", "YamlSource", "read_yaml", "validate"]
+__all__ = ["KeyPath", "Name", "Text", "YamlSource", "read_yaml", "validate"]
 
 _FIRST = r"[^\s\x00-\x1f\x7f\u200b-\u200f\u2060\ufeff]"
 Text = Annotated[str, Field(min_length=1, pattern=rf"^\s*{_FIRST}[^\x00-\x08\x0b\x0c\x0e-\x1f\x7f]*$")]
@@ -26,12 +27,10 @@ Name = Annotated[str, Field(min_length=1, pattern=rf"^ *{_FIRST}[^\x00-\x1f\x7f]
 """A name in a file: the same on one line."""
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
-KeyPath = tuple[str | int, ...]
 MAX_BYTES: Final = 1_000_000
-MOST_DIGITS: Final = 100
-MOST_NESTED: Final = 80
-_NUMBERS: Final = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
-_WORD: Final = re.compile(r"[\w -]{1,40}")
+_SURELY_FLAT: Final = 1_000
+"""A text with fewer brackets and letters in a line is not checked for its depth by an own pass."""
+_SECOND: Final = "but found another document"
 
 
 @dataclass(frozen=True)
@@ -53,27 +52,24 @@ class YamlSource:
         return InputError(message, hint=hint, file=self.path, line=self.line(path))
 
 
-def read_yaml(path: Path | str) -> YamlSource:
-    """Read one YAML document of plain data.
+def read_yaml(path: Path | str, tags: frozenset[str] = frozenset()) -> YamlSource:
+    """Read one YAML document of plain data; `tags` are those that may stand in it.
 
     Raises:
-        InputError: the file cannot be read, is too large, is no YAML, has a key twice, or has anchors.
+        InputError: the file cannot be read, is too large, is no YAML, or has a key twice, or a tag.
     """
     file = Path(path)
+    text = read_text(file, most_bytes=MAX_BYTES)
     try:
-        text = _text(file)
-        _refuse_aliases(text, file)
+        _refuse_deep(text, file)
         root = _composed(text)
-        places = list(_walk(root, (), file))
-        data = None if root is None else _plain(root)
-    except OSError as error:
-        raise InputError(f"cannot read it ({error.strerror})", hint="name a file that exists", file=file) from error
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        raise InputError("it is no UTF-8 text", hint="save it as UTF-8", file=file, line=line) from error
+        data, lines = data_and_lines(root, file, tags)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = 1 if mark is None else mark.line + 1
+        if error.problem and _SECOND in error.problem:
+            hint = "end the file before this line"
+            raise InputError("it holds more than one document", hint=hint, file=file, line=line) from error
         what = f"broken YAML: {error.problem or error.context}"
         raise InputError(what, hint="correct the indentation, brackets or quotes here", file=file, line=line) from error
     except yaml.reader.ReaderError as error:
@@ -84,25 +80,21 @@ def read_yaml(path: Path | str) -> YamlSource:
         raise InputError(f"broken YAML: {error}", hint="correct it", file=file, line=1) from error
     except RecursionError as error:
         raise InputError("it is nested too deeply", hint="write it flatter", file=file, line=1) from error
-    lines: dict[KeyPath, int] = {}
-    for key_path, line in places:
-        if key_path in lines:
-            what = f"{_quoted(key_path[-1])} stands twice (first in line {lines[key_path]})"
-            raise InputError(what, hint="remove one of the two", file=file, line=line)
-        lines[key_path] = line
     return YamlSource(file, data, lines)
 
 
-def _text(file: Path) -> str:
-    """The file's text. Raises InputError when it is no plain file, or larger than anyone would write."""
-    if not (stat.S_ISREG(file.stat().st_mode) or file.is_dir()):
-        raise InputError("it is a pipe or a device", hint="name a plain file", file=file, line=1)
-    with file.open("rb") as opened:
-        read = opened.read(MAX_BYTES + 1)
-    if len(read) > MAX_BYTES:
-        what = f"it is too large (at most {MAX_BYTES} bytes are read)"
-        raise InputError(what, hint="split it into files that use each other", file=file, line=1)
-    return read.decode("utf-8").replace("\r\n", "\n")
+def _refuse_deep(text: str, file: Path) -> None:
+    """Raise InputError before the composer, which calls itself for each level, runs out of stack."""
+    most = text.count("[") + text.count("{") + max(map(len, text.splitlines()), default=0)
+    if most <= _SURELY_FLAT:
+        return
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.CSafeLoader):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > MOST_NESTED:
+            what = f"it is nested more than {MOST_NESTED} deep"
+            line = 1 if event.start_mark is None else event.start_mark.line + 1
+            raise InputError(what, hint="write it flatter", file=file, line=line)
 
 
 def _composed(text: str) -> yaml.Node | None:
@@ -112,44 +104,6 @@ def _composed(text: str) -> yaml.Node | None:
     except yaml.YAMLError:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     return node
-
-
-def _refuse_aliases(text: str, file: Path) -> None:
-    """Anchors make small files huge, and lines ambiguous."""
-    if "*" not in text:
-        return
-    for event in yaml.parse(text, Loader=yaml.SafeLoader):
-        if isinstance(event, yaml.AliasEvent):
-            what = f"the alias '*{str(event.anchor)[:40]}' cannot be used here"
-            raise InputError(what, hint="write it out", file=file, line=_line(event))
-
-
-def _line(event: yaml.Event) -> int:
-    return 1 if event.start_mark is None else event.start_mark.line + 1
-
-
-def _plain(root: yaml.Node) -> Any:
-    """The data of a composed document."""
-    return yaml.constructor.SafeConstructor().construct_document(root)
-
-
-def _walk(node: yaml.Node | None, path: KeyPath, file: Path) -> Iterator[tuple[KeyPath, int]]:
-    """Every key and list item below `node` with its line. Raises InputError: what nobody would write or read."""
-    if len(path) > MOST_NESTED:
-        what = f"it is nested more than {MOST_NESTED} deep"
-        raise InputError(what, hint="write it flatter", file=file, line=1 if node is None else node.start_mark.line + 1)
-    if isinstance(node, yaml.ScalarNode) and node.tag in _NUMBERS and len(node.value) > MOST_DIGITS:
-        what = f"a number of {len(node.value)} digits (at most {MOST_DIGITS} are read)"
-        raise InputError(what, hint="write a shorter one", file=file, line=node.start_mark.line + 1)
-    if isinstance(node, yaml.MappingNode):
-        for key, value in node.value:
-            yield from () if isinstance(key, yaml.CollectionNode) else _walk(key, path, file)
-            yield (*path, key.value), key.start_mark.line + 1
-            yield from _walk(value, (*path, key.value), file)
-    elif isinstance(node, yaml.SequenceNode):
-        for index, item in enumerate(node.value):
-            yield (*path, index), item.start_mark.line + 1
-            yield from _walk(item, (*path, index), file)
 
 
 def validate(model: type[ModelT], source: YamlSource) -> ModelT:
@@ -220,7 +174,7 @@ def _input_error(model: type[BaseModel], source: YamlSource, errors: list[ErrorD
     known = _field_names(_model_at(model, path[:-1]))
     if error["type"] == "extra_forbidden":
         hint = suggestion(str(path[-1]), known, f"known keys are {listing(known)}")
-        return source.error(path, f"unknown {_quoted(path[-1])}", hint)
+        return source.error(path, f"unknown {quoted(path[-1])}", hint)
     if error["type"] == "missing" and isinstance(path[-1], int):
         parts = ".".join(str(part) for part in path[:-1])
         return source.error(path[:-1], f"{parts}: it should have more parts than {path[-1]}", "add what is missing")
@@ -243,11 +197,6 @@ def _plainly(error: ErrorDetails) -> str:
         return f"should have {context['min_length']} parts or more"
     said = _PLAINER.get(error["type"], error["msg"].removeprefix("Value error, "))
     return f"should be {said.removeprefix('Input should be ')}" if said.startswith("Input should be ") else said
-
-
-def _quoted(key: str | int) -> str:
-    """A key as an error names it: one that is no plain word is not repeated, for the file may be none of ours."""
-    return f"key {key!r}" if _WORD.fullmatch(str(key)) else "key that is no plain word"
 
 
 def _nearest_word(error: ErrorDetails) -> str | None:

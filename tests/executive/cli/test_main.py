@@ -286,7 +286,7 @@ def test_evaluate_tries_each_fault_alone(monkeypatch, tmp_path):
     [
         (("--fault", "camra: dropout"), "'camra' is no verb of the robot; did you mean 'camera'"),
         (("--fault", "camera.hnad: dropout"), "no camera 'hnad'; did you mean 'hand'"),
-        (("--scenario", "nowhere.yaml"), "nowhere.yaml: cannot read it"),
+        (("--scenario", "nowhere.yaml"), "nowhere.yaml: there is no such file"),
     ],
 )
 @pytest.mark.parametrize("command", ["run", "evaluate"])

@@ -154,5 +154,5 @@ def test_a_file_without_keys_is_refused(write, text):
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"nowhere\.yaml: cannot read it"):
+    with pytest.raises(InputError, match=r"nowhere\.yaml: there is no such file"):
         load_knowledge(tmp_path / "nowhere.yaml")

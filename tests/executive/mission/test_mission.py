@@ -147,7 +147,7 @@ def test_a_file_without_steps_is_refused(load, text):
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(InputError, match="cannot read it"):
+    with pytest.raises(InputError, match="there is no such file"):
         load_mission(tmp_path / "nowhere.yaml")
 
 

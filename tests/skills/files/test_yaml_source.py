@@ -1,4 +1,4 @@
-"""Files that nobody would write as a mission are refused with one error that shows nothing of them."""
+"""The reader of YAML files: anchors, lines, and one refusal that shows nothing of a file that nobody wrote as such."""
 
 import os
 import time
@@ -11,7 +11,8 @@ from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import load_knowledge
 from executive.mission.stack_file import load_stack
 from skills.files.errors import InputError
-from skills.files.yaml_source import MAX_BYTES, read_yaml
+from skills.files.yaml_source import MAX_BYTES, YamlSource, read_yaml
+from tests.hostile_values import FILES
 
 LOADERS = (load_mission, load_stack, load_knowledge)
 
@@ -90,3 +91,91 @@ def test_a_name_that_cannot_be_seen_is_refused_at_its_line(tmp_path, name):
 def test_a_name_in_any_writing_is_taken(tmp_path, name):
     (tmp_path / "m.yaml").write_text(f"name: {name}\nsteps: [{{say: 'go to\n  the hall'}}]\n", encoding="utf-8")
     assert isinstance(load_mission(tmp_path / "m.yaml"), MissionFile)
+
+
+def source_of(tmp_path, text) -> YamlSource:
+    (tmp_path / "f.yaml").write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_yaml(tmp_path / "f.yaml")
+
+
+def refusal_of(tmp_path, text) -> InputError:
+    with pytest.raises(InputError) as error:
+        source_of(tmp_path, text)
+    assert error.value.line is not None
+    return error.value
+
+
+@pytest.mark.parametrize("raw", FILES, ids=lambda raw: repr(raw[:20]))
+def test_any_bytes_are_read_or_refused_at_a_line(tmp_path, raw):
+    (tmp_path / "f.yaml").write_bytes(raw)
+    try:
+        read_yaml(tmp_path / "f.yaml")
+    except InputError as error:
+        assert 1 <= (error.line or 0) <= raw.count(b"\n") + 1
+        assert len(str(error)) < 500
+
+
+def test_merge_keys_bring_what_is_not_written(tmp_path):
+    source = source_of(tmp_path, "a: &a {x: 1, y: 2}\nb: &b\n  y: 3\nc:\n  <<: [*a, *b]\n  x: 5\nd: {<<: *b}\n")
+    assert (source.data["c"], source.data["d"]) == ({"x": 5, "y": 2}, {"y": 3})
+
+
+def test_what_an_alias_brings_has_the_line_of_its_anchor(tmp_path):
+    source = source_of(tmp_path, "a: &a\n  x: 1\nb:\n  <<: *a\n  z: 1\nc:\n- *a\n")
+    lines = [source.line(path) for path in (("b", "x"), ("b", "z"), ("c", 0, "x"))]
+    assert lines == [2, 5, 2]
+
+
+def test_a_small_file_that_aliases_make_huge_is_refused(tmp_path):
+    text = "a0: &a0 [x, x, x, x]\n" + "".join(
+        f"a{n}: &a{n} [{', '.join(['*a' + str(n - 1)] * 8)}]\n" for n in range(1, 30)
+    )
+    begun = time.process_time()
+    assert "repeat more than" in str(refusal_of(tmp_path, text))
+    assert time.process_time() - begun < 1.0
+
+
+def test_many_merges_of_a_large_mapping_are_refused(tmp_path):
+    large = "a: &a {" + ", ".join(f"k{n}: 1" for n in range(2_000)) + "}\n"
+    assert "repeat more than" in str(refusal_of(tmp_path, large + "b: {<<: [" + ", ".join(["*a"] * 5_000) + "]}\n"))
+
+
+@pytest.mark.parametrize(
+    ("text", "said", "line"),
+    [
+        ("a: 1\nb: 2\na: 3\n", "stands twice (first in line 1)", 3),
+        ("1: a\n0x1: b\n", "stands twice", 2),
+        ("x: {b: 1,\n  b: 2}\n", "stands twice", 2),
+        ("a: &a {x: 1}\nb:\n  <<: *a\n  <<: *a\n", "write one", 4),
+        ("a: 1\nb:\n  <<: [1]\n", "takes a mapping", 3),
+        ("a: 1\n<<: text\n", "takes a mapping", 2),
+        ("a: 1\nb: &b {<<: *b}\n", "inside of what it repeats", 2),
+        ("a: 1\nb: !!python/object/apply:os.system [id]\n", "tag", 2),
+        ("a: 1\nb: !Rpy {deg: [0, 0, 90]}\n", "the tag '!Rpy' cannot be used", 2),
+        ("a: 1\nb: !!binary aGk=\n", "the tag '!!binary' cannot be used", 2),
+        ("a: 1\n? [b, c]\n: 1\n", "a key cannot be a list", 2),
+        ("a: 1\nb: !!int x\n", "put it in quotes", 2),
+        ("a: 1\n---\nb: 2\n", "more than one document", 2),
+        ("a: *b\n", "undefined alias", 1),
+        ("a: 1\n".encode("utf-16"), "UTF-16", 1),
+        (b"a: 1\nb: caf\xe9\n", "UTF-8", 2),
+    ],
+)
+def test_what_a_file_cannot_hold_is_refused_at_its_line(tmp_path, text, said, line):
+    error = refusal_of(tmp_path, text)
+    assert said in str(error)
+    assert error.line == line
+
+
+def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path):
+    assert source_of(tmp_path, b"\xef\xbb\xbfa: 1\r\nb: 2\r\n").data == {"a": 1, "b": 2}
+
+
+def test_tags_that_a_format_has_are_read_where_it_says_so(tmp_path):
+    (tmp_path / "f.yaml").write_text("a: !Rpy {deg: [0, 0, 90]}\n")
+    assert read_yaml(tmp_path / "f.yaml", frozenset({"!Rpy"})).data == {"a": {"deg": [0, 0, 90]}}
+
+
+@pytest.mark.parametrize("opening", ["[", "{a: ", "- "])
+def test_a_million_brackets_are_refused(tmp_path, opening):
+    refusal_of(tmp_path, opening * (900_000 // len(opening)))

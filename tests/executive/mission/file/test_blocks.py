@@ -422,10 +422,16 @@ def test_a_file_of_50_megabytes_is_refused_at_once(load, tmp_path):
     assert refusal.value.file.name == "big.yaml"
 
 
-@pytest.mark.parametrize("text", ["steps:\n- &a {group: [*a]}", "x: &x [a, a]\ny: &y [*x, *x]\nsteps: [*y]"])
-def test_aliases_are_refused(load, text):
-    with pytest.raises(InputError, match="the alias"):
-        load(text)
+def test_an_alias_inside_of_what_it_repeats_is_refused(load):
+    with pytest.raises(InputError, match="inside of what it repeats") as refusal:
+        load("steps:\n- dock\n- &a {group: [*a]}")
+    assert refusal.value.line is not None
+
+
+def test_steps_share_what_an_anchor_names(load):
+    mission = load("each: &p {retries: 3}\nsteps:\n- {to: office, <<: *p}\n- {to: hall, <<: [*p, {timeout: 7}]}")
+    first, second = (step.policy for step in mission.steps)
+    assert (first.retries, second.retries, second.timeout_s) == (3, 3, 7)
 
 
 def nested(depth, opening="{group: [", closing="]}", inner="dock"):

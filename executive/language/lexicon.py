@@ -60,6 +60,7 @@ class Lexicon:
     requests: tuple[str, ...]
     refusals: tuple[str, ...]
     searches: tuple[str, ...]
+    counting: tuple[str, ...]
     short_forms: Mapping[str, str]
     asides: tuple[str, ...]
     praises: tuple[str, ...]

@@ -8,12 +8,13 @@ from functools import cache
 from typing import Final
 
 from executive.language.lexicon import lexicon, read_table
+from skills.detect.words import plural
 
 __all__ = ["rephrased", "smoothed"]
 
 _Rule = tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]
 _SMOOTHED: Final = "smoothed"
-_TABLES: Final = tuple("short_forms asides hesitations praises refusals searches requests openers".split())  # noqa: SIM905
+_TABLES: Final = tuple("short_forms asides hesitations praises refusals searches requests counting openers".split())  # noqa: SIM905
 
 
 def rephrased(text: str) -> str:
@@ -66,6 +67,12 @@ def _bring(match: re.Match[str]) -> str:
     return f"bring {match[0]}" if whom else f"bring me {match[0]}"
 
 
+def _all(match: re.Match[str]) -> str:
+    """Each of a kind, one after the other, is all of that kind."""
+    what = match["what"].strip()
+    return f"{match['act']} all the {what if what.endswith('s') and not what.endswith('ss') else plural(what)} "
+
+
 def _break(match: re.Match[str]) -> str:
     """What stands in an opener's place: a comma, unless there is one or the sentence ends."""
     return ", " if match.string[: match.start()].strip() and match.string[match.end() :].strip(" .!?") else " "
@@ -75,5 +82,6 @@ _FUNCTIONS: Final[Mapping[str, Callable[[re.Match[str]], str]]] = {
     "$full": _full,
     "$are": _are,
     "$bring": _bring,
+    "$all": _all,
     "$break": _break,
 }

@@ -20,6 +20,7 @@ from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.recollection import Recollection
 from executive.store.records import Replacement
 from executive.store.resuming import ended_tree, resumed_tree
+from executive.tree.compiling.builder import slug
 from skills.files.errors import InputError, disk_is_full
 from skills.robot import Pose2D
 
@@ -213,7 +214,7 @@ def as_it_was(mission: StoredMission, store: Path) -> Request:
     file, text = mission.request.file, mission.request.text
     if file is None or text is None or _text(file) == text:
         return mission.request
-    file = file.with_name(f".{file.stem}.mission-{mission.id}{file.suffix}")
+    file = file.with_name(f".{slug(file.stem)}.mission-{mission.id}{file.suffix[:8]}")
     try:
         file.write_text(text, encoding="utf-8")
     except OSError as error:
@@ -252,7 +253,7 @@ def kept(store: MissionStore, mission: StoredMission) -> Iterator[Callable[[RunR
         if over:
             raise
         if mission.queued or mission.starts:
-            store.finish(mission.id, mission.state, mission.message)
+            store.never_began(mission)
         else:
             store.remove(mission.id)
         raise

@@ -89,13 +89,19 @@ def run(
             console=lines,
             record=not no_record,
         )
-        folder, first = out or store.parent / "fleet", next(iter(dispatch.missions[queued[0].id].options.values()))
+        folder, first = (
+            out or store.parent / "fleet",
+            next(iter(next(iter(dispatch.missions.values())).options.values())),
+        )
         page = PageView(None, console, port=view_port) if view or view_for is not None else None
         limit_s = time_limit_s(time_limit)
         run_fleet(dispatch, out=folder, seed=seed, time_limit_s=limit_s, page=page, first=first)
         results = told(missions, [each.id for each in queued])
+        left = resumable_lines(missions, queue)
     achieved = [_achieved(each) for each in results if each["part_of"] is None]
     console.print(f"{sum(achieved)} of {len(achieved)} missions achieved")
+    for line in left:
+        console.print(line, markup=False)
     if as_json:
         print_json({"missions": results})
     if page is not None:
@@ -146,8 +152,25 @@ def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
     given.settle()
     queued = [each for each in missions.missions(MissionState.QUEUED) if each.queued]
     if not queued:
-        raise InputError("nothing is queued", hint="queue a mission by `errand queue add`", file=missions.path)
+        hint = " ".join(resumable_lines(missions)) or "queue a mission by `errand queue add`"
+        raise InputError("nothing is queued", hint=hint, file=missions.path)
     return queued
+
+
+def resumable_lines(missions: MissionStore, queue: Path | None = None) -> Sequence[str]:
+    """How to go on with what a run has left: by `errand fleet run` with what waits in the `queue`, and by `errand
+    resume` with what was cancelled."""
+    given = GivenMissions(missions).all()
+    waiting = [each for each in missions.missions(MissionState.QUEUED) if each.queued]
+    lines = list[str]()
+    if waiting and queue is not None:
+        left = f"{len(waiting)} missions are" if len(waiting) > 1 else "1 mission is"
+        lines.append(f"{left} left in the queue; `errand fleet run {queue}` with the same options goes on.")
+    for each in missions.missions(MissionState.CANCELLED):
+        if each.id in given and given[each.id].part_of is None:
+            again = f"`errand resume --mission {each.id} --store {missions.path}`"
+            lines.append(f"Mission {each.id} ({each.request.name}) was cancelled; {again} does it with one robot.")
+    return lines
 
 
 def _faults(words: Sequence[str], robots: Sequence[str]) -> Mapping[str, Sequence[str]]:

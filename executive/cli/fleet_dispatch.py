@@ -81,6 +81,11 @@ class FleetDispatch:
         self._leaving: dict[str, tuple[int, Pose2D]] = {}
         self._work = Work()
         self.over: list[EndedMission] = []
+        self._stopped: str | None = None
+
+    def stop(self, reason: str) -> None:
+        """The run is ended from outside: what robots have under way stays in the queue; from signal handlers."""
+        self._stopped = reason
 
     @property
     def waiting(self) -> tuple[int, ...]:
@@ -172,6 +177,9 @@ class FleetDispatch:
         if name not in self._dispatcher.under_way:
             self._charged(name, end.result, recalled=recalled)
             return
+        if self._stopped is not None and end.result.outcome is Outcome.CANCELLED:
+            self._leave_in_queue(name, end)
+            return
         if end.result.outcome is Outcome.SUCCESS:
             self._over(name, end.result)
             return
@@ -187,6 +195,16 @@ class FleetDispatch:
         self._hand_on(name, end.result)
         if gone is None:
             self._leave_for_dock(name)
+
+    def _leave_in_queue(self, name: str, end: MissionEnd) -> None:
+        """The next run goes on with a robot's mission; one of which it cannot be said how far it came is cancelled."""
+        why = self._stuck(name, holding=end.seen is not None and end.seen.holding)
+        if why is not None:
+            self._over(name, replace(end.result, message=f"{end.result.message}; {why}"))
+            return
+        number = self._dispatcher.hand_back(name)
+        self._go_on_later(number, self._robots[name], end.result)
+        self._tell(f"Mission {number} stays in the queue: {end.result.message}")
 
     def _given_to_another(self, name: str, end: MissionEnd) -> bool:
         """Offer to the others, once, what one robot did not manage: it has nothing in its gripper, and has put nothing
@@ -246,7 +264,7 @@ class FleetDispatch:
     def close(self) -> None:
         """What no robot has at the end stays in the queue; what was handed back is told as failed."""
         handed_back = self._given.all()
-        for number in self.waiting:
+        for number in self.waiting if self._stopped is None else ():
             given = handed_back.get(number)
             if given is not None and given.robot is not None:
                 why = {**self._gone, **self.missions[number].tried}

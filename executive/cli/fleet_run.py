@@ -10,7 +10,7 @@ from executive.cli.fleet_dispatch import FleetDispatch
 from executive.cli.fleet_report import mission_rows, told, write_fleet_report
 from executive.cli.page_view import PageView, log_map
 from executive.cli.requests import Prepared
-from executive.cli.signals import cancelled_by_signals
+from executive.cli.signals import cancelled_by_signals, ended_by_signals
 from executive.record.event_log import EventLog
 from executive.record.reader import read_events
 from executive.run.control import Control
@@ -46,7 +46,7 @@ def run_fleet(
             page.begin(log, backend.show_live())
         if first is not None:
             log_map(log, first)
-        with cancelled_by_signals(asked) as control, LockStepWorker(clock) as worker:
+        with ended_by_signals(dispatch.stop), cancelled_by_signals(asked) as control, LockStepWorker(clock) as worker:
             result = run(
                 (),
                 clock=clock,

@@ -8,13 +8,15 @@ from dataclasses import replace
 from rich.console import Console
 
 from executive.cli.fleet_dispatch import FleetDispatch
-from executive.cli.fleet_missions import charging_missions, fleet_mission
+from executive.cli.fleet_missions import FleetMission, charging_missions, fleet_mission
 from executive.cli.simulated import SimulatedBackend
 from executive.cli.starts import placed_robots
 from executive.cli.worlds import knowledge_of, open_world
 from executive.mission.robots import RobotSetup
 from executive.store.given import GivenMissions
-from executive.store.missions import MissionStore, StoredMission
+from executive.store.missions import MissionState, MissionStore, StoredMission
+from plant.worlds.world import World
+from skills.files.errors import InputError, Problems
 
 __all__ = ["simulated_fleet"]
 
@@ -30,27 +32,36 @@ def simulated_fleet(
     console: Console | None = None,
     record: bool = False,
 ) -> FleetDispatch:
-    """A fleet in the plant of a world (None: that of the first mission). `faults` are by the robots' names; with
-    `record` it leaves a recording and pictures.
+    """A fleet in the plant of a world (None: that of the first mission whose world there is). `faults` are by the
+    robots' names; with `record` it leaves a recording and pictures.
 
+    A mission that is for none of these robots, for another world or that cannot be prepared is left out: it stays in
+    the queue with the cause as its message.
     Raises:
-        InputError: the robots do not fit into the world, or a mission is for none of them or for another world.
+        InputError: the robots do not fit into the world, or all missions are left out.
     """
-    where = open_world(world or queued[0].request.world or queued[0].request.world_name)
+    where = _world_of(queued) if world is None else open_world(world)
     knowledge = knowledge_of(where)
     robots = placed_robots(where, knowledge, setups)
     given = GivenMissions(store).all()
-    missions = {
-        each.id: fleet_mission(
-            store,
-            replace(each, request=replace(each.request, seed=seed)),
-            world=where,
-            knowledge=knowledge,
-            robots=robots,
-            done=given[each.id].done if each.id in given else 0,
-        )
-        for each in queued
-    }
+    missions, left_out = dict[int, FleetMission](), Problems()
+    for each in queued:
+        try:
+            missions[each.id] = fleet_mission(
+                store,
+                replace(each, request=replace(each.request, seed=seed)),
+                world=where,
+                knowledge=knowledge,
+                robots=robots,
+                done=given[each.id].done if each.id in given else 0,
+            )
+        except InputError as error:
+            left_out.add(error)
+            store.finish(each.id, MissionState.QUEUED, str(error))
+            if console is not None:
+                console.print(f"It is left out of this run: {error}", markup=False)
+    if not missions:
+        left_out.raise_any()
     return FleetDispatch(
         store,
         missions,
@@ -61,3 +72,13 @@ def simulated_fleet(
         knowledge.battery,
         console,
     )
+
+
+def _world_of(queued: Sequence[StoredMission]) -> World:
+    """The world of the first mission whose world there is. Raises InputError: there is none of them."""
+    problems = Problems()
+    for each in queued:
+        with problems:
+            return open_world(each.request.world or each.request.world_name)
+    problems.raise_any()
+    raise AssertionError("nothing is queued")

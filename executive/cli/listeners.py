@@ -38,6 +38,7 @@ class Listeners:
         self._calls = TriggerCalls(store, tell)
         self._server: CallServer | None = None
         self._sources: dict[str, tuple[tuple[str, ...], TriggerSource]] = {}
+        self._unheard: dict[str, str] = {}
 
     def __enter__(self) -> Listeners:
         return self
@@ -46,10 +47,10 @@ class Listeners:
         self.close()
 
     def follow(self, triggers: Iterable[Trigger]) -> None:
-        """Listen to what these wait for, and to nothing else.
+        """Listen to what these wait for, and to nothing else; a plug-in that is missing or does not start is told once.
 
         Raises:
-            InputError: the address cannot be served, or a plug-in is missing or does not start.
+            InputError: the address cannot be served.
         """
         waited_for = tuple(triggers)
         wanted: dict[str, tuple[str, ...]] = {}
@@ -90,9 +91,18 @@ class Listeners:
             if wanted.get(kind) != topics:
                 del self._sources[kind]
                 self._stop(kind, source)
+        self._unheard = {kind: why for kind, why in self._unheard.items() if kind in wanted}
         for kind, topics in wanted.items():
-            if kind not in self._sources:
+            if kind in self._sources:
+                continue
+            try:
                 self._sources[kind] = (topics, self._started(kind, topics))
+            except InputError as error:
+                if self._unheard.get(kind) != str(error):
+                    self._tell(f"errand: missions that wait for topics of {kind} are not heard of: {error}")
+                self._unheard[kind] = str(error)
+            else:
+                self._unheard.pop(kind, None)
 
     def _started(self, kind: str, topics: Sequence[str]) -> TriggerSource:
         """A plug-in that listens. Raises InputError: there is none, or it does not start."""

@@ -136,12 +136,18 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Run all that is queued, each mission in the world as the one before has left it."""
-    from executive.cli.queue_run import run_queue
+    from executive.cli.queue_run import resumable_line, run_queue
 
     console = console_for(as_json)
     with refusals(), MissionStore(store or out / STORE, create=False) as missions, missions.claimed():
         results = run_queue(missions, console, quiet=quiet)
-    console.print(f"{sum(result['achieved'] for result in results)} of {len(results)} missions achieved")
+        resumable = resumable_line(missions)
+    if results:
+        console.print(f"{sum(result['achieved'] for result in results)} of {len(results)} missions achieved")
+    else:
+        console.print("Nothing is queued; `errand queue add` queues a mission, `errand queue list` shows all.")
+    if resumable is not None:
+        console.print(resumable, markup=False)
     if as_json:
         print_json({"missions": results})
     if not all(result["achieved"] for result in results):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import traceback
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, Final, Protocol
 
 from rich.console import Console
 
@@ -13,6 +16,7 @@ from executive.cli.requests import Prepared, prepare
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.simulated import run_simulated
 from executive.run.control import Control
+from executive.store.database import StoreError
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.tree.compiling.builder import slug
 from skills.files.errors import InputError
@@ -21,26 +25,96 @@ _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCEL
 
 
 def run_queue(missions: MissionStore, console: Console, *, quiet: bool) -> list[dict[str, Any]]:
-    """Run all that is queued, until one is cancelled; their reports.
+    """Run all that is queued, until one is cancelled; their reports. One that cannot begin is set aside.
 
     Raises:
-        InputError: a mission was broken off before and waits to be taken up, or one cannot begin.
+        InputError: a mission was broken off before and waits to be taken up, or the store cannot be used.
     """
     results: list[dict[str, Any]] = []
     broken = missions.missions(MissionState.RUNNING)
     if broken:
         raise broken_off(missions, broken[-1])
     while (mission := next_queued(missions)) is not None:
-        results.append(start_of(missions, mission, console, quiet=quiet))
+        results.append(run_or_set_aside(start_of, missions, mission, console, quiet=quiet))
         if results[-1]["outcome"] == MissionState.CANCELLED.value:
             break
     return results
+
+
+class Begin(Protocol):
+    """Begins a mission of the store, or goes on with it; `start_of` and `go_on`."""
+
+    def __call__(
+        self,
+        missions: MissionStore,
+        mission: StoredMission,
+        console: Console,
+        *,
+        quiet: bool,
+        control: Control | None = None,
+    ) -> dict[str, Any]:
+        """Run it to its end; its report. Raises InputError: it cannot."""
+
+
+def run_or_set_aside(
+    begin: Begin,
+    missions: MissionStore,
+    mission: StoredMission,
+    console: Console,
+    *,
+    quiet: bool,
+    control: Control | None = None,
+) -> dict[str, Any]:
+    """Run a mission of the queue; its report. One that cannot be run is set aside, so that the next one can.
+
+    Raises:
+        StoreError: the store cannot be used, or the disk is full; no other mission can be run either.
+    """
+    try:
+        return begin(missions, mission, console, quiet=quiet, control=control)
+    except StoreError:
+        raise
+    except InputError as error:
+        cause = str(error)
+    except OSError as error:
+        cause = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+    except Exception as defect:
+        cause = f"a defect of errand or of a plug-in ended it ({type(defect).__name__}: {defect})"
+        console.print(f"The traceback is in {_traceback_file(missions, mission)}", markup=False)
+    return set_aside(missions, mission, cause, console)
+
+
+def set_aside(missions: MissionStore, mission: StoredMission, cause: str, console: Console) -> dict[str, Any]:
+    """End a mission that cannot be run with its cause; its report."""
+    missions.finish(mission.id, MissionState.ERROR, cause)
+    console.print(f"Mission {mission.id} ({mission.request.name}) is set aside: {cause}", markup=False)
+    again = f"errand resume --mission {mission.id} --store {missions.path}"
+    console.print(f"  `{again}` tries again", markup=False)
+    return {"mission": mission.id, "outcome": MissionState.ERROR.value, "achieved": False, "message": cause}
+
+
+def _traceback_file(missions: MissionStore, mission: StoredMission) -> Path:
+    """Write the traceback of a defect beside the store, where that can be done; the file."""
+    file = missions.path.with_name(f"mission-{mission.id}-traceback.txt")
+    with suppress(OSError):
+        file.write_text(traceback.format_exc(), encoding="utf-8")
+    return file
 
 
 def broken_off(missions: MissionStore, mission: StoredMission) -> InputError:
     """Why nothing else is run before a mission that was broken off."""
     what = f"mission {mission.id} ({mission.request.name}) was broken off"
     return InputError(what, hint="`errand resume` goes on with it and then with the queue", file=missions.path)
+
+
+def resumable_line(missions: MissionStore) -> str | None:
+    """How to go on with the mission that was begun last, where it was cancelled; None where it was not."""
+    begun = [each for each in missions.missions() if each.starts]
+    if not begun or begun[-1].state is not MissionState.CANCELLED:
+        return None
+    last = begun[-1]
+    what = f"Mission {last.id} ({last.request.name}) was cancelled"
+    return f"{what}; `errand resume --store {missions.path}` goes on with it{' and then with the queue' * last.queued}."
 
 
 def next_queued(missions: MissionStore) -> StoredMission | None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 from rich.console import Console
 
-from executive.cli.queue_run import broken_off, go_on, next_queued, start_of
+from executive.cli.queue_run import broken_off, go_on, next_queued, run_or_set_aside, set_aside, start_of
 from executive.cli.shown import control_for
 from executive.run.control import Control
 from executive.store.missions import MissionState, MissionStore, StoredMission
@@ -46,7 +46,10 @@ class Runner(Protocol):
     """Runs missions of the store."""
 
     def run(self, mission: StoredMission) -> Ended:
-        """Run one to its end. Raises InputError: no further one can be run."""
+        """Run one to its end, or set it aside. Raises InputError: no further one can be run."""
+
+    def set_aside(self, mission: StoredMission, cause: str) -> Ended:
+        """End one that cannot be run with its cause."""
 
     def cancel(self, reason: str) -> None:
         """Cancel the one under way, and any that begins later; from signal handlers."""
@@ -110,19 +113,19 @@ class QueueServer:
         return ended
 
     def _take_up(self) -> list[Ended]:
-        """Go on with the mission of the queue that was broken off.
+        """Go on with the mission of the queue that was broken off; one that ends the process each time is set aside.
 
-        Raises InputError: it was broken off again and again, or it is none of the queue.
+        Raises InputError: it is none of the queue.
         """
-        broken = self._missions.missions(MissionState.RUNNING)
-        for each in broken:
+        ended = list[Ended]()
+        for each in self._missions.missions(MissionState.RUNNING):
             if not each.queued:
                 raise broken_off(self._missions, each)
             if each.starts >= MOST_STARTS:
-                what = f"mission {each.id} ({each.request.name}) was started {each.starts} times and broken off"
-                hint = f"`errand resume` tries again, `errand queue remove {each.id}` gives it up"
-                raise InputError(what, hint=hint, file=self._missions.path)
-        return [self._runner.run(each) for each in broken if self.stopped is None]
+                ended.append(self._runner.set_aside(each, f"it was started {each.starts} times and broken off"))
+            elif self.stopped is None:
+                ended.append(self._runner.run(each))
+        return ended
 
     def _follow_again(self) -> None:
         """Standing missions may have come or gone. What cannot be listened to is told once; the rest goes on."""
@@ -143,25 +146,24 @@ class MissionRunner:
         self._cancelled: str | None = None
 
     def run(self, mission: StoredMission) -> Ended:
-        """Run one, or go on with one that was broken off.
+        """Run one, or go on with one that was broken off; one that cannot be run is set aside.
 
-        One that cannot begin ends with an error. Raises InputError: one that has begun cannot go on.
+        Raises InputError: the store cannot be used, or the disk is full.
         """
         begin = go_on if mission.state is MissionState.RUNNING else start_of
         control = self._control = control_for(self._console, quiet=self._quiet)
         if self._cancelled is not None:
             control.cancel(self._cancelled)
         try:
-            result: dict[str, Any] = begin(self._missions, mission, self._console, quiet=self._quiet, control=control)
-        except InputError as error:
-            if self._missions.mission(mission.id).state is not MissionState.QUEUED:
-                raise
-            self._missions.finish(mission.id, MissionState.ERROR, str(error))
-            self._console.print(f"Mission {mission.id} cannot begin: {error}", markup=False)
-            return Ended(mission.id, MissionState.ERROR.value, achieved=False)
+            result = run_or_set_aside(begin, self._missions, mission, self._console, quiet=self._quiet, control=control)
         finally:
             self._control = None
         return Ended(mission.id, result["outcome"], result["achieved"])
+
+    def set_aside(self, mission: StoredMission, cause: str) -> Ended:
+        """End one that cannot be run with its cause."""
+        set_aside(self._missions, mission, cause, self._console)
+        return Ended(mission.id, MissionState.ERROR.value, achieved=False)
 
     def cancel(self, reason: str) -> None:
         """Cancel the one under way, and any that begins later; from signal handlers."""

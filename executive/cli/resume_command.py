@@ -9,7 +9,7 @@ import typer
 
 from executive.cli.durable import STORE
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
-from executive.cli.queue_run import go_on, run_queue
+from executive.cli.queue_run import go_on, run_or_set_aside, run_queue
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from skills.files.errors import InputError, listing
 
@@ -30,9 +30,11 @@ def resume(
     console = console_for(as_json)
     with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
         chosen = _broken_off(missions, mission)
-        results = [go_on(missions, chosen, console, quiet=quiet)]
         if chosen.queued:
+            results = [run_or_set_aside(go_on, missions, chosen, console, quiet=quiet)]
             results += run_queue(missions, console, quiet=quiet)
+        else:
+            results = [go_on(missions, chosen, console, quiet=quiet)]
     if as_json:
         print_json({**results[0], "then": results[1:]})
     if not all(result["achieved"] for result in results):

@@ -12,7 +12,7 @@ import typer
 from executive.cli.durable import STORE
 from executive.cli.output import console_for, print_json, refusals
 from executive.cli.signals import ended_by_signals
-from executive.store.missions import MissionState, MissionStore
+from executive.store.missions import MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.wakeup import WakeupPipe
 
@@ -44,6 +44,7 @@ def serve(
 ) -> None:
     """Wait for triggers and run what is queued, until Ctrl-C: at times, on a full battery, calls and messages."""
     from executive.cli.listeners import CallAddress, Listeners
+    from executive.cli.queue_run import resumable_line
     from executive.cli.queue_serve import MissionRunner, QueueServer
 
     console = console_for(as_json)
@@ -61,8 +62,9 @@ def serve(
             with ended_by_signals(server.stop):
                 tell(f"Standing missions: {len(standing.missions())} ({missions.path}). Ctrl-C ends.")
                 ended = server.serve(end=end, until_idle=until_idle)
+            resumable = resumable_line(missions)
     tell(f"{sum(each.achieved for each in ended)} of {len(ended)} missions achieved")
-    if ended and ended[-1].outcome == MissionState.CANCELLED.value:
-        tell(f"Mission {ended[-1].mission} was cancelled; `errand resume --store {missions.path}` goes on with it.")
+    if resumable is not None:
+        tell(resumable)
     if as_json:
         print_json({"missions": [asdict(each) for each in ended]})

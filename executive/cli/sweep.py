@@ -18,7 +18,6 @@ from executive.tree.compiling.builder import slug
 from skills.files.errors import InputError
 
 COUNTS: Final = ("successes", "referee_successes", "false_claims")
-_MOST_LETTERS: Final = 60
 Found = tuple[str, Sequence[RunReport]]
 """A condition's name, and its reports."""
 
@@ -45,7 +44,7 @@ def folders(out: Path, names: Sequence[str]) -> list[Path]:
     """Where the logs under each condition go: a folder of its own in `out`, where there are several."""
     if len(names) == 1:
         return [out]
-    return [out / f"{number}-{slug(name)}"[:_MOST_LETTERS] for number, name in enumerate(names)]
+    return [out / f"{number}-{slug(name)}" for number, name in enumerate(names)]
 
 
 def sweep(

@@ -41,8 +41,6 @@ class TriggerCalls:
             self._queue(OnTopic(kind, topic), payload)
         except CallError as refusal:
             self._tell(f"{OnTopic(kind, topic)}: {refusal}")
-        except Exception as defect:
-            self._tell(f"{OnTopic(kind, topic)}: {type(defect).__name__}: {defect}")
 
     def _queue(self, trigger: OnCall | OnTopic, body: bytes) -> tuple[StoredMission, ...]:
         """Queue the standing missions of a trigger, with the values in the body. Raises CallError."""
@@ -57,6 +55,11 @@ class TriggerCalls:
             raise CallError(HTTPStatus.TOO_MANY_REQUESTS, str(error)) from error
         except InputError as error:
             raise CallError(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
+        except CallError:
+            raise
+        except Exception as defect:
+            said = f"a defect of errand or of a plug-in ({type(defect).__name__}: {defect})"
+            raise CallError(HTTPStatus.INTERNAL_SERVER_ERROR, said) from defect
         for mission in fired:
             self._tell(f"Mission {mission.id} is queued: {mission.request.name} ({mission.why})")
         wake_server(self._store)

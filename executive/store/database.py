@@ -164,6 +164,10 @@ def _migrate(connection: sqlite3.Connection) -> None:
     connection.execute(f"PRAGMA user_version = {VERSION}")
 
 
+class StoreError(InputError):
+    """The store cannot be read or written, whichever mission it is about."""
+
+
 @contextmanager
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
     """All or nothing."""
@@ -179,7 +183,7 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
 
 @contextmanager
 def told(path: Path) -> Iterator[None]:
-    """Failures of the database become an InputError."""
+    """Failures of the database become a StoreError."""
     try:
         yield
     except sqlite3.OperationalError as error:
@@ -187,21 +191,21 @@ def told(path: Path) -> Iterator[None]:
             raise full_disk(path) from error
         hint = "end the program that keeps it open, then try again" if _busy(error) else "name another by --store"
         what = "another program has locked the store" if _busy(error) else f"cannot use the store ({error})"
-        raise InputError(what, hint=hint, file=path) from error
+        raise StoreError(what, hint=hint, file=path) from error
     except sqlite3.DatabaseError as error:
-        raise InputError(f"the store is damaged ({error})", hint=_DAMAGED, file=path) from error
+        raise StoreError(f"the store is damaged ({error})", hint=_DAMAGED, file=path) from error
     except OSError as error:
         if disk_is_full(error):
             raise full_disk(path) from error
-        raise InputError(
+        raise StoreError(
             f"cannot use the store ({error.strerror})", hint="name another by --store", file=path
         ) from error
 
 
-def full_disk(store: Path) -> InputError:
+def full_disk(store: Path) -> StoreError:
     """The way on when the disk has become full under a mission of a store."""
     hint = f"what was written is kept: free space, then go on with `errand resume --store {store}`"
-    return InputError("the disk is full", hint=hint)
+    return StoreError("the disk is full", hint=hint)
 
 
 def _busy(error: sqlite3.OperationalError) -> bool:

@@ -125,6 +125,12 @@ class MissionStore:
         with self.writing() as connection:
             connection.execute("UPDATE mission SET state = 'running', starts = starts + 1 WHERE id = ?", (number,))
 
+    def never_began(self, before: StoredMission) -> None:
+        """A mission that was started is as it was `before`: it could not begin."""
+        with self.writing() as connection:
+            values = (before.state.value, before.message, before.starts, before.id)
+            connection.execute("UPDATE mission SET state = ?, message = ?, starts = ? WHERE id = ?", values)
+
     def finish(self, number: int, state: MissionState, message: str) -> None:
         """The mission has come to an end."""
         with self.writing() as connection:

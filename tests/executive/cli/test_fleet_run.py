@@ -2,6 +2,7 @@
 
 import io
 import json
+import signal
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,6 +11,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from executive.cli import entry, fleet_dispatch, fleet_missions, fleet_robots
+from executive.cli.fleet_command import _to_do, resumable_lines
 from executive.cli.fleet_dispatch import FleetDispatch
 from executive.cli.fleet_missions import FleetMission
 from executive.cli.fleet_report import told
@@ -28,6 +30,7 @@ from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.faults.faulty_robot import with_faults
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 from tests.benchmarks.fleet import begun_again
 from tests.executive.conftest import default_end
@@ -519,3 +522,44 @@ def test_two_robots_do_not_put_things_on_one_surface_at_once(fleet, script, regi
     script.ends.update(grasp=fleet.hold, place=put_down)
     assert [robot for robot, *_ in fleet.run()] == ["Alice", "Alice", "Bob"]
     assert at_work == [{"Alice"}, {"Alice"}]
+
+
+def interrupted_at(fleet, skill_ends):
+    """A Ctrl-C while a skill runs."""
+
+    def interrupt(skill):
+        if not fleet.interrupted:
+            fleet.interrupted = True
+            signal.raise_signal(signal.SIGINT)
+            return Running("on its way")
+        return skill_ends(skill)
+
+    fleet.interrupted = False
+    return interrupt
+
+
+def test_after_ctrl_c_the_next_run_goes_on_with_what_was_under_way(fleet, script):
+    for line in (KITCHEN, BEDROOM, KITCHEN):
+        fleet.queue(line)
+    script.ends["navigate"] = interrupted_at(fleet, lambda skill: Succeeded("there"))
+    assert [outcome for _, outcome, _ in fleet.run()] == ["queued", "success", "queued"]
+    assert resumable_lines(fleet.store, fleet.out) == [
+        f"2 missions are left in the queue; `errand fleet run {fleet.out}` with the same options goes on."
+    ]
+    assert [each.id for each in _to_do(fleet.store)] == [1, 3]
+    del fleet.missions[2]
+    assert [outcome for _, outcome, _ in fleet.run()] == ["success"] * 2
+
+
+def test_after_ctrl_c_with_something_in_the_gripper_the_mission_is_cancelled_and_can_be_resumed(
+    fleet, script, registry
+):
+    registry["grasp"].changes_world = True
+    fleet.queue(TAKE, PUT)
+    script.ends["grasp"] = fleet.hold
+    at_goal = interrupted_at(fleet, lambda skill: Succeeded("there"))
+    script.ends["navigate"] = lambda skill: at_goal(skill) if "grasp" in script.begun else Succeeded("there")
+    assert fleet.run() == [("Alice", "cancelled", 0)]
+    assert fleet.message(1) == "cancelled by SIGINT; the coke is in Alice's gripper"
+    with pytest.raises(InputError, match=r"nothing is queued; .*errand resume --mission 1 --store .* with one robot"):
+        _to_do(fleet.store)

@@ -525,9 +525,118 @@ def test_serve_runs_what_a_plug_in_hears(errand, mission, plant, tmp_path, monke
     assert "(topic bell:front door)" in result.output
 
 
-def test_serve_is_refused_where_a_plug_in_is_gone(errand, mission, plant, tmp_path):
+def test_serve_names_a_plug_in_that_is_gone_and_runs_what_is_queued(errand, mission, plant, tmp_path):
     errand("queue", "add", mission("first"), "--every", "1h")
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
         store._connection.execute("UPDATE standing SET trigger = 'topic gone:x'")
-    result = errand("queue", "serve")
-    assert (result.exit_code, "entry-point group 'errand.triggers'" in result.output) == (2, True)
+    errand("queue", "add", mission("second"))
+    result = errand("queue", "serve", "--until-idle", "--quiet")
+    assert (result.exit_code, [run[0] for run in plant.runs]) == (0, ["second"])
+    assert "missions that wait for topics of gone are not heard of" in result.output
+    assert "entry-point group 'errand.triggers'" in result.output
+
+
+def ended(errand):
+    """The state of each mission and the message in the list."""
+    told = json.loads(errand("queue", "list", "--json").stdout.splitlines()[-1])["missions"]
+    return [(each["state"], each["message"]) for each in told]
+
+
+SERVE = ("queue", "serve", "--until-idle", "--quiet")
+RUN = ("queue", "run", "--quiet")
+
+
+@pytest.mark.parametrize("command", [RUN, SERVE])
+def test_a_name_of_300_letters_is_run_in_a_folder_with_a_short_name(errand, plant, tmp_path, command):
+    for number in range(2):
+        (tmp_path / f"{number}.yaml").write_text(f"name: {'go there ' * 34}{number}\nsteps: [{{to: kitchen}}]\n")
+        assert errand("queue", "add", str(tmp_path / f"{number}.yaml")).exit_code == 0
+    assert errand(*command).exit_code == 0
+    folders = [run[2] for run in plant.runs]
+    assert [len(folder) <= 100 for folder in folders] == [True, True]
+    assert folders[0].removeprefix("001-") != folders[1].removeprefix("002-")
+
+
+@pytest.mark.parametrize("command", [RUN, SERVE])
+@pytest.mark.parametrize(
+    ("column", "value", "cause"),
+    [
+        ("world", "nowhere", "unknown world 'nowhere'"),
+        ("text", "name: [", "alone"),
+        ("text", "name: alone\nsteps: [{skill: dance}]\n", "there is no skill 'dance'"),
+    ],
+)
+def test_what_cannot_begin_is_set_aside_with_its_cause_and_the_next_one_runs(
+    errand, mission, plant, states, tmp_path, command, column, value, cause
+):
+    errand("queue", "add", mission("alone"))
+    errand("queue", "add", mission("second"))
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+        store._connection.execute(f"UPDATE mission SET {column} = ? WHERE id = 1", (value,))
+    result = errand(*command)
+    assert (states(), [run[0] for run in plant.runs]) == (["error", "success"], ["second"])
+    assert cause in ended(errand)[0][1]
+    assert "Mission 1 (alone) is set aside: " in result.output
+
+
+def test_a_defect_in_a_run_sets_its_mission_aside_and_keeps_the_traceback(errand, mission, plant, states, tmp_path):
+    def broken(prepared, **options):
+        if prepared.mission.name == "first":
+            raise ZeroDivisionError("by a plug-in")
+        return Plant.__call__(plant, prepared, **options)
+
+    errand("queue", "add", mission("first"))
+    errand("queue", "add", mission("second"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(queue_run, "run_simulated", broken)
+        result = errand("queue", "run", "--quiet")
+    assert (result.exit_code, states()) == (1, ["error", "success"])
+    assert "(ZeroDivisionError: by a plug-in)" in ended(errand)[0][1]
+    assert "raise ZeroDivisionError" in (tmp_path / "out" / "mission-1-traceback.txt").read_text()
+
+
+def test_what_was_set_aside_is_tried_again_by_its_number(errand, mission, plant, states, tmp_path):
+    errand("queue", "add", mission("first"))
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+        store._connection.execute("UPDATE mission SET world = 'nowhere'")
+    assert errand("queue", "run", "--quiet").exit_code == 1
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+        store._connection.execute("UPDATE mission SET world = NULL")
+    assert errand("resume", "--mission", "1", "--quiet").exit_code == 0
+    assert states() == ["success"]
+
+
+def test_a_queued_mission_that_cannot_go_on_is_set_aside_and_the_queue_goes_on(
+    errand, mission, plant, states, tmp_path
+):
+    plant.outcomes = ["killed"]
+    errand("queue", "add", mission("first"))
+    errand("queue", "add", mission("second"))
+    with pytest.raises(GoneError):
+        errand("queue", "run", "--quiet")
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+        store._connection.execute("UPDATE mission SET fingerprint = 'other' WHERE id = 1")
+    assert errand("queue", "serve", "--until-idle", "--quiet").exit_code == 0
+    assert states() == ["error", "success"]
+
+
+def test_a_mission_that_could_not_begin_does_not_give_the_next_one_a_fresh_world(errand, mission, plant):
+    def refuse_second(prepared, **options):
+        if prepared.mission.name == "second":
+            raise InputError("the world is full")
+        return Plant.__call__(plant, prepared, **options)
+
+    for name in ("first", "second", "third"):
+        errand("queue", "add", mission(name))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(queue_run, "run_simulated", refuse_second)
+        errand("queue", "run", "--quiet")
+    assert [run[3].take_up for run in plant.runs] == [False, True]
+
+
+def test_after_a_cancelled_run_the_queue_says_how_to_go_on_also_when_nothing_is_queued(errand, mission, plant):
+    plant.outcomes = ["cancelled"]
+    errand("queue", "add", mission("first"))
+    for said in (errand("queue", "run", "--quiet").output, errand("queue", "run", "--quiet").output):
+        assert "Mission 1 (first) was cancelled; `errand resume --store" in " ".join(said.split())
+    assert "Nothing is queued" in said

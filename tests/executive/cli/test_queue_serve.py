@@ -15,6 +15,7 @@ from executive.cli import queue_serve
 from executive.cli.queue_serve import MOST_STARTS, Ended, MissionRunner, QueueServer
 from executive.mission.request import Request
 from executive.run.journal import TickNote
+from executive.store.database import full_disk
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.triggers import Missed, OnCall, trigger_of
@@ -63,6 +64,10 @@ class World:
 
     def cancel(self, reason):
         self.cancelled = reason
+
+    def set_aside(self, mission, cause):
+        self.store.finish(mission.id, MissionState.ERROR, cause)
+        return Ended(mission.id, "error", False)
 
 
 @pytest.fixture
@@ -175,13 +180,13 @@ def test_a_mission_that_was_broken_off_goes_on_first(server, store, world):
     assert [number for _, number, _ in world.runs] == [2, 1]
 
 
-def test_a_mission_that_ends_the_process_each_time_is_not_taken_up_for_ever(server, store, world):
+def test_a_mission_that_ends_the_process_each_time_is_set_aside_and_the_next_one_runs(server, store, world):
+    store.add(REQUEST, queued=True)
     store.add(REQUEST, queued=True)
     for _ in range(MOST_STARTS):
         store.begin(1)
-    with pytest.raises(InputError, match=r"started 3 times and broken off; `errand resume` tries again, .*remove 1"):
-        server.serve(until_idle=True)
-    assert world.runs == []
+    assert [each.outcome for each in server.serve(until_idle=True)] == ["error", "success"]
+    assert store.mission(1).message == "it was started 3 times and broken off"
 
 
 def test_a_run_that_was_broken_off_is_left_to_the_user(server, store, world):
@@ -272,7 +277,7 @@ class TestMissionRunner:
     def test_a_full_disk_ends_the_server(self, runner, store, mission, monkeypatch):
         def refuse(*_, **__):
             store.begin(1)
-            raise InputError("the disk is full")
+            raise full_disk(store.path)
 
         monkeypatch.setattr(queue_serve, "start_of", refuse)
         with pytest.raises(InputError, match="the disk is full"):

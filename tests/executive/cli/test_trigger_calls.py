@@ -148,6 +148,6 @@ def test_a_message_that_cannot_be_used_is_told_and_raises_nothing(calls, stand, 
     assert [line.split(";")[0] for line in lines] == [
         "topic mqtt:home/door: the values are no JSON object",
         "topic mqtt:elsewhere: no standing mission waits for 'topic mqtt:elsewhere'",
-        "topic mqtt:home/door: ZeroDivisionError: division by zero",
+        "topic mqtt:home/door: a defect of errand or of a plug-in (ZeroDivisionError: division by zero)",
     ]
     assert queued() == []

@@ -8,7 +8,6 @@ from functools import cache
 from pathlib import Path
 
 from executive.cli.goal_conditions import Share, verdict_of
-from executive.cli.grids import grid_at
 from executive.cli.starts import PlacedRobot
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
@@ -19,7 +18,7 @@ from plant.snapshot.file import SnapshotError
 from plant.variation import AS_IT_IS, Variation
 from plant.worlds.world import World, WorldError
 from skills.detection import Detector
-from skills.estimate.grid_map import MapError
+from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
 from skills.perception.detector.network_file import ModelFileError
 from skills.robot import Pose2D
@@ -73,12 +72,12 @@ def run_entry(
         known = ", ".join(simulation.robots)
         raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", hint=f"known: {known}")
     seen_from_m = simulation.robots[tree.robot_name].capabilities().lidar_height_m
-    scan_map, keepout_map = grid_at(world.scan_map_seen_from(seen_from_m)), grid_at(world.keepout_map_path)
+    scan_map, keepout_map = load_grid_map(world.scan_map_seen_from(seen_from_m)), load_grid_map(world.keepout_map_path)
     start = believed or (simulation.starts[tree.robot_name] if told else None)
     try:
         localiser = stack.localiser.build(scan_map, start, surely=told and believed is None)
-    except MapError as error:
-        raise InputError(f"{world.scan_map_path}: {error}") from error
+    except InputError as error:
+        raise InputError(error.message, hint=error.hint, file=world.scan_map_path) from error
     return RunEntry(
         tree=tree,
         robot=simulation.robots[tree.robot_name],

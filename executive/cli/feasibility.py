@@ -17,7 +17,7 @@ from plant.kinds import robot_kind
 from plant.models.catalogue import load_catalogue
 from plant.worlds.world import World
 from skills.arm.kinematics import arm_model
-from skills.files.errors import InputError, Problems
+from skills.files.errors import Problems
 from skills.perception.attributes import known_attributes
 from skills.perception.class_forms import class_forms
 from skills.robot import Capabilities, Pose2D
@@ -35,13 +35,10 @@ class _RoutesOnMap(RoutePlanner):
 
     @cached_property
     def _routes(self) -> PlannedRoutes:
-        from skills.estimate.grid_map import MapError, load_grid_map
+        from skills.estimate.grid_map import load_grid_map
         from skills.navigate.footprint import Footprint
 
-        try:
-            keepout_map = load_grid_map(self._world.keepout_map_path)
-        except (MapError, OSError) as error:
-            raise InputError(str(error)) from error
+        keepout_map = load_grid_map(self._world.keepout_map_path)
         costmap, planner = (
             default_component(slot) if self._stack is None else getattr(self._stack, slot)
             for slot in ("costmap", "planner")

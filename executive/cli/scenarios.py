@@ -14,7 +14,7 @@ from executive.mission.scenario import Scenario
 from executive.mission.scenario_file import checked_fault, load_scenario, scenario_of
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import DoorRule, MoveRule, RouteRule, World, WorldError
-from skills.estimate.grid_map import GridMap, MapError, load_grid_map
+from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.faults.words import random_faults
 from skills.files.errors import InputError
 from skills.robot import FloatArray
@@ -66,10 +66,7 @@ def _with_doorways(scenario: Scenario, world: World) -> Scenario:
     """The scenario with the true middle, width and direction of each door. Raises InputError: the map is broken."""
     if not scenario.doors:
         return scenario
-    try:
-        grid = load_grid_map(world.surveyed.scan_map_path)
-    except (MapError, OSError) as error:
-        raise InputError(str(error)) from error
+    grid = load_grid_map(world.surveyed.scan_map_path)
     return replace(scenario, doors=tuple({**door, **doorway(grid, door["at"])} for door in scenario.doors))
 
 

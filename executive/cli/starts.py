@@ -10,7 +10,6 @@ from typing import Final
 
 import numpy as np
 
-from executive.cli.grids import grid_at
 from executive.mission.knowledge import Knowledge, Pose, RobotFacts
 from executive.mission.request import Start
 from executive.mission.robots import RobotSetup, display_name
@@ -18,7 +17,7 @@ from executive.mission.stack_file import load_stack
 from plant.kinds import robot_kind
 from plant.worlds.placement import people_stand_W, place_people
 from plant.worlds.world import World
-from skills.estimate.grid_map import GridMap
+from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.files.errors import InputError
 from skills.navigate.footprint import Footprint
 from skills.robot import Capabilities, FloatArray, Pose2D
@@ -62,7 +61,7 @@ def placed_robots(world: World, knowledge: Knowledge, setups: Mapping[str, Robot
     Raises:
         InputError: two overlap, a robot stands in something, a dock or a stack is none, or there is no room.
     """
-    free = grid_at(world.surveyed.keepout_map_path).with_unknown_blocked()
+    free = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     placed: dict[str, PlacedRobot] = {}
     told = {name: setup.start or (world.start if not number else None) for number, (name, setup) in _numbered(setups)}
     for number, (name, setup) in sorted(_numbered(setups), key=lambda each: told[each[1][0]] is None):
@@ -166,7 +165,7 @@ def stand_at(world: World, start: Start, seed: int) -> Pose2D:
     """
     if start.pose is not None:
         return start.pose
-    keepout = grid_at(world.surveyed.keepout_map_path).with_unknown_blocked()
+    keepout = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     places = keepout.centres(np.argwhere(keepout.distance > TURNING_M))
     for person in place_people(world, seed):
         places = places[np.hypot(*(places - person.X_WO.translation()[:2]).T) > FROM_PEOPLE_M]

@@ -29,7 +29,7 @@ from executive.view.feed import Feed
 from executive.view.server import PageContent
 from plant.worlds.world import World
 from skills.api import SkillContext
-from skills.estimate.grid_map import MapError, load_grid_map
+from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack
@@ -88,7 +88,7 @@ def context_for(world: World, robot: Robot, clock: Clock, start: Pose2D) -> Skil
         scan_map, keepout_map = load_grid_map(world.scan_map_path), load_grid_map(world.keepout_map_path)
         localiser = components.localiser.build(scan_map, start, surely=True)
         lease = robot.acquire_lease(HOLDER)
-    except (MapError, OSError, LeaseError) as error:
+    except (OSError, LeaseError) as error:
         raise InputError(str(error)) from error
     return SkillContext(
         robot=robot,

@@ -18,7 +18,7 @@ from executive.cli.output import refusals
 from executive.cli.run_options import START, StartCommand, start_pose
 from executive.cli.worlds import knowledge_of, open_world
 from plant.worlds.world import WorldError
-from skills.estimate.grid_map import GridMap, MapError, load_grid_map
+from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.files.errors import InputError
 from skills.robot import Picture, Pose2D
 
@@ -59,7 +59,9 @@ def from_map(
     from plant.worlds.builder.own import world_from_grid
 
     with refusals():
-        read = _grid_map(map_file)
+        read = load_grid_map(map_file)
+        for note in read.notes:
+            typer.echo(f"errand: warning: {map_file}: {note}", err=True)
         unknown = np.zeros_like(read.occupied) if read.unknown is None else read.unknown
         cells = np.where(read.occupied, OCCUPIED, np.where(unknown, UNKNOWN, FREE)).astype(np.uint8)
         grid, pose = Grid(cells, read.origin_m, read.resolution_m), start_pose(start)
@@ -97,7 +99,7 @@ def show(
     with refusals():
         drawn = open_world(folder)
         facts = knowledge_of(drawn)
-        grid = _grid_map(drawn.surveyed.keepout_map_path)
+        grid = load_grid_map(drawn.surveyed.keepout_map_path)
         picture = draw_world(
             drawn,
             _grey(grid),
@@ -117,13 +119,6 @@ def _grey(grid: GridMap) -> Picture:
     """Grey values of a grid, rows from the south."""
     unknown = np.zeros_like(grid.occupied) if grid.unknown is None else grid.unknown
     return np.where(grid.occupied, 0, np.where(unknown, 150, 255)).astype(np.uint8)
-
-
-def _grid_map(path: Path) -> GridMap:
-    try:
-        return load_grid_map(path)
-    except (MapError, OSError) as error:
-        raise InputError(str(error)) from error
 
 
 def _cylinders(path: Path) -> _Cylinders:

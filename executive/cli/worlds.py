@@ -37,13 +37,10 @@ def refuse_blocked(world: World, pose: Pose2D) -> None:
     import numpy as np
 
     from plant.spot.capabilities import spot_capabilities
-    from skills.estimate.grid_map import MapError, load_grid_map
+    from skills.estimate.grid_map import load_grid_map
     from skills.navigate.footprint import Footprint
 
-    try:
-        grid = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
-    except (MapError, OSError) as error:
-        raise InputError(str(error)) from error
+    grid = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     discs = Footprint.of(spot_capabilities()).discs
     c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     middles = discs[:, :2] @ np.array([[c, s], [-s, c]]) + [pose.x_m, pose.y_m]

@@ -1,30 +1,29 @@
-"""Surveyed occupancy grids in the map_server form (PGM picture and YAML), with their distance field."""
+"""Surveyed occupancy grids in the map_server form (a picture and YAML), with their distance field."""
 
 from __future__ import annotations
 
 import math
-import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from skills.estimate.compiled import distances
+from skills.files.errors import InputError
+from skills.files.outside import file_beside
+from skills.files.pictures import picture_shares
+from skills.files.yaml_source import YamlSource, read_yaml, validate
 from skills.robot import FloatArray
 
 BoolGrid = NDArray[np.bool_]
 MOST_CELLS: Final = 16_000_000
-_PGM: Final = re.compile(rb"P[25](?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)\s")
-_HEAD_BYTES: Final = 4096
-
-
-class MapError(ValueError):
-    """A map that cannot be used; the text begins with file:line and ends with the hint."""
+MOST_FROM_ORIGIN_M: Final = 10_000.0
+UNKNOWN_GREY: Final = 205
+"""What map_saver writes for unknown ground."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,8 @@ class GridMap:
     `occupied` and `unknown` are (rows, columns) with row 0 at the smallest y; `origin_m` is the world (x, y) of the
     outer corner of cell [0, 0]. `distance` is the signed distance (m) from each cell's centre to the boundary of the
     occupied cells: positive in the open, negative inside. `height_band_m` is the heights above the floor that the
-    grid speaks of, None when its file does not say. Raises ValueError for grids of fewer than 2 x 2 cells.
+    grid speaks of, None when its file does not say; `notes` are what a person may want to know of its file. Raises
+    ValueError for grids of fewer than 2 x 2 cells.
     """
 
     occupied: BoolGrid
@@ -42,6 +42,7 @@ class GridMap:
     origin_m: tuple[float, float]
     unknown: BoolGrid | None = None
     height_band_m: tuple[float, float] | None = None
+    notes: tuple[str, ...] = ()
     distance: NDArray[np.float32] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -74,9 +75,7 @@ class GridMap:
 
     def with_unknown_blocked(self) -> GridMap:
         """The same grid with unknown cells counted as occupied, as planning wants it."""
-        if self.unknown is None:
-            return self
-        return GridMap(self.occupied | self.unknown, self.resolution_m, self.origin_m, None, self.height_band_m)
+        return self if self.unknown is None else replace(self, occupied=self.occupied | self.unknown, unknown=None)
 
 
 def signed_distance(occupied: BoolGrid, resolution_m: float) -> NDArray[np.float32]:
@@ -90,6 +89,22 @@ def signed_distance(occupied: BoolGrid, resolution_m: float) -> NDArray[np.float
     return np.ascontiguousarray(np.where(occupied, 0.5 - inside, outside - 0.5) * resolution_m, dtype=np.float32)
 
 
+def _near_the_origin(value: float) -> float:
+    if abs(value) > MOST_FROM_ORIGIN_M:
+        raise ValueError(f"should lie within {MOST_FROM_ORIGIN_M:g} m of 0; subtract the same from all places")
+    return value
+
+
+def _in_radians(value: float) -> float:
+    if abs(value) > 2.0 * math.pi:
+        raise ValueError(f"should be an angle in radians; {value:g} degrees is {math.radians(value):.4g}")
+    return value
+
+
+_FromOrigin = Annotated[float, AfterValidator(_near_the_origin)]
+_Yaw = Annotated[float, AfterValidator(_in_radians)]
+
+
 class _MapFile(BaseModel):
     """The keys of a map_server YAML file, and the band of heights."""
 
@@ -97,66 +112,72 @@ class _MapFile(BaseModel):
 
     image: str
     resolution: float = Field(ge=0.005, le=1.0)
-    origin: tuple[float, float, float]
-    occupied_thresh: float = Field(le=1.0)
-    free_thresh: float = Field(ge=0.0)
-    negate: float = 0.0
-    mode: Literal["trinary", "scale"] = "trinary"
+    origin: tuple[_FromOrigin, _FromOrigin, _Yaw]
+    occupied_thresh: float = Field(ge=0.0, le=1.0)
+    free_thresh: float = Field(ge=0.0, le=1.0)
+    negate: bool = False
+    mode: Literal["trinary", "scale", "raw"] | None = None
+    trinary: bool | None = None
     height_band_m: tuple[float, float] | None = None
+
+    @property
+    def read_as(self) -> str:
+        """The mode; `trinary` is how older files say it."""
+        return self.mode or ("scale" if self.trinary is False else "trinary")
 
 
 def load_grid_map(path: Path) -> GridMap:
-    """Read a map_server YAML file and the picture that it names. Raises MapError with file:line and the hint."""
-    lines = _key_lines(path)
+    """Read a map_server YAML file and the picture that it names, as map_server reads them.
 
-    def refused(key: str, why: str) -> MapError:
-        return MapError(f"{path}:{lines.get(key, 1)}: {key}: {why}")
-
-    try:
-        told = _MapFile.model_validate(yaml.safe_load(path.read_text()))
-    except ValidationError as error:
-        first = error.errors()[0]
-        why = f"{first['msg']}; known keys are {', '.join(_MapFile.model_fields)}"
-        raise refused(str(first["loc"][0]), why) from error
+    Raises:
+        InputError: with file and line: the file is no such map, or its picture cannot be used.
+    """
+    source = read_yaml(path)
+    told = validate(_MapFile, source)
     if not told.free_thresh < told.occupied_thresh:
-        raise refused("free_thresh", "must lie below occupied_thresh, both in 0..1")
-    picture = path.parent / told.image
-    try:
-        occupied, unknown = _classify(_grey(picture), told)
-    except (OSError, ValueError, cv2.error) as error:
-        raise refused("image", f"no picture can be read from {picture}: {error}") from error
+        what = f"free_thresh: {told.free_thresh:g} should be below occupied_thresh, {told.occupied_thresh:g}"
+        raise source.error(("free_thresh",), what, "swap the two, or correct them")
+    if told.trinary is not None and told.mode is not None:
+        raise source.error(("trinary",), "trinary: 'mode' says it, too", "remove 'trinary'")
+    shares, opacity = _picture(source, told)
+    occupied, unknown = _classify(shares, opacity, told)
+    notes = _notes(shares, told)
     if told.origin[2] != 0.0:
-        return _turned(occupied, unknown, told)
-    return GridMap(occupied, told.resolution, told.origin[:2], unknown, told.height_band_m)
+        return _turned(occupied, unknown, told, source, notes)
+    return GridMap(occupied, told.resolution, told.origin[:2], unknown, told.height_band_m, notes)
 
 
-def _grey(picture: Path) -> NDArray[np.uint8]:
-    """The grey values of a PGM or PNG file, whose head is looked at first. Raises OSError and ValueError."""
-    if not picture.is_file():
-        raise ValueError("there is no such file; put the map's PGM or PNG there")
-    with picture.open("rb") as file:
-        head = file.read(_HEAD_BYTES)
-    pgm = _PGM.match(head)
-    if pgm:
-        columns, rows, depth = (int(value) for value in pgm.groups())
-    elif head.startswith(b"\x89PNG") and len(head) >= 26:
-        columns, rows, depth = int.from_bytes(head[16:20]), int.from_bytes(head[20:24]), 255
-        if head[25] != 0:
-            raise ValueError("it has colours or is transparent; save it as a grey picture")
-    else:
-        raise ValueError("it is neither PGM nor PNG; save it as one of these, in grey")
-    if not 4 <= rows * columns <= MOST_CELLS:
-        raise ValueError(f"it has {columns} x {rows} cells; cut it or make it coarser, to at most {MOST_CELLS}")
-    size = picture.stat().st_size
-    if pgm and head.startswith(b"P5") and size - pgm.end() != (said := rows * columns * (1 if depth < 256 else 2)):
-        raise ValueError(f"it says {columns} x {rows} cells, {said} bytes, and has {size - pgm.end()}; save it again")
-    grey = cv2.imread(str(picture), cv2.IMREAD_GRAYSCALE)
-    if grey is None or grey.shape != (rows, columns):
-        raise ValueError(f"it says {columns} x {rows} cells and is damaged; save it again")
-    return np.asarray(grey, dtype=np.uint8)
+def _picture(source: YamlSource, told: _MapFile) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Brightness and opacity of the map's picture. Raises InputError in the line that names it."""
+    try:
+        picture = file_beside(source.path, told.image)
+        shares, opacity = picture_shares(picture, most_pixels=MOST_CELLS)
+    except InputError as error:
+        what = f"image: {error.message}" if error.file == source.path else f"image: {told.image[:100]}: {error.message}"
+        raise source.error(("image",), what, error.hint) from error
+    if min(shares.shape) < 2:
+        rows, columns = shares.shape
+        what = f"image: it has {columns} x {rows} cells"
+        raise source.error(("image",), what, "name a picture of 2 x 2 cells or more")
+    return shares, opacity
 
 
-def _turned(occupied: BoolGrid, unknown: BoolGrid, told: _MapFile) -> GridMap:
+def _notes(shares: NDArray[np.float64], told: _MapFile) -> tuple[str, ...]:
+    """What a person may want to know of a map that is read as its file says."""
+    unknown = UNKNOWN_GREY / 255.0
+    free = (unknown if told.negate else 1.0 - unknown) < told.free_thresh
+    share = float(np.mean(np.abs(shares - unknown) < 0.5 / 255.0))
+    if told.read_as == "raw" or not free or share == 0.0:
+        return ()
+    return (
+        f"{100.0 * share:.0f} % of the picture has the grey {UNKNOWN_GREY}, by which map_saver means unknown ground. "
+        f"It counts as free, since free_thresh is {told.free_thresh:g}; write 0.196 unless that is meant",
+    )
+
+
+def _turned(
+    occupied: BoolGrid, unknown: BoolGrid, told: _MapFile, source: YamlSource, notes: tuple[str, ...]
+) -> GridMap:
     """The grid of a turned map with axes parallel to the world's, in cells half as long, so that thin walls stay."""
     x, y, yaw = told.origin
     c, s = math.cos(yaw), math.sin(yaw)
@@ -165,7 +186,7 @@ def _turned(occupied: BoolGrid, unknown: BoolGrid, told: _MapFile) -> GridMap:
     low, step = ends.min(axis=0), told.resolution / 2.0
     count = np.ceil((ends.max(axis=0) - low) / step - 1e-6).astype(int)
     if count[0] * count[1] > 4 * MOST_CELLS:
-        raise MapError(f"the map at {told.origin} becomes too large when it is turned; cut it")
+        raise source.error(("origin",), "origin: the map becomes too large when it is turned", "cut it")
     across, up = np.meshgrid(*(edge + (np.arange(n) + 0.5) * step for edge, n in zip(low, count, strict=True)))
     column, row = (
         np.floor(along / told.resolution).astype(int) for along in (c * across + s * up, c * up - s * across)
@@ -173,34 +194,28 @@ def _turned(occupied: BoolGrid, unknown: BoolGrid, told: _MapFile) -> GridMap:
     inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
     column, row = column.clip(0, columns - 1), row.clip(0, rows - 1)
     origin_m = (x + float(low[0]), y + float(low[1]))
-    return GridMap(occupied[row, column] & inside, step, origin_m, unknown[row, column] | ~inside, told.height_band_m)
+    unknown = unknown[row, column] | ~inside
+    return GridMap(occupied[row, column] & inside, step, origin_m, unknown, told.height_band_m, notes)
 
 
-def _key_lines(path: Path) -> dict[str, int]:
-    """The 1-based line of each key. Raises MapError when there is no file or it is no YAML mapping."""
-    try:
-        node = yaml.compose(path.read_text(), Loader=yaml.SafeLoader)
-    except OSError as error:
-        raise MapError(f"{path}:1: cannot be read ({error.strerror}); check the map's path") from error
-    except (UnicodeDecodeError, yaml.reader.ReaderError) as error:
-        raise MapError(f"{path}:1: it is no text; give the map's YAML file") from error
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise MapError(f"{path}:{line}: {error.problem}; correct the YAML there") from error
-    if not isinstance(node, yaml.MappingNode):
-        raise MapError(f"{path}:1: must be a mapping with the keys {', '.join(_MapFile.model_fields)}")
-    return {key.value: key.start_mark.line + 1 for key, _ in node.value}
+def _classify(
+    shares: NDArray[np.float64], opacity: NDArray[np.float64] | None, told: _MapFile
+) -> tuple[BoolGrid, BoolGrid]:
+    """Occupied and unknown cells, row 0 at the bottom, as map_server tells them by mode and thresholds.
 
-
-def _classify(grey: NDArray[np.uint8], told: _MapFile) -> tuple[BoolGrid, BoolGrid]:
-    """Occupied and unknown cells, row 0 at the bottom, by the thresholds of the map_server.
-
-    What lies between them is unknown in trinary mode; in scale mode it is what is likelier.
+    What lies between the thresholds is unknown in trinary mode, in which opacity counts as a fourth colour. In scale
+    mode it is what is likelier, and unknown where the picture is transparent. In raw mode a value is the percentage
+    itself, and unknown above 100.
     """
-    share = grey.astype(np.float64) / 255.0
-    probability = np.flipud(share if told.negate else 1.0 - share)
-    if told.mode == "scale":
-        occupied = probability >= (told.free_thresh + told.occupied_thresh) / 2.0
-        return occupied, np.zeros_like(occupied)
+    if told.read_as == "raw":
+        percent = np.flipud(np.rint(255.0 * shares))
+        unknown = percent > 100.0
+        return (percent >= 50.0) & ~unknown, unknown
+    if opacity is not None and told.read_as == "trinary":
+        shares = (3.0 * shares + opacity) / 4.0
+    probability = np.flipud(shares if told.negate else 1.0 - shares)
+    if told.read_as == "scale":
+        unknown = np.zeros(shares.shape, dtype=np.bool_) if opacity is None else np.flipud(opacity < 1.0)
+        return (probability >= (told.free_thresh + told.occupied_thresh) / 2.0) & ~unknown, unknown
     occupied = probability > told.occupied_thresh
     return occupied, ~occupied & (probability >= told.free_thresh)

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
-from skills.estimate.grid_map import GridMap, MapError
+from skills.estimate.grid_map import GridMap
+from skills.files.errors import InputError
 from skills.geometry import wrap
 from skills.quantities import Count, Factor, Length, Margin, Share, Tries, Turn
 from skills.robot import FloatArray, Pose2D
@@ -75,7 +76,7 @@ class Mode:
 class ParticleFilter:
     """Weighted poses X_WB. `place` or `scatter` first; then `move`, `weigh` and `resample` in turn.
 
-    Raises MapError: the map has no free ground.
+    Raises InputError: the map has no free ground.
     """
 
     def __init__(self, grid: GridMap, options: FilterOptions) -> None:
@@ -85,7 +86,9 @@ class ParticleFilter:
         self._geometry = (grid.resolution_m, grid.origin_m[0], grid.origin_m[1])
         self._standable = _standable(grid)
         if not self._standable.any():
-            raise MapError("the map has no free ground where a robot could be; check its picture and thresholds")
+            raise InputError(
+                "the map has no free ground where a robot could be", hint="check its picture and thresholds"
+            )
         self._slow = self._fast = 0.0
         self.poses: FloatArray = np.empty((0, 3))
         self.weights: FloatArray = np.empty(0)

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cli.grids import grid_at
 from executive.cli.worlds import knowledge_of, open_world
 from executive.mission.knowledge import Door, Knowledge
 from executive.mission.robots import RobotSetup
 from plant.kinds import robot_kind
 from plant.worlds.world import World
-from skills.estimate.grid_map import GridMap
+from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.navigate.footprint import Footprint, footprint_clearance_m
 from skills.robot import Pose2D
 
@@ -106,7 +105,7 @@ def _start(
     kind: str, place: str, door: Door, world: World, knowledge: Knowledge, rng: np.random.Generator
 ) -> Pose2D | None:
     """A free pose in a place near a door, about facing it; None: there is none."""
-    grid = grid_at(world.surveyed.keepout_map_path).with_unknown_blocked()
+    grid = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     footprint = Footprint.of(robot_kind(kind).capabilities())
     low, high = (bound(knowledge.places[place].polygon, axis=0) for bound in (np.min, np.max))
     for _ in range(TRIES):

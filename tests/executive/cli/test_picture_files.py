@@ -85,7 +85,7 @@ def test_a_text_is_no_picture(tmp_path, name):
 def test_empty_missing_and_folder(tmp_path):
     (tmp_path / "a.png").touch()
     assert refused(tmp_path / "a.png") == "it is empty"
-    assert "No such file" in refused(tmp_path / "b.png")
+    assert "no such file" in refused(tmp_path / "b.png")
     assert refused(tmp_path) == "it is a folder"
 
 

@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from skills.estimate.grid_map import GridMap, MapError, load_grid_map
+from skills.estimate.grid_map import GridMap, load_grid_map
+from skills.files.errors import InputError
 
 YAML = """image: room.pgm
 resolution: 0.1
@@ -68,24 +69,34 @@ def test_unknown_ground_is_blocked_for_planning(tmp_path):
         ("origin: [-1.0, -2.0, 0.0]", "origin: [1, 2]", 3, "origin"),
         ("resolution: 0.1", "resolution: 0", 2, "resolution"),
         ("resolution: 0.1", "resolution: 50", 2, "resolution"),
-        ("negate: 0", "mode: raw", 4, "mode"),
-        ("negate: 0", "negative: 0", 4, "negative"),
+        ("negate: 0", "mode: grey", 4, "mode"),
+        ("negate: 0", "negative: 0", 4, "unknown key 'negative'; did you mean 'negate'"),
+        ("negate: 0", "resolution: 1", 4, "key 'resolution' stands twice"),
+        ("negate: 0", "mode: scale\ntrinary: true", 5, "trinary"),
+        ("origin: [-1.0, -2.0, 0.0]", "origin: [448262.5, -2, 0.0]", 3, "origin"),
+        ("origin: [-1.0, -2.0, 0.0]", "origin: [0, 0, 90]", 3, "origin.2: should be an angle in radians; 90 degrees"),
+        ("origin: [-1.0, -2.0, 0.0]", "origin: [0, .nan, 0]", 3, "origin"),
+        ("resolution: 0.1", "resolution: .inf", 2, "resolution"),
+        ("image: room.pgm", "image: http://x/room.pgm", 1, "image"),
+        ("image: room.pgm", "image: ../room.pgm", 1, "image: '../room.pgm' leads out of the folder"),
+        ("image: room.pgm", "image: /etc/passwd", 1, "image"),
+        ("image: room.pgm", "image: .", 1, "image"),
         ("free_thresh: 0.196", "free_thresh: 0.9", 6, "free_thresh"),
         ("image: room.pgm", "image: hall.pgm", 1, "image"),
-        ("negate: 0", "negate: [0", 5, ""),
+        ("negate: 0", "negate: [0", 5, "broken YAML"),
     ],
 )
 def test_errors_name_file_line_and_hint(tmp_path, old, new, line, key):
     path = write_map(tmp_path, YAML.replace(old, new))
-    with pytest.raises(MapError) as error:
+    with pytest.raises(InputError) as error:
         load_grid_map(path)
     assert str(error.value).startswith(f"{path}:{line}: {key}")
 
 
 def test_missing_key_and_missing_file_are_named(tmp_path):
-    with pytest.raises(MapError, match="resolution"):
+    with pytest.raises(InputError, match="resolution"):
         load_grid_map(write_map(tmp_path, YAML.replace("resolution: 0.1\n", "")))
-    with pytest.raises(MapError, match=r"nowhere\.yaml:1: cannot be read"):
+    with pytest.raises(InputError, match=r"nowhere\.yaml: there is no such file"):
         load_grid_map(tmp_path / "nowhere.yaml")
 
 
@@ -137,21 +148,109 @@ def _pgm(folder, head, size):
 @pytest.mark.parametrize(
     ("picture", "why"),
     [
-        (lambda folder: _png(folder, np.zeros((9, 9, 3), np.uint8)), "colours"),
-        (lambda folder: _pgm(folder, b"P5\n30 20\n255\n", 599), "30 x 20 cells, 600 bytes, and has 599"),
-        (lambda folder: _pgm(folder, b"P5\n30 20\n255\n", 700), "has 700"),
-        (lambda folder: _pgm(folder, b"P5\n20000 20000\n255\n", 9), "20000 x 20000 cells"),
-        (lambda folder: _pgm(folder, b"GIF89a", 99), "neither PGM nor PNG"),
+        (lambda folder: _pgm(folder, b"P5\n30 20\n255\n", 599), "30 x 20 pixels, 600 values, and it has 599"),
+        (lambda folder: _pgm(folder, b"P5\n30 20\n255\n", 700), "it has 700"),
+        (lambda folder: _pgm(folder, b"P5\n30 20\n65535\n", 600), "it has 300"),
+        (lambda folder: _pgm(folder, b"P2\n3 2\n255\n1 2 3 4 5 x", 0), "it has 0"),
+        (lambda folder: _pgm(folder, b"P2\n3 2\n255\n1 2 3 4 5", 0), "it has 6|it has 0|it has 5"),
+        (lambda folder: _pgm(folder, b"P5\n30 20\n0\n", 600), "its greatest value is 0"),
+        (lambda folder: _pgm(folder, b"P5\n20000 20000\n255\n", 9), "20000 x 20000 pixels"),
+        (lambda folder: _pgm(folder, b"P5\n1 600\n255\n", 600), "1 x 600 cells"),
+        (lambda folder: _pgm(folder, b"version https://git-lfs.github.com/spec/v1\n", 0), "pointer of Git LFS"),
+        (lambda folder: _pgm(folder, b"P9", 99), "no picture|damaged"),
     ],
 )
 def test_a_picture_that_is_no_map_is_refused_with_the_reason(tmp_path, picture, why):
     path = write_map(tmp_path)
     path.write_text(YAML.replace("room.pgm", picture(tmp_path)))
-    with pytest.raises(MapError, match=rf"room\.yaml:1: image: .*{why}"):
+    with pytest.raises(InputError, match=rf"room\.yaml:1: image: .*{why}"):
         load_grid_map(path)
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path):
     (tmp_path / "room.yaml").write_bytes(bytes(range(256)))
-    with pytest.raises(MapError, match=r"room\.yaml:1: it is no text"):
+    with pytest.raises(InputError, match=r"room\.yaml:2: it is no UTF-8 text"):
         load_grid_map(tmp_path / "room.yaml")
+
+
+GREYS = np.repeat([[0], [205], [254], [128]], 30, axis=1).astype(np.uint8)
+"""Occupied, unknown, free and grey, from the top."""
+
+
+def classes(folder: Path, name: str, keys: str = "") -> tuple[list[bool], list[bool]]:
+    """Whether each row of a picture is occupied, and unknown, from the top."""
+    (folder / "room.yaml").write_text(YAML.replace("room.pgm", name).replace("negate: 0\n", "") + keys)
+    grid = load_grid_map(folder / "room.yaml")
+    assert grid.unknown is not None
+    return grid.occupied[::-1, 3].tolist(), grid.unknown[::-1, 3].tolist()
+
+
+TRINARY = ([True, False, False, False], [False, True, False, True])
+
+
+def pnm(head: bytes, values: np.ndarray, kind: str = "u1") -> bytes:
+    return head + values.astype(kind).tobytes()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        pnm(b"P5\n30 4\n255\n", GREYS),
+        pnm(b"P5 30 4 255 ", GREYS),
+        pnm(b"P5\n# made by map_saver 0.050 m/pix\n30 4\n#x\n255\n", GREYS),
+        pnm(b"P5\r\n30 4\r\n255\r\n", GREYS),
+        pnm(b"P5\n30 4\n255\n", GREYS) + b"\n",
+        pnm(b"P5\n30 4\n65535\n", GREYS * 257.0, ">u2"),
+        pnm(b"P5\n30 4\n200\n", np.rint(GREYS / 255.0 * 200.0 - 0.4)),
+        pnm(b"P6\n30 4\n255\n", np.repeat(GREYS[..., None], 3, axis=2)),
+        b"P2\n30 4\n255\n" + b" ".join(b"%d" % value for value in GREYS.flat),
+        b"P2\n# c\n30 4\n1000 # most\n" + b"\n".join(b"%d" % (value / 255 * 1000) for value in GREYS.flat) + b"\n",
+    ],
+    ids=["p5", "blanks", "comments", "crlf", "trailing", "16bit", "max200", "colour", "p2", "p2max1000"],
+)
+def test_a_pgm_is_read_as_map_server_reads_it(tmp_path, content):
+    (tmp_path / "m.pgm").write_bytes(content)
+    assert classes(tmp_path, "m.pgm") == TRINARY
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_a_png_is_read_as_map_server_reads_it(tmp_path, channels, kind):
+    pixels = np.repeat(GREYS[..., None], channels, axis=2).astype(kind) * (257 if kind is np.uint16 else 1)
+    cv2.imwrite(str(tmp_path / "m.png"), pixels.squeeze())
+    assert classes(tmp_path, "m.png") == TRINARY
+
+
+def test_colours_are_averaged(tmp_path):
+    cv2.imwrite(str(tmp_path / "m.png"), np.tile(np.array([255, 255, 0], np.uint8), (4, 30, 1)))
+    assert classes(tmp_path, "m.png") == ([False] * 4, [True] * 4)
+
+
+def test_a_map_with_the_key_trinary_is_read_in_that_mode(tmp_path):
+    (tmp_path / "m.pgm").write_bytes(pnm(b"P5\n30 4\n255\n", GREYS))
+    assert classes(tmp_path, "m.pgm", "trinary: true\n") == TRINARY
+    assert classes(tmp_path, "m.pgm", "trinary: false\n") == ([True, False, False, True], [False] * 4)
+
+
+def test_transparent_ground_is_unknown_in_scale_mode(tmp_path):
+    pixels = np.dstack([GREYS, GREYS, GREYS, np.where(GREYS == 205, 0, 255)]).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "m.png"), pixels)
+    assert classes(tmp_path, "m.png", "mode: scale\n") == ([True, False, False, True], [False, True, False, False])
+
+
+def test_opacity_is_a_fourth_colour_in_trinary_mode(tmp_path):
+    pixels = np.dstack([GREYS, GREYS, GREYS, np.full_like(GREYS, 255)])
+    cv2.imwrite(str(tmp_path / "m.png"), pixels)
+    assert classes(tmp_path, "m.png") == ([True, False, False, False], [False, False, False, True])
+
+
+def test_values_are_percentages_in_raw_mode(tmp_path):
+    (tmp_path / "m.pgm").write_bytes(pnm(b"P5\n30 4\n255\n", np.repeat([[100], [255], [0], [60]], 30, axis=1)))
+    assert classes(tmp_path, "m.pgm", "mode: raw\n") == ([True, False, False, True], [False, True, False, False])
+
+
+def test_unknown_ground_that_counts_as_free_is_noted(tmp_path):
+    path = write_map(tmp_path, YAML.replace("0.196", "0.25"))
+    (note,) = load_grid_map(path).notes
+    assert "free_thresh is 0.25" in note
+    assert load_grid_map(write_map(tmp_path)).notes == ()

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from skills.estimate.grid_map import GridMap, MapError
+from skills.estimate.grid_map import GridMap
 from skills.estimate.particle_filter import FilterOptions, ParticleFilter
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 from skills.testing.blocks import Block, block_array, cast_rays, grid_of
 
@@ -139,7 +140,7 @@ def test_random_poses_stand_on_free_known_ground():
 
 
 def test_a_map_without_free_ground_is_refused():
-    with pytest.raises(MapError, match="no free ground"):
+    with pytest.raises(InputError, match="no free ground"):
         ParticleFilter(GridMap(np.ones((20, 20), dtype=np.bool_), 0.05, (0.0, 0.0)), FilterOptions())
 
 

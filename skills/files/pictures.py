@@ -1,0 +1,168 @@
+"""Picture files from outside: their pixels are counted in the file's head, before anything is decoded."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.files.errors import InputError
+from skills.files.outside import read_bytes
+
+__all__ = ["MOST_PIXELS", "check_picture", "picture_shares", "read_pixels"]
+
+MOST_PIXELS: Final = 64_000_000
+"""What is larger is refused before it fills the memory; `executive.cli` tells OpenCV the same limit."""
+MOST_BYTES: Final = 200_000_000
+_PNG: Final = b"\x89PNG\r\n\x1a\n"
+_LIMIT_NAME: Final = "MAX_IMAGE_PIXELS"
+_JPEG_SIZES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_SPACE: Final = rb"(?:\s|#[^\n\r]*[\n\r])+"
+_PNM: Final = re.compile(rb"P([2356])" + (_SPACE + rb"(\d{1,9})") * 3 + rb"\s")
+_ANY_PNM: Final = re.compile(rb"P[1-6]" + (_SPACE + rb"(\d{1,9})") * 2)
+_COMMENT: Final = re.compile(rb"#[^\n\r]*")
+_NUMBERS: Final = re.compile(rb"[\d\s]*")
+_HINT: Final = "name a file in PNG, JPEG, WebP, TIFF or BMP"
+
+
+def read_pixels(file: Path, *, flags: int = cv2.IMREAD_UNCHANGED, most_pixels: int = MOST_PIXELS) -> NDArray[Any]:
+    """The pixels of a picture file as OpenCV decodes them.
+
+    Raises:
+        InputError: it cannot be read, is damaged or no picture, or has more than `most_pixels`.
+    """
+    return _decoded(_content(file, most_pixels), file, flags)
+
+
+def check_picture(file: Path, *, most_pixels: int = MOST_PIXELS) -> None:
+    """Check a picture file that a library will read. Raises InputError as `read_pixels` does, but for damage."""
+    content = _content(file, most_pixels)
+    if _size(content) == (0, 0):
+        raise _unreadable(file, content)
+
+
+def picture_shares(file: Path, *, most_pixels: int) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Brightness (H, W) of a picture from 0 to 1, its colours averaged, and its opacity (None without transparency).
+
+    Values of a PGM or PPM are shares of the greatest one that its head names.
+
+    Raises:
+        InputError: as `read_pixels`.
+    """
+    content = _content(file, most_pixels)
+    head = _PNM.match(content)
+    if head is not None:
+        return _pnm_shares(content, head, file), None
+    pixels = _decoded(content, file, cv2.IMREAD_UNCHANGED)
+    shares = pixels.astype(np.float64) / np.iinfo(pixels.dtype).max
+    if shares.ndim == 2:
+        return shares, None
+    return np.asarray(shares[..., :3].mean(axis=2)), shares[..., 3] if shares.shape[2] == 4 else None
+
+
+def _pnm_shares(content: bytes, head: re.Match[bytes], file: Path) -> NDArray[np.float64]:
+    """Brightness of a picture in the form PGM or PPM."""
+    kind = head[1]
+    columns, rows, most = (int(number) for number in head.groups()[1:])
+    count = rows * columns * (3 if kind in b"36" else 1)
+    if not 0 < most < 65_536:
+        raise InputError(f"its greatest value is {most}", hint="save it with one from 1 to 65535", file=file)
+    values = _numbers(content[head.end() :]) if kind in b"23" else _raw(content, head.end(), count, most)
+    if len(values) != count:
+        what = f"its head says {columns} x {rows} pixels, {count} values, and it has {len(values)}"
+        raise InputError(what, hint="save it again", file=file)
+    shares = np.clip(values / most, 0.0, 1.0).reshape(rows, columns, -1)
+    return np.asarray(shares.mean(axis=2))
+
+
+def _numbers(body: bytes) -> NDArray[np.float64]:
+    """The numbers of a text; none where it holds anything else."""
+    text = _COMMENT.sub(b"", body)
+    return np.fromstring(text, dtype=np.float64, sep=" ") if _NUMBERS.fullmatch(text) and text.strip() else np.empty(0)
+
+
+def _raw(content: bytes, start: int, count: int, most: int) -> NDArray[np.float64]:
+    """The values of one or two bytes from `start` on; white space may follow them, and nothing else."""
+    kind = np.dtype(np.uint8 if most < 256 else ">u2")
+    needed = count * kind.itemsize
+    if len(content) - start == needed + 1 and content[start - 1 : start + 1] == b"\r\n":
+        start += 1
+    kept = needed if content[start + needed :].strip() == b"" else len(content) - start
+    body = content[start : start + kept]
+    return np.frombuffer(body[: len(body) // kind.itemsize * kind.itemsize], kind).astype(np.float64)
+
+
+def _content(file: Path, most_pixels: int) -> bytes:
+    content = read_bytes(file, most_bytes=MOST_BYTES, hint="name a picture file")
+    width, height = _size(content)
+    if width * height > most_pixels:
+        raise _too_large(file, f"{width} x {height}", most_pixels)
+    return content
+
+
+def _decoded(content: bytes, file: Path, flags: int) -> NDArray[Any]:
+    try:
+        with _silent():
+            pixels = cv2.imdecode(np.frombuffer(content, np.uint8), flags) if content else None
+    except cv2.error as error:
+        large = _LIMIT_NAME in str(error)
+        raise (_too_large(file, "too many", MOST_PIXELS) if large else _unreadable(file, content)) from error
+    if pixels is None:
+        raise _unreadable(file, content)
+    return np.asarray(pixels)
+
+
+def _too_large(file: Path, pixels: str, most_pixels: int) -> InputError:
+    what = f"it has {pixels} pixels, and {most_pixels // 1_000_000} million are the most that is read"
+    return InputError(what, hint="make it smaller", file=file)
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """OpenCV keeps its own words on damaged files to itself."""
+    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+
+
+def _unreadable(file: Path, content: bytes) -> InputError:
+    if not content:
+        return InputError("it is empty", hint="name a picture file", file=file)
+    if cv2.haveImageReader(str(file)):
+        return InputError("the picture is damaged or cut off", hint="copy or make it again", file=file)
+    return InputError("it is no picture", hint=_HINT, file=file)
+
+
+def _size(content: bytes) -> tuple[int, int]:
+    """Width and height as the head of a PNG, JPEG, PNM or BMP says; (0, 0) for others, which OpenCV checks itself."""
+    if content.startswith(_PNG) and len(content) >= 24:
+        width, height = struct.unpack(">II", content[16:24])
+        return int(width), int(height)
+    if content.startswith(b"\xff\xd8"):
+        return _jpeg_size(content)
+    if content.startswith(b"BM") and len(content) >= 26:
+        width, height = struct.unpack("<ii", content[18:26])
+        return abs(int(width)), abs(int(height))
+    pnm = _ANY_PNM.match(content[:4096])
+    return (0, 0) if pnm is None else (int(pnm[1]), int(pnm[2]))
+
+
+def _jpeg_size(content: bytes) -> tuple[int, int]:
+    """Width and height from the first frame's head; segments are marked 0xff, kind, length."""
+    place = 2
+    while place + 9 <= len(content) and content[place] == 0xFF:
+        kind = content[place + 1]
+        if kind in _JPEG_SIZES:
+            height, width = struct.unpack(">HH", content[place + 5 : place + 9])
+            return int(width), int(height)
+        place += 1 if kind == 0xFF else 2 + int.from_bytes(content[place + 2 : place + 4], "big")
+    return 0, 0

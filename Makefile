@@ -61,7 +61,7 @@ test: env voices
 	$(BIN)/pytest -n $(JOBS) --dist worksteal --ignore=tests/benchmarks
 
 fast: env
-	$(BIN)/pytest -n $(JOBS) --ignore=tests/benchmarks -m "not mission"
+	$(BIN)/pytest -n $(JOBS) --ignore=tests/benchmarks -m "not mission and not nightly"
 
 check: env
 	$(BIN)/ruff check .

@@ -14,12 +14,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from executive.cli.feasibility import refuse_impossible
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Prepared, prepare
 from executive.cli.run_options import robots_of
 from executive.cli.simulated import run_simulated
 from executive.evaluation.evidence import evidence_of, steps_of
-from executive.evaluation.outcome import RunOutcome
+from executive.evaluation.outcome import RunOutcome, Standing
 from executive.evaluation.runs import RunSpec
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
@@ -32,20 +33,26 @@ REFUSED: Final = "REFUSED"
 _ONE_AT_A_TIME: Final = threading.Lock()
 
 
-def run_one(spec: RunSpec) -> RunOutcome:
-    """Run it from beginning to end. What goes wrong with it, a refusal included, is an outcome and raises nothing."""
+def run_one(spec: RunSpec, *, checked: bool = False) -> RunOutcome:
+    """Run it from beginning to end. What goes wrong with it, a refusal included, is an outcome and raises nothing.
+
+    When `checked`, what `errand check` finds refuses it.
+    """
     began = time.monotonic()
     with _ONE_AT_A_TIME, tempfile.TemporaryDirectory(prefix="errand-run-", ignore_cleanup_errors=True) as folder:
-        outcome = _ran(spec, Path(folder))
+        outcome = _ran(spec, Path(folder), checked)
     worker = f"{platform.node()}:{os.getpid()}"
     return replace(outcome, spent_s=round(time.monotonic() - began, 3), worker=worker)
 
 
-def _ran(spec: RunSpec, folder: Path) -> RunOutcome:
+def _ran(spec: RunSpec, folder: Path, checked: bool) -> RunOutcome:
     out = folder / "out"
     try:
         with _files(spec, folder) as placed:
-            report = run_simulated(prepared_run(placed, out)).report
+            prepared = prepared_run(placed, out)
+            if checked:
+                refuse_impossible(prepared)
+            report = run_simulated(prepared).report
     except InputError as error:
         return RunOutcome(spec.id, _report(spec, "refused", REFUSED, str(error)).to_json())
     except Exception as error:
@@ -54,7 +61,7 @@ def _ran(spec: RunSpec, folder: Path) -> RunOutcome:
         return replace(kept, evidence=replace(kept.evidence, timeline=((0.0, "error", traceback.format_exc()),)))
     events = read_events(out / "log.mcap")
     outcome = RunOutcome(spec.id, {**report.to_json(), "log": ""}, steps_of(events))
-    if outcome.achieved:
+    if outcome.standing is Standing.FULFILLED:
         return outcome
     files = {path.name: path.read_bytes() for path in sorted(out.iterdir()) if path.is_file()}
     return replace(outcome, evidence=evidence_of(events, files))

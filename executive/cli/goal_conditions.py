@@ -44,9 +44,8 @@ def verdict_of(
     verdict = judge([replace(condition, since_s=since_s) for condition in conditions])
     without = [part for part in _done(tree, result) if part.goal is None]
     if result.outcome is not Outcome.SUCCESS:
-        return replace(
-            verdict, success=False, why=_joined(f"The mission ended with {result.outcome.value}.", verdict.why)
-        )
+        why = _joined(f"The mission ended with {result.outcome.value}.", verdict.why)
+        return replace(verdict, success=False, why=why, holds=verdict.success)
     if verdict.success is False or not (without or verdict.success is None):
         return verdict
     names = {node.path_id: node.name for node in tree.root.walk()}

@@ -87,6 +87,12 @@ ScenarioOrMission = Annotated[
         metavar="FILE", help="A scenario file, a mission file, or a name of `errand missions`.", show_default=False
     ),
 ]
+RandomMissions = Annotated[
+    int | None, typer.Option(min=1, metavar="N", help="Run so many random English missions; each seed draws one.")
+]
+Worlds = Annotated[
+    str | None, typer.Option(metavar="WORLD,...", help="The worlds of random missions, in turn; flat unless said.")
+]
 OwnMap = Annotated[
     Path | None, typer.Option("--map", help="The robot's map, a folder of `errand map build`; else the world's own.")
 ]
@@ -201,29 +207,40 @@ def evaluate(
         bool, typer.Option("--each-fault", help="Without any, then with each fault and scenario alone.")
     ] = False,
     anyway: Anyway = False,
+    random_missions: RandomMissions = None,
+    worlds: Worlds = None,
     out: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("out/evaluate"),
     as_json: AsJson = False,
 ) -> None:
-    """Run a scenario file, or a mission at many seeds; count what the trees claim and what the referee saw.
+    """Run a scenario file, random missions, or a mission at many seeds; count claims and what the referee saw.
 
-    A scenario file says what is run, where and with what varied; its results land in a file, and the same command goes
-    on where it stopped. Of a mission, faults and scenarios are all in each run, unless each is to be tried alone.
+    A scenario file says what is run, where and with what varied. Results of scenarios and of random missions land in a
+    file, and the same command goes on where it stopped. Of a mission, faults and scenarios are all in each run, unless
+    each is to be tried alone.
     """
     with refusals():
-        if file is not None and is_evaluation(file):
-            own = (say, world, given, seeds, wake, answer, questions, stack, own_map, start, fault, scenario)
-            if any(each is not None for each in own) or random_faults or each_fault:
-                what = "a scenario file says itself what is run"
-                raise InputError(what, hint="write missions, worlds, seeds, faults and stacks into it", file=file)
-            from executive.cli.evaluate_scenario import evaluate_scenario
+        own = (say, world, given, wake, answer, questions, stack, own_map, start, fault, scenario)
+        has_own = any(each is not None for each in own) or random_faults > 0 or each_fault
+        if random_missions is not None or (file is not None and is_evaluation(file)):
+            from executive.cli.evaluate_scenario import Handling, evaluate_scenario
+            from executive.cli.random_evaluation import evaluate_random_missions
             from executive.cli.worker_pool import Pool
 
-            pool, told = Pool(jobs, workers, scheduler), console_for(as_json)
-            raise typer.Exit(
-                evaluate_scenario(file, told, pool=pool, results=results, out=out, anyway=anyway, as_json=as_json)
-            )
+            how = Handling(console_for(as_json), Pool(jobs, workers, scheduler), results, out, anyway, as_json)
+            if random_missions is not None:
+                if has_own or file is not None:
+                    what = "--random-missions draws itself what is run"
+                    raise InputError(what, hint="give only --worlds, --seeds, who works, and where results land")
+                raise typer.Exit(evaluate_random_missions(random_missions, worlds, seeds, how))
+            assert file is not None
+            if has_own or seeds is not None or worlds is not None:
+                what = "a scenario file says itself what is run"
+                raise InputError(what, hint="write missions, worlds, seeds, faults and stacks into it", file=file)
+            raise typer.Exit(evaluate_scenario(file, how))
+        if worlds is not None:
+            raise InputError("--worlds is for --random-missions", hint="name one world by --world")
         if workers is not None or scheduler is not None or results is not None:
-            what = "--workers, --scheduler and --results are for a scenario file"
+            what = "--workers, --scheduler and --results are for a scenario file and for random missions"
             raise InputError(what, hint="write one: missions, worlds, seeds, variations")
         chosen = seed_range(seeds or "1-20")
         at = None if start is None else Start.of(start)

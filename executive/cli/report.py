@@ -17,7 +17,8 @@ class RefereeReport:
 
     `success` is None when the referee has not judged all that was asked for. `people_hit` counts collisions with
     people, `robots_hit` those between two robots, and `hit_by_people` how often somebody walked into the robot while it
-    stood: no collision of the robot's.
+    stood: no collision of the robot's. `holds` tells of a run that failed whether the referee sees nevertheless what
+    was asked for.
     """
 
     success: bool | None
@@ -27,6 +28,7 @@ class RefereeReport:
     people_hit: int = 0
     hit_by_people: int = 0
     robots_hit: int = 0
+    holds: bool | None = None
     events: tuple[str, ...] = ()
 
 

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 
-from executive.cli.evaluate_scenario import command_of
 from executive.cli.output import console_for, print_json, refusals, show_table
+from executive.cli.results_view import command_of, log_folder, show_cases, standings_json
 from executive.evaluation.page import EvaluationPage, to_page
 from executive.evaluation.results import ResultsFile
 from executive.evaluation.summary import (
     Case,
     causes_of,
     compared,
-    group_rows,
     groups_of,
     label_of,
     time_rows,
@@ -39,7 +39,7 @@ def report(
     with refusals(), ResultsFile(results) as kept:
         cases, about = _cases(kept), kept.about()
         other = None if against is None else _other(against)
-        _show(console, cases, other)
+        _show(console, cases, other, about.get("logs"))
         if html is not None:
             facts = (
                 ("scenario", about["scenario"]),
@@ -49,11 +49,18 @@ def report(
             )
             title = Path(about["scenario"]).stem.replace("_", " ")
             name = "" if against is None else str(against)
-            page = EvaluationPage(title, facts, cases, kept.evidence, lambda case: command_of(case.run), other, name)
+            repeats = partial(_repeats, logs=about.get("logs"))
+            page = EvaluationPage(title, facts, cases, kept.evidence, repeats, other, name)
             _write(html, to_page(page))
             console.print(f"Written: {html}", markup=False)
         if as_json:
-            print_json(_json(about["scenario"], cases, other))
+            print_json(_json(about, cases, other))
+
+
+def _repeats(case: Case, logs: str | None) -> Sequence[str]:
+    """The commands that repeat a run, and print its log where that is on this machine."""
+    folder = log_folder(case, logs)
+    return (command_of(case.run), *([] if folder is None else [f"errand log {folder / 'log.mcap'}"]))
 
 
 def _other(path: Path) -> Sequence[Case]:
@@ -70,8 +77,8 @@ def _cases(kept: ResultsFile) -> Sequence[Case]:
     return cases
 
 
-def _show(console: Console, cases: Sequence[Case], other: Sequence[Case] | None) -> None:
-    show_table(console, ("", "runs", "success", "95 %", "referee", "false claims"), group_rows(groups_of(cases)))
+def _show(console: Console, cases: Sequence[Case], other: Sequence[Case] | None, logs: str | None) -> None:
+    show_cases(console, cases, logs=logs)
     for row in causes_of(cases, most=1):
         console.print(f"{row.cause}: {row.runs}, as in: {row.sentences[0][0]}", markup=False)
     rows = ((row.skill, str(row.runs), f"{row.total_s:.1f}", f"{row.share:.1%}") for row in time_rows(cases))
@@ -91,7 +98,7 @@ def _write(path: Path, text: str) -> None:
         raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=path) from error
 
 
-def _json(scenario: str, cases: Sequence[Case], other: Sequence[Case] | None) -> dict[str, Any]:
+def _json(about: Mapping[str, str], cases: Sequence[Case], other: Sequence[Case] | None) -> dict[str, Any]:
     groups = [
         {
             "dimension": group.dimension,
@@ -117,16 +124,12 @@ def _json(scenario: str, cases: Sequence[Case], other: Sequence[Case] | None) ->
         for found in (compared(cases, other) if other is not None else ())
     ]
     return {
-        "scenario": scenario,
+        "scenario": about["scenario"],
         "runs": len(cases),
         **totals_of(cases),
         "groups": groups,
         "causes": [{"cause": row.cause, "runs": row.runs, "messages": dict(row.sentences)} for row in causes_of(cases)],
         "skills": {row.skill: {"runs": row.runs, "sim_s": row.total_s, "share": row.share} for row in time_rows(cases)},
         **({"against": comparisons} if other is not None else {}),
-        "failures": [
-            {"id": case.outcome.run_id, "cause": case.cause, "message": case.why, "command": command_of(case.run)}
-            for case in cases
-            if not case.outcome.achieved
-        ],
+        **standings_json(cases, about.get("logs")),
     }

@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
+import enum
 import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-__all__ = ["Evidence", "RunOutcome", "same_everywhere"]
+__all__ = ["Evidence", "RunOutcome", "Standing", "same_everywhere"]
 
 _OF_THE_MACHINE: Final = ("wall_time_s", "real_time_factor", "log")
 _COUNTERS_OF_THE_MACHINE: Final = ("bytes_logged",)
+
+
+class Standing(enum.Enum):
+    """What a run claims against what the referee saw, in words."""
+
+    FULFILLED = "claimed and fulfilled"
+    FALSE_CLAIM = "claimed, not fulfilled: FALSE CLAIM"
+    NOT_JUDGED = "claimed, not judged"
+    FAILED = "failed and said so"
+    FULFILLED_YET_FAILED = "failed, though fulfilled"
+    REFUSED = "refused"
+    BROKEN = "broken by an error"
+
+
+_CLAIMED: Final = {True: Standing.FULFILLED, False: Standing.FALSE_CLAIM, None: Standing.NOT_JUDGED}
+_NO_CLAIM: Final = {"refused": Standing.REFUSED, "error": Standing.BROKEN}
 
 
 @dataclass(frozen=True)
@@ -51,9 +68,23 @@ class RunOutcome:
         return success
 
     @property
+    def holds(self) -> bool | None:
+        """Whether the referee sees all that was asked for, however the run ended; None: not judged."""
+        return (self.report.get("referee") or {}).get("holds")
+
+    @property
     def achieved(self) -> bool:
         """The tree says so, and no referee denies it."""
         return self.claimed and self.fulfilled is not False
+
+    @property
+    def standing(self) -> Standing:
+        """The claim against the verdict."""
+        if self.claimed:
+            return _CLAIMED[self.fulfilled]
+        if self.report["outcome"] in _NO_CLAIM:
+            return _NO_CLAIM[self.report["outcome"]]
+        return Standing.FULFILLED_YET_FAILED if self.holds else Standing.FAILED
 
     @property
     def digest(self) -> str:

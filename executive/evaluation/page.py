@@ -8,8 +8,20 @@ from dataclasses import dataclass
 from html import escape
 from typing import Final
 
-from executive.evaluation.outcome import Evidence
-from executive.evaluation.summary import Case, Comparison, causes_of, compared, groups_of, mean_work, time_rows
+from executive.evaluation.outcome import Evidence, Standing
+from executive.evaluation.summary import (
+    COLUMNS,
+    STANDING_HEAD,
+    Case,
+    Comparison,
+    causes_of,
+    compared,
+    groups_of,
+    mean_work,
+    standing_texts,
+    time_rows,
+    to_look_at,
+)
 from executive.view.server import PAGE_FOLDER
 from executive.view.text import printable
 
@@ -29,7 +41,7 @@ _STYLE: Final = """
 
 @dataclass(frozen=True)
 class EvaluationPage:
-    """What the page is of: all cases, how the evidence of a run and the command that repeats it are found.
+    """What the page is of: all cases, how the evidence of a run and the commands that repeat and show it are found.
 
     `facts` are pairs of a name and a value; `against` are the cases of another results file, `other` its name.
     """
@@ -38,7 +50,7 @@ class EvaluationPage:
     facts: Sequence[tuple[str, str]]
     cases: Sequence[Case]
     evidence: Callable[[str], Evidence]
-    command: Callable[[Case], str]
+    commands: Callable[[Case], Sequence[str]]
     against: Sequence[Case] | None = None
     other: str = ""
 
@@ -50,10 +62,11 @@ def to_page(page: EvaluationPage) -> str:
     parts = (
         f'<header><h1>{_safe(page.title)}</h1></header>\n<dl class="facts">{facts}</dl>\n',
         _section("Success", _groups(page.cases)),
+        _section("Claims against verdicts", _standings(page.cases)),
         "" if page.against is None else _section(f"Against {_safe(page.other)}", _against(page.cases, page.against)),
         _section("Causes", _causes(page.cases)),
         _section("Where the time goes", _times(page.cases)),
-        _section("Failures", "".join(_failures(page))),
+        _section("Runs to look at", "".join(_failures(page))),
     )
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -88,9 +101,14 @@ def _groups(cases: Sequence[Case]) -> str:
         )
         share, interval = f"{group.achieved} ({group.rate.value:.1%})", f"{low:.1%} to {high:.1%}"
         name = "" if group.dimension == "all" else group.dimension
-        counts = (str(group.runs), share, interval, bar, str(group.fulfilled), str(group.false_claims))
-        rows.append((_safe(name), _safe(group.name), *counts))
-    return _table(("", "", "runs", "success", "95 % (Wilson)", "", "referee", "false claims"), rows)
+        counts = (str(group.standings[standing]) for standing in Standing)
+        rows.append((_safe(name), _safe(group.name), str(group.runs), share, interval, bar, *counts))
+    heads = (COLUMNS[standing] for standing in Standing)
+    return _table(("", "", "runs", "success", "95 % (Wilson)", "", *heads), rows)
+
+
+def _standings(cases: Sequence[Case]) -> str:
+    return _table(STANDING_HEAD, (tuple(map(_safe, row)) for row in standing_texts(cases)))
 
 
 def _against(cases: Sequence[Case], other: Sequence[Case]) -> str:
@@ -127,21 +145,20 @@ def _times(cases: Sequence[Case]) -> str:
 
 
 def _failures(page: EvaluationPage) -> Iterator[str]:
-    """Each failure, its pictures as long as there is room."""
+    """Each run that is not claimed and fulfilled, its pictures as long as there is room."""
     room = MOST_PICTURE_BYTES
-    for case in page.cases:
-        if case.outcome.achieved:
-            continue
+    for case in to_look_at(page.cases):
         evidence = page.evidence(case.outcome.run_id)
         size = sum(len(jpeg) for _, jpeg in evidence.pictures)
         shown = evidence.pictures if size <= room else ()
         room -= size if shown else 0
-        yield _failure(case, evidence, shown, page.command(case))
+        yield _failure(case, evidence, shown, page.commands(case))
 
 
-def _failure(case: Case, evidence: Evidence, pictures: Sequence[tuple[str, bytes]], command: str) -> str:
+def _failure(case: Case, evidence: Evidence, pictures: Sequence[tuple[str, bytes]], commands: Sequence[str]) -> str:
     varied = f", {case.run.variation_words}" if case.run.varied else ""
-    title = f"{case.run.mission}, {case.outcome.report.get('world')}, seed {case.run.seed}{varied}"
+    title = f"{case.asked}, {case.outcome.report.get('world')}, seed {case.run.seed}{varied}"
+    told = "\n".join(map(_safe, commands))
     lines = "\n".join(f"{t_s:8.2f} s  {about}  {text}" for t_s, about, text in evidence.timeline)
     images = "".join(
         f'<figure><img src="data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}" alt="{_safe(caption)}">'
@@ -150,8 +167,8 @@ def _failure(case: Case, evidence: Evidence, pictures: Sequence[tuple[str, bytes
     )
     left_out = "<p>Its pictures are in the results file; this page has no room for more.</p>" if not pictures else ""
     return (
-        f'<details class="failure"><summary><b>{_safe(case.cause)}</b> {_safe(title)}: {_safe(case.why)}</summary>'
-        f"<pre>{_safe(command)}</pre>"
+        f'<details class="failure"><summary><b>{_safe(case.label)}</b> {_safe(title)}: {_safe(case.why)}</summary>'
+        f"<pre>{told}</pre>"
         + (f'<div class="pictures">{images}</div>' if images else left_out if evidence.pictures else "")
         + (f"<pre>{escape(lines)}</pre>" if lines else "")
         + "</details>\n"

@@ -102,12 +102,12 @@ class ResultsFile:
     def begin(self, evaluation: Evaluation, *, code: str) -> None:
         """Note all runs of an evaluation and the version that runs them, or check that they are those of the file.
 
-        Raises InputError: it holds the results of another scenario, or of another version of Errand.
+        Raises InputError: it holds the results of other runs, or of another version of Errand.
         """
         about = self.about()
         if not about:
             with self._writing() as connection:
-                facts = {"scenario": str(evaluation.file), "digest": evaluation.digest, "code": code}
+                facts = {"scenario": evaluation.name, "digest": evaluation.digest, "code": code}
                 facts["runs"] = str(len(evaluation.runs))
                 connection.executemany("INSERT INTO about VALUES (?, ?)", facts.items())
                 files = {path: text for run in evaluation.runs for path, text in run.files.items()}
@@ -117,7 +117,7 @@ class ResultsFile:
             return
         hint = f"name another file by --results, or remove {self.path.name}"
         if about["digest"] != evaluation.digest:
-            what = f"it holds results of another scenario ({about['scenario']}, or an earlier text of it)"
+            what = f"it holds results of other runs ({about['scenario']}, or an earlier form of it)"
             raise InputError(what, hint=hint, file=self.path)
         if about["code"] != code:
             what = f"its results are of another version of Errand ({about['code']}; this is {code})"

@@ -7,7 +7,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Final
 
 from executive.mission.variation import NO_VARIATION, Variation
@@ -72,9 +71,9 @@ class RunSpec:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """All runs of a scenario file."""
+    """All runs of an evaluation; `name` is that of its scenario file, or says what is drawn."""
 
-    file: Path
+    name: str
     runs: Sequence[RunSpec]
 
     @cached_property

@@ -45,7 +45,7 @@ def load_evaluation(path: Path, *, mission_file: FileFinder, stack_file: FileFin
     twice = len(runs) - len({run.id for run in runs})
     if twice:
         raise source.error((), f"{twice} of the runs stand in it twice", "list each mission, value and seed once")
-    return Evaluation(path, runs)
+    return Evaluation(str(path), runs)
 
 
 @dataclass(frozen=True)

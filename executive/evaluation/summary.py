@@ -7,25 +7,42 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from executive.evaluation.outcome import RunOutcome
+from executive.evaluation.outcome import RunOutcome, Standing
 from executive.evaluation.runs import RunSpec
 from executive.evaluation.statistics import Rate, fisher, mcnemar
 
 __all__ = [
+    "COLUMNS",
+    "GROUP_HEAD",
+    "STANDING_HEAD",
     "Case",
     "Comparison",
     "Group",
+    "StandingRow",
     "TimeRow",
     "causes_of",
     "compared",
     "group_rows",
     "groups_of",
     "label_of",
+    "standing_rows",
+    "standing_texts",
     "time_rows",
+    "to_look_at",
 ]
 
 FALSE_CLAIM: Final = "FALSE CLAIM"
 PLAIN: Final = "as it is"
+COLUMNS: Final[Mapping[Standing, str]] = {
+    Standing.FULFILLED: "fulfilled",
+    Standing.FALSE_CLAIM: "false claims",
+    Standing.NOT_JUDGED: "not judged",
+    Standing.FAILED: "failed",
+    Standing.FULFILLED_YET_FAILED: "failed, yet fulfilled",
+    Standing.REFUSED: "refused",
+    Standing.BROKEN: "broken",
+}
+"""The standings as heads of columns."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +66,26 @@ class Case:
 
     @property
     def why(self) -> str:
-        """The sentence that goes with the cause."""
+        """The sentence that goes with the cause, or says why it was not judged."""
         referee = self.outcome.report.get("referee") or {}
-        return str(referee.get("why", "") if self.false_claim else self.outcome.report["message"])
+        return str(referee.get("why", "") if self.outcome.claimed else self.outcome.report["message"])
+
+    @property
+    def label(self) -> str:
+        """The claim against the verdict, with the cause of a failure."""
+        cause = self.failure_cause
+        return self.outcome.standing.value + (f" ({cause})" if cause else "")
+
+    @property
+    def failure_cause(self) -> str:
+        """The cause that a run which failed gives; empty for all others."""
+        failed = self.outcome.standing in (Standing.FAILED, Standing.FULFILLED_YET_FAILED)
+        return str(self.outcome.report.get("cause") or "") if failed else ""
+
+    @property
+    def asked(self) -> str:
+        """What was asked for: the sentence, else what people call the mission."""
+        return self.run.sentence or self.run.mission
 
 
 @dataclass(frozen=True)
@@ -64,7 +98,7 @@ class Group:
     achieved: int
     fulfilled: int
     claimed: int
-    false_claims: int
+    standings: Mapping[Standing, int]
 
     @property
     def rate(self) -> Rate:
@@ -77,7 +111,7 @@ class Group:
         return {
             "successes": self.claimed,
             "referee_successes": self.fulfilled,
-            "false_claims": self.false_claims,
+            "false_claims": self.standings[Standing.FALSE_CLAIM],
         }
 
 
@@ -116,7 +150,7 @@ def _group(dimension: str, name: str, cases: Iterable[Case]) -> Group:
         sum(case.outcome.achieved for case in found),
         sum(case.outcome.fulfilled is True for case in found),
         sum(case.outcome.claimed for case in found),
-        sum(case.false_claim for case in found),
+        Counter(case.outcome.standing for case in found),
     )
 
 
@@ -125,13 +159,62 @@ def totals_of(cases: Sequence[Case]) -> Mapping[str, int]:
     return _group("all", "", cases).counts
 
 
+GROUP_HEAD: Final = ("", "runs", "success", "95 %", *(COLUMNS[standing] for standing in Standing))
+"""The head of the table of groups."""
+
+
 def group_rows(groups: Iterable[Group]) -> Iterator[tuple[str, ...]]:
     """The table of groups as text."""
     for group in groups:
         low, high = group.rate.interval()
         name = label_of(group.dimension, group.name)
         success = f"{group.achieved} ({group.rate.value:.1%})"
-        yield name, str(group.runs), success, f"{low:.1%} to {high:.1%}", str(group.fulfilled), str(group.false_claims)
+        counts = (str(group.standings[standing]) for standing in Standing)
+        yield name, str(group.runs), success, f"{low:.1%} to {high:.1%}", *counts
+
+
+@dataclass(frozen=True)
+class StandingRow:
+    """A claim against a verdict: how many runs of all, and their causes with their numbers."""
+
+    standing: Standing
+    rate: Rate
+    causes: Sequence[tuple[str, int]]
+
+
+def standing_rows(cases: Sequence[Case]) -> Sequence[StandingRow]:
+    """The table of claims against verdicts; all runs but those of its first row are to be looked at."""
+    found = defaultdict[Standing, list[Case]](list)
+    for case in cases:
+        found[case.outcome.standing].append(case)
+    return [
+        StandingRow(standing, Rate(len(found[standing]), len(cases)), _counted_causes(found[standing]))
+        for standing in Standing
+    ]
+
+
+def _counted_causes(cases: Iterable[Case]) -> Sequence[tuple[str, int]]:
+    return Counter(case.failure_cause for case in cases if case.failure_cause).most_common()
+
+
+STANDING_HEAD: Final = ("claim against verdict", "runs", "share", "95 %", "causes")
+"""The head of the table of claims against verdicts."""
+
+
+def standing_texts(cases: Sequence[Case]) -> Iterator[tuple[str, ...]]:
+    """The table of claims against verdicts as text."""
+    for row in standing_rows(cases):
+        low, high = row.rate.interval()
+        causes = ", ".join(f"{cause} {number}" for cause, number in row.causes)
+        share, interval = f"{row.rate.value:.1%}", f"{low:.1%} to {high:.1%}"
+        yield row.standing.value, str(row.rate.successes), share, interval, causes
+
+
+def to_look_at(cases: Iterable[Case]) -> Sequence[Case]:
+    """The runs that are not claimed and fulfilled, the gravest first."""
+    order = {standing: number for number, standing in enumerate(Standing)}
+    found = [case for case in cases if case.outcome.standing is not Standing.FULFILLED]
+    return sorted(found, key=lambda case: order[case.outcome.standing])
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,8 @@ class Verdict:
     counts of the whole run, or since the conditions count.
 
     `collisions` are the robots' own, `people_hit` those of them with people, `robots_hit` those between two robots;
-    `hit_by_people` counts who walked into a robot that stood.
+    `hit_by_people` counts who walked into a robot that stood. `holds` tells of a run that failed whether its goal
+    conditions hold nevertheless.
     """
 
     success: bool | None
@@ -91,3 +92,4 @@ class Verdict:
     people_hit: int = 0
     hit_by_people: int = 0
     robots_hit: int = 0
+    holds: bool | None = None

@@ -21,8 +21,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from executive.cli.evaluate_scenario import command_of
 from executive.cli.evaluation_run import run_one
+from executive.cli.results_view import command_of
 from executive.evaluation.cluster import local_cluster
 from executive.evaluation.outcome import Evidence, RunOutcome
 from executive.evaluation.page import EvaluationPage, to_page
@@ -57,7 +57,7 @@ def report(count: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path, runs = Path(folder) / "r.sqlite", runs_of(count)
         with ResultsFile(path, create=True) as kept:
-            kept.begin(Evaluation(Path("made.yaml"), runs), code="1")
+            kept.begin(Evaluation("made.yaml", runs), code="1")
             for run in runs:
                 kept.add(made_outcome(run))
         began = time.perf_counter()
@@ -83,7 +83,7 @@ def kill(count: int) -> None:
     with tempfile.TemporaryDirectory() as folder, local_cluster(2) as workers:
         runs = runs_of(count)
         with ResultsFile(Path(folder) / "r.sqlite", create=True) as kept:
-            kept.begin(Evaluation(Path("made.yaml"), runs), code="1")
+            kept.begin(Evaluation("made.yaml", runs), code="1")
             for finished in workers.give_out(cheap, runs):
                 assert finished.result is not None
                 found[finished.item.id] += 1

@@ -143,7 +143,7 @@ def test_run_json_has_exactly_the_contract_on_the_last_line(no_plant, tmp_path):
         "real_time_factor", "ticks", "log", "work", "answers", "said", "seen_objects",
     ]  # fmt: skip
     assert list(values["referee"]) == [
-        "success", "why", "collisions", "drops", "people_hit", "hit_by_people", "robots_hit",
+        "success", "why", "collisions", "drops", "people_hit", "hit_by_people", "robots_hit", "holds",
     ]  # fmt: skip
     assert (result.exit_code, len(result.stdout.splitlines())) == (0, 1)
     assert "The referee saw" in result.stderr

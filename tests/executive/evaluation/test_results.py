@@ -1,7 +1,6 @@
 """The results file."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -11,7 +10,7 @@ from executive.evaluation.runs import Evaluation, RunSpec
 from skills.files.errors import InputError
 
 RUNS = tuple(RunSpec("go", seed, sentence="go") for seed in range(3))
-EVALUATION = Evaluation(Path("scenario.yaml"), RUNS)
+EVALUATION = Evaluation("scenario.yaml", RUNS)
 
 
 def outcome(run, result="success"):
@@ -33,7 +32,7 @@ def test_results_are_kept_once_and_read_back(tmp_path):
 def test_results_of_another_scenario_or_version_are_refused(tmp_path):
     with ResultsFile(tmp_path / "r.sqlite", create=True) as kept:
         kept.begin(EVALUATION, code="1")
-        with pytest.raises(InputError, match="results of another scenario"):
+        with pytest.raises(InputError, match="results of other runs"):
             kept.begin(replace(EVALUATION, runs=RUNS[:2]), code="1")
         with pytest.raises(InputError, match="another version of Errand"):
             kept.begin(EVALUATION, code="2")

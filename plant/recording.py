@@ -14,6 +14,10 @@ from plant.diagram import WorldDiagram
 from skills.robot import FloatArray
 
 FRAMES_PER_SECOND = 16.0
+_MOST_BYTES = 9.5e6
+_BODY_BYTES = 105.0
+_FEWEST_FRAMES = 400
+"""A frame takes so much of a file for each body; the shapes of a world take about ten megabytes."""
 BESIDE_M = (-0.7, -1.5, 3.0)
 """Where a camera that goes along stands from the robot, in the world's axes."""
 
@@ -27,18 +31,32 @@ class Frame:
 
 
 class Recorder:
-    """Keeps the plant's positions at a fixed rate; call it after every step."""
+    """Keeps the plant's positions at a fixed rate, and in a long run fewer of them; call it after every step.
 
-    def __init__(self, world: WorldDiagram, context: Context, frames_per_second: float = FRAMES_PER_SECOND) -> None:
-        """Record from the plant's `context`."""
+    When there are too many frames, those go that the frames before and after tell best: while little moves there are
+    few, and while a robot works there are many.
+    """
+
+    def __init__(
+        self,
+        world: WorldDiagram,
+        context: Context,
+        frames_per_second: float = FRAMES_PER_SECOND,
+        *,
+        most_frames: int | None = None,
+    ) -> None:
+        """Record from the plant's `context`, `most_frames` at most (None: as many as fit into a file of 20 MB)."""
         self._plant, self._context = world.plant, context
         self._period_s = 1.0 / frames_per_second
         self._frames: list[Frame] = []
+        self._most = most_frames or max(_FEWEST_FRAMES, round(_MOST_BYTES / (_BODY_BYTES * world.plant.num_bodies())))
 
     def __call__(self, now_s: float) -> None:
         """Keep a frame when one is due."""
         if not self._frames or now_s - self._frames[-1].time_s >= self._period_s - 1e-9:
             self._frames.append(Frame(now_s, self._plant.GetPositions(self._context).copy()))
+        if len(self._frames) > self._most:
+            self._frames = thinned(self._frames)
 
     @property
     def frames(self) -> Sequence[Frame]:
@@ -51,6 +69,21 @@ class Recorder:
             raise LookupError("nothing was recorded")
         earlier = [frame for frame in self._frames if frame.time_s <= time_s + 1e-9]
         return earlier[-1] if earlier else self._frames[0]
+
+
+def thinned(frames: Sequence[Frame]) -> list[Frame]:
+    """A quarter fewer frames: of every second one, the half that the frames before and after tell best.
+
+    The first and the last frame stay.
+    """
+    inner = np.arange(1, len(frames) - 1, 2)
+    times_s = np.array([frame.time_s for frame in frames])
+    positions = np.array([frame.positions for frame in frames])
+    share = (times_s[inner] - times_s[inner - 1]) / (times_s[inner + 1] - times_s[inner - 1])
+    between = positions[inner - 1] + share[:, None] * (positions[inner + 1] - positions[inner - 1])
+    off = np.max(np.abs(positions[inner] - between), axis=1, initial=0.0)
+    gone = set(inner[np.argsort(off, kind="stable")[: (len(inner) + 1) // 2]].tolist())
+    return [frame for number, frame in enumerate(frames) if number not in gone]
 
 
 @dataclass(frozen=True)

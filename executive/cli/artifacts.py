@@ -4,6 +4,7 @@ the way walked from above."""
 from __future__ import annotations
 
 import base64
+from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -54,7 +55,7 @@ class RobotArtifacts:
 
     seen: Mapping[str, Any] | None = None
     confirmed: Mapping[str, Any] | None = None
-    looked: list[Mapping[str, Any]] = field(default_factory=list)
+    looked: deque[Mapping[str, Any]] = field(default_factory=lambda: deque(maxlen=_MOST_LOOKS))
     detection: Mapping[str, Any] | None = None
     moments: dict[str, float] = field(default_factory=dict)
 
@@ -97,13 +98,14 @@ class Artifacts:
 
     def _shown(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
         """The answer with a picture: of what was found, or of all that was looked at in vain."""
-        looked, own.looked = own.looked, []
+        looked = list(own.looked)
+        own.looked.clear()
         if not looked:
             return message
         if message["answer"] and own.confirmed is not None:
             self.answer = detection_picture(own.confirmed)
         else:
-            self.answer = _sheet([detection_picture(each) for each in looked[-_MOST_LOOKS:]])
+            self.answer = _sheet([detection_picture(each) for each in looked])
         self._keep(message, self.answer)
         return {**message, "image": self.answer}
 

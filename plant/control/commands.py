@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 from skills.robot import CommandId, CommandState, CommandStatus
 
 PayloadT = TypeVar("PayloadT")
+
+MOST_KEPT: Final = 2000
+"""So many commands are kept: those of ten seconds and more."""
 
 
 class Part(enum.Enum):
@@ -32,11 +35,15 @@ class Active(Generic[PayloadT]):
 
 
 class CommandTable:
-    """All commands ever given and the running one of each part."""
+    """The running command of each part, and the last that are over.
+
+    Of one that was over long ago it is only known that it is over.
+    """
 
     def __init__(self) -> None:
         self._statuses: dict[CommandId, CommandStatus] = {}
         self._running: dict[Part, Active[object]] = {}
+        self._given = 0
 
     def begin(self, part: Part, payload: object, now_s: float, until_s: float) -> CommandId:
         """Start a command in place of the part's running one."""
@@ -74,7 +81,16 @@ class CommandTable:
 
     def status(self, command: CommandId) -> CommandStatus:
         """State of a command. Raises KeyError for an id never given."""
-        return self._statuses[command]
+        known = self._statuses.get(command)
+        if known is None and not 0 < command <= self._given:
+            raise KeyError(command)
+        return known or CommandStatus(CommandState.STOPPED, "it was over long ago")
 
     def _new_id(self) -> CommandId:
-        return CommandId(len(self._statuses) + 1)
+        self._given += 1
+        if len(self._statuses) > MOST_KEPT:
+            running = {active.id for active in self._running.values()}
+            old = [each for each in list(self._statuses)[: MOST_KEPT // 2] if each not in running]
+            for each in old:
+                del self._statuses[each]
+        return CommandId(self._given)

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from plant.snapshot.file import Snapshot, SnapshotError, SnapshotFile, encoded
 
 if TYPE_CHECKING:
@@ -14,9 +16,7 @@ if TYPE_CHECKING:
 
 PERIOD_S: Final = 1.0
 _WORLD: Final = "world: "
-_PATH: Final = "path: "
 _POINT_VALUES: Final = 4
-_POINT_BYTES: Final = 8 * _POINT_VALUES
 
 
 class SnapshotWriter:
@@ -28,13 +28,21 @@ class SnapshotWriter:
     def __init__(
         self, path: Path, engine: Engine, referee: Referee, facts: Mapping[str, Any], robots: Sequence[str]
     ) -> None:
-        self._file, self._engine, self._referee, self._facts = SnapshotFile(path), engine, referee, dict(facts)
-        self._paths = {robot: bytearray() for robot in robots}
+        self._file = SnapshotFile(path, width=1 + _POINT_VALUES)
+        self._engine, self._referee, self._facts = engine, referee, dict(facts)
+        self._robots, self._from = tuple(robots), 0
+        self._points = dict.fromkeys(robots, 0)
         self._due_s = 0.0
+
+    @property
+    def bytes_written(self) -> int:
+        """How many bytes were written so far."""
+        return self._file.bytes_written
 
     def __call__(self) -> None:
         """Write it."""
         self._due_s = self._engine.now() + PERIOD_S
+        self._append_points()
         self._file.write(self.content())
 
     def when_due(self) -> None:
@@ -43,20 +51,23 @@ class SnapshotWriter:
             self()
 
     def content(self) -> bytes:
-        """What is written."""
+        """What is written, without the points of the paths."""
         world = {_WORLD + name: (array.shape, array.tobytes()) for name, array in self._engine.world_state().items()}
-        paths = {_PATH + robot: self._grown(robot) for robot in self._paths}
+        paths = {"robots": self._robots, "from": self._from}
         values = {"facts": self._facts, "engine": self._engine.state(), "referee": self._referee.state()}
-        return encoded(self._file.next_number, values, {**world, **paths})
+        return encoded(self._file.next_number, {**values, "paths": paths}, world, self._file.rows)
 
-    def _grown(self, robot: str) -> tuple[tuple[int, int], bytearray]:
-        """The path so far; only what was added since the last time is taken over."""
-        raw, points = self._paths[robot], self._referee.points(robot)
-        if len(points) * _POINT_BYTES < len(raw):
-            raw.clear()
-        for point in points[len(raw) // _POINT_BYTES :]:
-            raw.extend(point.tobytes())
-        return (len(points), _POINT_VALUES), raw
+    def _append_points(self) -> None:
+        """Append what the paths have grown by; paths that began again are written as a whole after the old ones."""
+        if any(len(self._referee.points(robot)) < count for robot, count in self._points.items()):
+            self._from = self._file.rows.count
+            self._points = dict.fromkeys(self._robots, 0)
+        for number, robot in enumerate(self._robots):
+            grown = self._referee.points(robot)[self._points[robot] :]
+            if grown:
+                points = np.array(grown, dtype=np.float64)
+                self._file.append(np.column_stack([np.full(len(points), float(number)), points]))
+                self._points[robot] += len(points)
 
 
 def restore(snapshot: Snapshot, engine: Engine, referee: Referee, facts: Mapping[str, Any]) -> None:
@@ -71,10 +82,12 @@ def restore(snapshot: Snapshot, engine: Engine, referee: Referee, facts: Mapping
         raise SnapshotError(f"the plant's state is that of another simulation ({differing}); run the mission again")
     named = snapshot.arrays.items()
     world = {name.removeprefix(_WORLD): array for name, array in named if name.startswith(_WORLD)}
-    paths = {name.removeprefix(_PATH): array for name, array in named if name.startswith(_PATH)}
     try:
+        told = snapshot.values["paths"]
+        rows = snapshot.rows[told["from"] :]
+        paths = {robot: rows[rows[:, 0] == number, 1:] for number, robot in enumerate(told["robots"])}
         engine.restore(snapshot.values["engine"], world)
         referee.restore(snapshot.values["referee"], paths)
     except (KeyError, TypeError, ValueError) as error:
-        told = f"the plant's state was written by another version ({error!r})"
-        raise SnapshotError(f"{told}; run the mission again") from error
+        what = f"the plant's state was written by another version ({error!r})"
+        raise SnapshotError(f"{what}; run the mission again") from error

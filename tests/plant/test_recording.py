@@ -1,7 +1,10 @@
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from plant.diagram import build_diagram
-from plant.recording import Recorder, save_html
+from plant.recording import Frame, Recorder, save_html, thinned
 from plant.simulation import Engine
 from skills.robot import Pose2D
 
@@ -35,3 +38,30 @@ def test_the_animation_is_one_html_file_with_the_robot_in_it(engine, tmp_path):
     text = path.read_text()
     assert "<html" in text and 'src="http' not in text
     assert len(text) > 100_000
+
+
+@pytest.fixture
+def moved():
+    """A recorder of 100 frames at most, and the positions that it records."""
+    positions = np.zeros(3)
+    plant = SimpleNamespace(GetPositions=lambda context: positions, num_bodies=lambda: 1)
+    return Recorder(SimpleNamespace(plant=plant), None, most_frames=100), positions
+
+
+def test_a_long_recording_keeps_few_frames_and_most_of_them_where_something_moves(moved):
+    recorder, positions = moved
+    for number in range(20_000):
+        time_s = number / 16.0
+        if 100.0 < time_s < 110.0:
+            positions[0] = np.sin(time_s)
+        recorder(time_s)
+    times = [frame.time_s for frame in recorder.frames]
+    assert len(times) <= 100
+    assert (times[0], times == sorted(times)) == (0.0, True)
+    assert times[-1] > 1240.0
+    assert sum(100.0 < time_s < 111.0 for time_s in times) > 20
+
+
+def test_a_frame_that_lies_between_its_neighbours_goes_first():
+    frames = [Frame(float(t), np.array([x])) for t, x in enumerate((0.0, 1.0, 2.0, 9.0, 4.0))]
+    assert [frame.time_s for frame in thinned(frames)] == [0.0, 2.0, 3.0, 4.0]

@@ -42,3 +42,10 @@ def test_without_a_question_there_is_no_picture(tmp_path):
     artifacts("detections", looked((10, 10, 40, 30)))
     assert draw_answer(artifacts, tmp_path) is None
     assert list(tmp_path.iterdir()) == []
+
+
+def test_of_many_looks_without_an_answer_only_the_last_are_remembered():
+    artifacts = Artifacts(lambda topic, message: None)
+    for _ in range(100):
+        artifacts("detections", looked())
+    assert len(artifacts.of("").looked) == 12

@@ -88,3 +88,50 @@ def test_nothing_damaged_or_foreign_is_read(path):
         path.with_name(f"kept.plant.{slot}").write_bytes(b"something else")
     with pytest.raises(SnapshotError, match="no snapshot that this errand reads"):
         read_snapshot(path)
+
+
+def rows(*values):
+    return np.array([[value, value] for value in values], dtype=np.float64)
+
+
+def write_with_rows(file, value):
+    file.append(rows(value))
+    file.write(encoded(file.next_number, {"value": value}, {}, file.rows))
+
+
+def test_what_grows_is_appended_and_read_as_far_as_it_belongs_to_the_snapshot(path):
+    file = SnapshotFile(path, width=2)
+    for value in (1, 2, 3):
+        write_with_rows(file, value)
+    file.append(rows(4))
+    assert read_snapshot(path).rows.tolist() == rows(1, 2, 3).tolist()
+
+
+def test_what_is_written_for_a_snapshot_does_not_grow_with_the_rows_before(path):
+    file, written = SnapshotFile(path, width=2), []
+    for _ in range(5):
+        write_with_rows(file, 1)
+        written.append(file.bytes_written)
+    assert np.ptp(np.diff(written)) <= 4  # digits of numbers
+
+
+def test_damaged_rows_leave_the_snapshot_before_them(path):
+    file = SnapshotFile(path, width=2)
+    for value in (1, 2):
+        write_with_rows(file, value)
+    kept = path.with_name(path.name + file.rows.file)
+    content = kept.read_bytes()
+    kept.write_bytes(content[:16] + b"\xff" * 16)
+    assert read_snapshot(path).rows.tolist() == rows(1).tolist()
+
+
+def test_another_process_spares_the_rows_of_the_last_snapshot_until_it_has_written_one(path):
+    file = SnapshotFile(path, width=2)
+    for value in (1, 2, 3):
+        write_with_rows(file, value)
+    file.close()
+    again = SnapshotFile(path, width=2)
+    again.append(rows(4))
+    assert read_snapshot(path).rows.tolist() == rows(1, 2, 3).tolist()
+    again.write(encoded(again.next_number, {}, {}, again.rows))
+    assert read_snapshot(path).rows.tolist() == rows(4).tolist()

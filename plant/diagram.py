@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -162,6 +162,16 @@ def build_diagram(
         scene,
         lambda shown_in: rebuild(meshcat=shown_in),
     )
+
+
+def try_geometry(directives: Path | None, models: Iterable[Path]) -> None:
+    """Build a world's geometry and some models, and throw them away. Raises InputError: Drake cannot use a file."""
+    plant, _ = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
+    if directives is not None:
+        add_scenery(plant, directives, parser_of)
+    parser = parser_of(plant)
+    for model in models:
+        add_model(parser, model)
 
 
 def parser_of(plant: MultibodyPlant) -> Parser:

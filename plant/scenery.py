@@ -32,15 +32,20 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
 from pydrake.systems.framework import DiagramBuilder
 
-OWN_PACKAGE = "world"
-"""The package of a world's own folder, wherever that lies."""
+from plant.worlds.geometry_files import OWN_PACKAGE
+from skills.files.errors import InputError
+
 _RELATIVE_URI = re.compile(r"<uri>\s*(?![a-z]+://)([^<\s]+)\s*</uri>")
 
 
 def add_scenery(
     plant: MultibodyPlant, directives: Path, parser_of: Callable[[MultibodyPlant], Parser]
 ) -> dict[GeometryId, str]:
-    """Add the directives' world to `plant` (before Finalize); returns the model each collision shape comes from."""
+    """Add the directives' world to `plant` (before Finalize); returns the model each collision shape comes from.
+
+    Raises:
+        InputError: Drake cannot use the directives or a model.
+    """
 
     def parser_in(into: MultibodyPlant) -> Parser:
         parser = parser_of(into)
@@ -49,11 +54,14 @@ def add_scenery(
 
     scratch, scene_graph = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
     parser = parser_in(scratch)
-    flat = FlattenModelDirectives(LoadModelDirectives(directives), parser.package_map()).directives
-    _process(flat, scratch, parser)
-    scratch.Finalize()
-    moving = _moving_models(scratch, flat)
-    _process([each for each in flat if _models_of(each) <= moving], plant, parser_in(plant))
+    try:
+        flat = FlattenModelDirectives(LoadModelDirectives(directives), parser.package_map()).directives
+        _process(flat, scratch, parser)
+        scratch.Finalize()
+        moving = _moving_models(scratch, flat)
+        _process([each for each in flat if _models_of(each) <= moving], plant, parser_in(plant))
+    except (RuntimeError, ValueError) as error:
+        raise _refused(directives, error) from error
     return _copy_fixed(scratch, scene_graph.model_inspector(), moving, plant)
 
 
@@ -61,7 +69,7 @@ def add_model(parser: Parser, path: Path) -> ModelInstanceIndex:
     """Add the model of a file. Of SDF the text is parsed: for each file that it opens itself, the parser takes 50 ms.
 
     Raises:
-        RuntimeError: the file cannot be used.
+        InputError: Drake cannot use the file.
     """
     if path.suffix == ".sdf":
         text = path.read_text(encoding="utf-8")
@@ -71,7 +79,16 @@ def add_model(parser: Parser, path: Path) -> ModelInstanceIndex:
             )
         except RuntimeError:
             pass  # once more, for a message that names the file
-    return _only(parser.AddModels(str(path)))
+    try:
+        return _only(parser.AddModels(str(path)))
+    except (RuntimeError, ValueError) as error:
+        raise _refused(path, error) from error
+
+
+def _refused(file: Path, error: Exception) -> InputError:
+    """What Drake says of a file, in one line."""
+    said = " ".join(str(error).split()) or type(error).__name__
+    return InputError(f"the simulation cannot use it: {said[:300]}", hint="correct the file", file=file)
 
 
 def _only(instances: Sequence[ModelInstanceIndex]) -> ModelInstanceIndex:

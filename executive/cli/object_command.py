@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from executive.cli.output import print_json, refusals
-from plant.models.imported import ImportedFolderError, ImportedObject, read_imported
+from plant.models.imported import ImportedObject, read_imported
 from skills.files.errors import InputError
 from skills.perception.class_forms import class_forms
 
@@ -66,7 +66,7 @@ def show(
 ) -> None:
     """Tell what an imported model holds: extents, mass, inertia, collision parts."""
     with refusals():
-        found = _read(folder)
+        found = read_imported(folder)
         if picture is not None:
             _draw(folder, found, picture)
     if as_json:
@@ -125,13 +125,6 @@ def _unlike_its_class(made: ImportedObject) -> str | None:
             expected = f"of class {made.class_name} the robot expects {low:g} to {high:g} m, and may not find it"
             return f"{made.name} is {value:.3f} m {what}; {expected}"
     return None
-
-
-def _read(folder: Path) -> ImportedObject:
-    try:
-        return read_imported(folder)
-    except ImportedFolderError as error:
-        raise InputError(str(error)) from error
 
 
 def _draw(folder: Path, found: ImportedObject, picture: Path) -> None:

@@ -187,7 +187,7 @@ def _with_objects(loaded: MissionFile, world: World, knowledge: Knowledge) -> Wo
     for index, folder in enumerate(import_folders(loaded)):
         try:
             world = world.with_imports([folder])
-        except WorldError as error:
+        except InputError as error:
             problems.add(loaded.error(("imports", index), str(error), ""))
     problems.raise_any()
     for name, file in (loaded.objects or {}).items():

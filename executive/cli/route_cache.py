@@ -65,7 +65,7 @@ class RouteCache(RoutePlanner):
 def route_cache_of(world: World, planned: RoutePlanner, *robot_files: Path) -> RouteCache:
     """The routes kept for a world. They are planned again once its maps, the planner or the robot's files change."""
     planner = (DEFAULT_FILE, *_SKILLS.glob("navigate/*.py"), *_SKILLS.glob("estimate/*.py"), *_SKILLS.glob("*.py"))
-    digest = _digest((*world.keepout_map_path.parent.iterdir(), *planner, *robot_files))
+    digest = _digest((*world.keepout_map_path.parent.glob("*"), *planner, *robot_files))
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return RouteCache(home / "errand" / "routes" / f"{digest}.json", planned)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from executive.mission.knowledge import Knowledge, load_knowledge
-from plant.worlds.world import World, WorldError, known_worlds, load_world
+from plant.worlds.world import WORLDS_FOLDER, World, WorldError, known_worlds, load_world
 from skills.files.errors import InputError, known_names, suggestion
 
 if TYPE_CHECKING:
@@ -28,6 +28,17 @@ def _world_error(name: str, error: Exception) -> InputError:
         return InputError(str(error))
     known = f"{known_names(name, known_worlds())}, and folders with a world.dmd.yaml"
     return InputError(f"unknown world '{name[:60]}'", hint=suggestion(name, known_worlds(), known))
+
+
+def refuse_unusable(world: World) -> None:
+    """Raise InputError unless the simulation can use the geometry of a world of the user's, and what is imported."""
+    is_ours = world.folder.is_relative_to(WORLDS_FOLDER)
+    if is_ours and not world.imports:
+        return
+    from plant.diagram import try_geometry
+
+    models = [each.folder / f"{name}.sdf" for name, each in world.imports.items()]
+    try_geometry(None if is_ours else world.directives_path, models)
 
 
 def refuse_blocked(world: World, pose: Pose2D) -> None:

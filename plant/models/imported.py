@@ -6,18 +6,16 @@ from pathlib import Path
 from typing import Annotated, Final
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from plant.models.catalogue import ModelForm
+from skills.files.errors import InputError
+from skills.files.yaml_source import read_yaml, validate
 
 FACTS_FILE: Final = "object.yaml"
-MAX_BYTES: Final = 100_000
+_AGAIN: Final = "make it by `errand object import`"
 NAME: Final = r"^[A-Za-z][A-Za-z0-9_]{0,39}$"
 Size = Annotated[float, Field(gt=0.0, le=100.0, allow_inf_nan=False)]
-
-
-class ImportedFolderError(ValueError):
-    """A folder is none that `errand object import` has written; the message names it and says what to do."""
 
 
 class ImportedObject(BaseModel):
@@ -47,26 +45,16 @@ class ImportedObject(BaseModel):
 
 
 def read_imported(folder: Path) -> ImportedObject:
-    """The object in a folder. Raises ImportedFolderError."""
-    path, again = folder / FACTS_FILE, "make it by `errand object import`"
+    """The object in a folder. Raises InputError: there is none, or it is damaged."""
+    path = folder / FACTS_FILE
+    if not path.exists():
+        raise InputError(f"there is no imported object ({FACTS_FILE} is missing)", hint=_AGAIN, file=folder)
     try:
-        if not path.is_file():
-            raise ImportedFolderError(f"{folder}: there is no imported object ({FACTS_FILE} is missing); {again}")
-        with path.open("rb") as opened:
-            text = opened.read(MAX_BYTES + 1)
-        if len(text) > MAX_BYTES:
-            raise ImportedFolderError(f"{path}: it is larger than {MAX_BYTES} bytes; {again}")
-        found = ImportedObject.model_validate(yaml.safe_load(text.decode("utf-8")))
-        if not (folder / f"{found.name}.sdf").is_file():
-            raise ImportedFolderError(f"{folder}: {found.name}.sdf is missing; {again}")
-    except OSError as error:
-        raise ImportedFolderError(f"{path}: it cannot be read ({error.strerror}); {again}") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "it"
-        raise ImportedFolderError(f"{path}: {where}: {first['msg']}; {again}") from error
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
-        raise ImportedFolderError(f"{path}: it cannot be read as YAML; {again}") from error
+        found = validate(ImportedObject, read_yaml(path))
+    except InputError as error:
+        raise InputError(error.message, hint=f"{error.hint}, or {_AGAIN}", file=path, line=error.line) from error
+    if not (folder / f"{found.name}.sdf").is_file():
+        raise InputError(f"{found.name}.sdf is missing", hint=_AGAIN, file=folder)
     return found
 
 

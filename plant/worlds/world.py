@@ -11,13 +11,15 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from plant.models.catalogue import load_catalogue
-from plant.models.imported import ImportedFolderError, ImportedObject, read_imported
+from plant.models.imported import ImportedObject, read_imported
+from plant.worlds.geometry_files import check_directives, check_model
+from skills.files.errors import InputError
+from skills.files.yaml_source import KeyPath, YamlSource, read_yaml, validate
 from skills.robot import Pose2D
 
 if TYPE_CHECKING:
@@ -25,20 +27,23 @@ if TYPE_CHECKING:
 
 WORLDS_FOLDER = Path(__file__).resolve().parent
 PACKAGE_NAME = "errand"
+DIRECTIVES: Final = "world.dmd.yaml"
 ROBOTS: Final = "map"
 """The folder of the grids that the robots are given."""
 TRUTH: Final = "truth"
 """The folder of a world's surveyed grids, where the robot has made its own map."""
-MAX_BYTES = 1_000_000
 
 Point = tuple[float, float]
 Polygon = tuple[Point, ...]
 Span = tuple[float, float]
-ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
-class WorldError(ValueError):
-    """A world is unknown or its files are wrong; the message says where and what to do."""
+class WorldError(InputError):
+    """A world is unknown or its files do not fit together; `path` is where in `objects.yaml`."""
+
+    def __init__(self, message: str, *, path: KeyPath = ()) -> None:
+        super().__init__(message)
+        self.path = path
 
 
 class _Strict(BaseModel):
@@ -264,7 +269,7 @@ class World:
         return replace(self, doors=(*self.doors, *doors), moves=(*self.moves, *moves))
 
     def with_imports(self, folders: Iterable[Path]) -> World:
-        """The same with the models of these folders. Raises WorldError: a folder holds none, or a name is taken."""
+        """The same with the models of these folders. Raises InputError: a folder holds none, or a name is taken."""
         return replace(self, imports=_with_imports(self.imports, folders))
 
     def with_objects(self, objects: Iterable[ObjectRule]) -> World:
@@ -286,7 +291,7 @@ class World:
     @property
     def directives_path(self) -> Path:
         """Drake model directives of rooms and furniture."""
-        return self.folder / "world.dmd.yaml"
+        return self.folder / DIRECTIVES
 
     @property
     def knowledge_path(self) -> Path:
@@ -324,8 +329,8 @@ class World:
 
 def _band_m(path: Path) -> tuple[float, float]:
     """The heights that a grid speaks of; none where its file does not say."""
-    with suppress(yaml.YAMLError, ValueError, TypeError, AttributeError, OSError):
-        low, high = yaml.load(path.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader).get("height_band_m")
+    with suppress(InputError, ValueError, TypeError, AttributeError):
+        low, high = read_yaml(path).data.get("height_band_m")
         return float(low), float(high)
     return math.inf, -math.inf
 
@@ -337,15 +342,21 @@ def add_package(package_map: PackageMap) -> None:
 
 def known_worlds() -> tuple[str, ...]:
     """Names of the worlds that come with the project."""
-    return tuple(sorted(path.parent.name for path in WORLDS_FOLDER.glob("*/world.dmd.yaml")))
+    return tuple(sorted(path.parent.name for path in WORLDS_FOLDER.glob(f"*/{DIRECTIVES}")))
 
 
 def load_world(name_or_path: str | Path) -> World:
-    """Load a world by its name, or by the path of its folder. Raises WorldError."""
+    """Load a world by its name, or by the path of its folder.
+
+    Raises:
+        InputError: with file and line: there is no such world, or one of its files, or what that names, is wrong.
+    """
     folder = _find_folder(name_or_path)
-    knowledge = _read(folder / "knowledge.yaml", _Knowledge)
+    check_directives(folder / DIRECTIVES, folder)
+    knowledge = validate(_Knowledge, _read(folder / "knowledge.yaml"))
     objects = folder / "objects.yaml"
-    rules = _read(objects, SeedRules) if objects.exists() or objects.is_symlink() else NO_SEED_RULES
+    source = _read(objects) if objects.exists() or objects.is_symlink() else None
+    rules = NO_SEED_RULES if source is None else validate(SeedRules, source)
     surfaces = {name: SurfaceTop(name, top.polygon, top.height) for name, top in knowledge.surfaces.items()}
     standing = _standing(knowledge)
     try:
@@ -354,7 +365,9 @@ def load_world(name_or_path: str | Path) -> World:
         imports = _with_imports({}, (folder / each for each in rules.imports))
         _check_models(rules, imports)
     except WorldError as error:
-        raise WorldError(f"{objects}: {error}") from error
+        raise error if source is None else source.error(error.path, error.message) from error
+    except InputError as error:
+        raise error if source is None else source.error(("imports",), str(error)) from error
     return World(
         name=folder.name,
         folder=folder,
@@ -370,13 +383,11 @@ def load_world(name_or_path: str | Path) -> World:
 
 
 def _with_imports(known: Mapping[str, Import], folders: Iterable[Path]) -> Mapping[str, Import]:
-    """The known models and those of folders by name. Raises WorldError."""
+    """The known models and those of folders by name. Raises InputError."""
     found = dict(known)
     for folder in dict.fromkeys(each.resolve() for each in folders):
-        try:
-            made = read_imported(folder)
-        except ImportedFolderError as error:
-            raise WorldError(str(error)) from error
+        made = read_imported(folder)
+        check_model(folder / f"{made.name}.sdf", folder)
         if made.name in load_catalogue():
             raise WorldError(f"{folder}: the name {made.name!r} is that of a class; import it under another name")
         other = found.setdefault(made.name, Import(folder, made))
@@ -397,7 +408,7 @@ def _standing(knowledge: _Knowledge) -> dict[str, Point]:
 def _find_folder(name_or_path: str | Path) -> Path:
     named = WORLDS_FOLDER / name_or_path
     for folder in (named, Path(name_or_path)):
-        if (folder / "world.dmd.yaml").is_file():
+        if (folder / DIRECTIVES).is_file():
             return folder.resolve()
     close = difflib.get_close_matches(str(name_or_path), known_worlds(), n=1)
     hint = f" Did you mean {close[0]!r}?" if close else ""
@@ -407,72 +418,38 @@ def _find_folder(name_or_path: str | Path) -> Path:
     )
 
 
-def _read(path: Path, schema: type[ModelT]) -> ModelT:
-    """Read and check a YAML file; every error names the file, the line and the key."""
-    if path.exists() and not (path.is_file() and path.stat().st_size <= MAX_BYTES):
-        raise WorldError(f"{path}: it is no plain file of at most {MAX_BYTES} bytes; every world needs this file")
-    try:
-        text = path.read_text(encoding="utf-8")
-        root = yaml.compose(text, Loader=yaml.CSafeLoader)
-        return schema.model_validate(yaml.load(text, Loader=yaml.CSafeLoader))
-    except OSError as error:
-        raise WorldError(f"{path}: cannot be read ({error.strerror}); every world needs this file") from error
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise WorldError(f"{path}:{line}: broken YAML, {error.problem}; correct the syntax there") from error
-    except ValidationError as error:
-        raise WorldError(f"{path}:{_complaint(root, error)}") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise WorldError(f"{path}:1: it cannot be read as YAML ({type(error).__name__}); correct it") from error
-
-
-def _complaint(root: yaml.Node | None, error: ValidationError) -> str:
-    """Line, key and hint of the first fault; unknown keys first, since they often explain a missing one."""
-    faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-    where, message = faults[0]["loc"], faults[0]["msg"]
-    if faults[0]["type"] == "extra_forbidden":
-        missing = [str(f["loc"][-1]) for f in faults if f["type"] == "missing" and f["loc"][:-1] == where[:-1]]
-        close = difflib.get_close_matches(str(where[-1]), missing, n=1)
-        message = f"unknown key; did you mean {close[0]!r}?" if close else "unknown key; take it out"
-    return f"{_line_of(root, where)}: {'.'.join(str(part) for part in where)}: {message}"
-
-
-def _line_of(node: yaml.Node | None, location: tuple[int | str, ...]) -> int:
-    """The line (from 1) of the deepest YAML node on the way to a key."""
-    line = 1
-    for part in location:
-        if isinstance(node, yaml.MappingNode):
-            entries = {key.value: (key, value) for key, value in node.value}
-            if part not in entries:
-                return line
-            key, node = entries[part]
-            line = key.start_mark.line + 1
-        elif isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
-            node = node.value[part]
-            line = node.start_mark.line + 1
-    return line
+def _read(path: Path) -> YamlSource:
+    return read_yaml(path, hint="every world needs this file")
 
 
 def _check_surfaces(rules: SeedRules, surfaces: dict[str, SurfaceTop]) -> None:
     """Every surface that the rules name is known, and those for things have fronts."""
-    wanted = {name for thing in rules.objects for name in thing.surfaces}
-    for name in sorted(wanted | set(rules.fronts)):
-        if name not in surfaces:
-            close = difflib.get_close_matches(name, surfaces, n=1)
-            hint = f"; did you mean {close[0]!r}?" if close else ""
-            raise WorldError(f"no surface {name!r} in knowledge.yaml{hint}")
-        if name in wanted and not rules.fronts.get(name):
-            raise WorldError(f"surface {name!r} may carry things but has no entry under `fronts` in objects.yaml")
+    for index, rule in enumerate(rules.objects):
+        for name in rule.surfaces:
+            path = ("objects", index, "surfaces")
+            _refuse_unknown(name, surfaces, path)
+            if not rules.fronts.get(name):
+                what = f"surface {name!r} may carry things but has no entry under `fronts` in objects.yaml"
+                raise WorldError(what, path=path)
+    for name in rules.fronts:
+        _refuse_unknown(name, surfaces, ("fronts", name))
+
+
+def _refuse_unknown(name: str, surfaces: Mapping[str, SurfaceTop], path: KeyPath) -> None:
+    if name not in surfaces:
+        close = difflib.get_close_matches(name, surfaces, n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        raise WorldError(f"no surface {name!r} in knowledge.yaml{hint}", path=path)
 
 
 def _check_models(rules: SeedRules, imports: Mapping[str, Import]) -> None:
     """Every object is of a class, or is imported."""
     known = (*load_catalogue(), *imports)
-    for rule in rules.objects:
+    for index, rule in enumerate(rules.objects):
         if rule.model not in known:
             close = difflib.get_close_matches(rule.model, known, n=1)
             hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(known)}"
-            raise WorldError(f"no model {rule.model!r} for {rule.name}; {hint}")
+            raise WorldError(f"no model {rule.model!r} for {rule.name}; {hint}", path=("objects", index, "model"))
 
 
 def _hands_of(rule: PersonRule | None) -> dict[str, Any]:
@@ -482,14 +459,21 @@ def _hands_of(rule: PersonRule | None) -> dict[str, Any]:
 
 def _check_people(rules: SeedRules, standing: Mapping[str, Point]) -> None:
     """Names are taken once, and every place on a route is known."""
-    names = [*(rule.name for rule in rules.objects), *(rule.name for rule in rules.people)]
-    for name in names:
-        if names.count(name) > 1:
-            raise WorldError(f"{name!r} names two objects or people; give one of them another name")
-    for rule in rules.people:
+    taken = set[str]()
+    places = [("objects", index, rule.name) for index, rule in enumerate(rules.objects)]
+    places += [("people", index, rule.name) for index, rule in enumerate(rules.people)]
+    for kind, index, name in places:
+        if name in taken:
+            what = f"{name!r} names two objects or people; give one of them another name"
+            raise WorldError(what, path=(kind, index, "name"))
+        taken.add(name)
+    for index, rule in enumerate(rules.people):
         for waypoint in () if rule.route is None else rule.route.waypoints:
             at = waypoint.at if isinstance(waypoint, StopRule) else waypoint
             if isinstance(at, str) and at not in standing:
                 close = difflib.get_close_matches(at, standing, n=1)
                 hint = f"did you mean {close[0]!r}?" if close else "give a point (x, y)"
-                raise WorldError(f"{rule.name} cannot walk to {at!r}: no place in knowledge.yaml; {hint}")
+                raise WorldError(
+                    f"{rule.name} cannot walk to {at!r}: no place in knowledge.yaml; {hint}",
+                    path=("people", index, "route"),
+                )

@@ -52,14 +52,16 @@ class YamlSource:
         return InputError(message, hint=hint, file=self.path, line=self.line(path))
 
 
-def read_yaml(path: Path | str, tags: frozenset[str] = frozenset()) -> YamlSource:
-    """Read one YAML document of plain data; `tags` are those that may stand in it.
+def read_yaml(
+    path: Path | str, tags: frozenset[str] = frozenset(), *, hint: str = "name a file that exists"
+) -> YamlSource:
+    """Read one YAML document of plain data; `tags` are those that may stand in it, `hint` is for a missing file.
 
     Raises:
         InputError: the file cannot be read, is too large, is no YAML, or has a key twice, or a tag.
     """
     file = Path(path)
-    text = read_text(file, most_bytes=MAX_BYTES)
+    text = read_text(file, most_bytes=MAX_BYTES, hint=hint)
     try:
         _refuse_deep(text, file)
         root = _composed(text)

@@ -51,12 +51,13 @@ from executive.run.runner import RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import built_in_skills
-from plant.models.imported import FACTS_FILE, ImportedFolderError, read_imported
+from plant.models.imported import FACTS_FILE, read_imported
 from plant.pictures import best_view, render_view, save_png
 from plant.simulation import Simulation
 from plant.worlds.placement import place_objects
 from plant.worlds.world import SurfaceTop, World
 from skills.api import Job, Worker
+from skills.files.errors import InputError
 from skills.perception.class_forms import THING
 from skills.perception.training.scoring import Judged
 from skills.robot import FloatArray, Picture
@@ -374,7 +375,7 @@ def own(folder: Path) -> list[tuple[str, Path | None]]:
     )
     try:
         found = [(read_imported(each).class_name, each.resolve()) for each in folders]
-    except ImportedFolderError as error:
+    except InputError as error:
         raise SystemExit(str(error)) from error
     if not found:
         raise SystemExit(f"{folder}: there is no imported object; make one by `errand object import`")

@@ -194,3 +194,19 @@ def test_a_file_is_checked_for_the_robots_that_are_given(write):
     assert invoke(heavy, "--robots", "bob=fetch").exit_code == 0
     unknown = invoke(heavy, "--robots", "bob=fatch")
     assert (unknown.exit_code, "unknown kind of robot 'fatch'" in unknown.stderr) == (2, True)
+
+
+WALLS = """<sdf version="1.9"><model name="walls"><link name="walls"><collision name="c">
+<geometry><sphere><radius>RADIUS</radius></sphere></geometry></collision></link></model></sdf>
+"""
+
+
+@pytest.mark.parametrize(("radius", "said"), [("1", ""), ("none", "the simulation cannot use it")])
+def test_a_world_that_the_simulation_cannot_use_is_refused(tmp_path, write, radius, said):
+    home = tmp_path / "home"
+    home.mkdir()
+    write("directives:\n- add_model: {name: walls, file: package://world/walls.sdf}\n", "home/world.dmd.yaml")
+    write(WALLS.replace("RADIUS", radius), "home/walls.sdf")
+    write("start: {x: 0, y: 0, yaw: 0}\n", "home/knowledge.yaml")
+    result = invoke(write("name: x\nsteps: [{speak: hello}]\n"), "--world", home)
+    assert (result.exit_code, said in result.stderr) == (2 if said else 0, True), result.stderr

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from plant.models.imported import ImportedFolderError, ImportedObject, read_imported, write_imported
+from plant.models.imported import ImportedObject, read_imported, write_imported
+from skills.files.errors import InputError
 
 DRILL = ImportedObject(
     name="drill",
@@ -42,18 +43,18 @@ def test_its_form_lies_in_the_folder_and_rests_at_half_its_height(folder: Path) 
         ("mass_kg: 1.2", "mass_kg: -1", "mass_kg: "),
         ("mass_kg: 1.2", "mass_kg: .nan", "mass_kg: "),
         ("name: drill", "name: ../drill", "name: "),
-        ("round:", "rnd:", "rnd: "),
-        ("name: drill", "name: [", "cannot be read as YAML"),
+        ("round:", "rnd:", "unknown key 'rnd'"),
+        ("name: drill", "name: [", "broken YAML"),
         ("name: drill", "name: other", "other.sdf is missing"),
     ],
 )
 def test_a_damaged_folder_is_refused_with_its_place(folder: Path, old: str, new: str, why: str) -> None:
     facts = folder / "object.yaml"
     facts.write_text(facts.read_text().replace(old, new, 1))
-    with pytest.raises(ImportedFolderError, match=f"{re.escape(str(folder))}.*{why}.*`errand object import`"):
+    with pytest.raises(InputError, match=f"{re.escape(str(folder))}.*{why}.*`errand object import`"):
         read_imported(folder)
 
 
 def test_a_folder_without_one_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ImportedFolderError, match=r"there is no imported object \(object.yaml is missing\)"):
+    with pytest.raises(InputError, match=r"there is no imported object \(object.yaml is missing\)"):
         read_imported(tmp_path)

@@ -12,7 +12,8 @@ from plant.models.builder.importing import Wanted, import_object
 from plant.models.builder.outlines import triangles_of
 from plant.simulation import Simulation
 from plant.worlds.placement import place_objects
-from plant.worlds.world import WORLDS_FOLDER, ObjectRule, WorldError, load_world
+from plant.worlds.world import WORLDS_FOLDER, ObjectRule, load_world
+from skills.files.errors import InputError
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("coacd")
@@ -68,7 +69,7 @@ def test_it_is_of_the_class_that_it_was_imported_with(world_folder):
 def test_a_folder_that_is_none_is_named_with_the_file(world_folder):
     path = world_folder / "objects.yaml"
     path.write_text(path.read_text().replace("../my tool", "../no tool"))
-    with pytest.raises(WorldError, match=r"objects\.yaml: .*no tool: there is no imported object"):
+    with pytest.raises(InputError, match=r"objects\.yaml:\d+: .*no tool: there is no imported object"):
         load_world(world_folder)
 
 
@@ -76,10 +77,10 @@ def test_two_models_of_one_name_are_refused(world_folder, tmp_path):
     world = load_world(world_folder)
     assert world.with_imports([tmp_path / "my tool"]).imports == world.imports
     shutil.copytree(tmp_path / "my tool", tmp_path / "other")
-    with pytest.raises(WorldError, match="are both called 'tool'"):
+    with pytest.raises(InputError, match="are both called 'tool'"):
         world.with_imports([tmp_path / "other"])
 
 
 def test_a_name_is_that_of_one_object(world_folder):
-    with pytest.raises(WorldError, match="'my tool' names two objects or people"):
+    with pytest.raises(InputError, match="'my tool' names two objects or people"):
         load_world(world_folder).with_objects([ObjectRule(name="my tool", model="coke", surfaces=("workbench",))])

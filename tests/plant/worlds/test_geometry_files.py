@@ -1,0 +1,161 @@
+"""What a world's geometry names is looked at before Drake reads it."""
+
+from __future__ import annotations
+
+import os
+import struct
+import time
+import zlib
+from pathlib import Path
+
+import pytest
+
+from plant.worlds.geometry_files import MOST_XML_DEPTH, check_directives, check_model
+from plant.worlds.world import known_worlds, load_world
+from skills.files.errors import InputError
+
+DIRECTIVES = """directives:
+- add_model:
+    name: walls
+    file: package://world/walls.sdf
+- add_weld:
+    parent: world
+    child: walls::walls
+    X_PC: {translation: [0, 0, 0], rotation: !Rpy {deg: [0, 0, 90]}}
+"""
+MODEL = """<sdf version="1.9"><model name="walls"><link name="walls">
+<visual name="v"><geometry><mesh><uri>walls.obj</uri></mesh></geometry></visual>
+</link></model></sdf>
+"""
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    folder = tmp_path / "home"
+    folder.mkdir()
+    (folder / "world.dmd.yaml").write_text(DIRECTIVES)
+    (folder / "walls.sdf").write_text(MODEL)
+    (folder / "walls.obj").write_text("mtllib walls.mtl\nv 0 0 0\n")
+    (folder / "walls.mtl").write_text("newmtl a\nKd 1 1 1\nmap_Kd -s 1 1 1 picture.png\n")
+    (folder / "picture.png").write_bytes(png(4, 4))
+    return folder
+
+
+def png(width: int, height: int) -> bytes:
+    """The head of a picture without its pixels."""
+    data = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + data + struct.pack(">I", zlib.crc32(data))
+
+
+def refusal(home: Path) -> InputError:
+    with pytest.raises(InputError) as error:
+        check_directives(home / "world.dmd.yaml", home)
+    return error.value
+
+
+def test_a_good_world_is_taken(home: Path) -> None:
+    check_directives(home / "world.dmd.yaml", home)
+
+
+@pytest.mark.parametrize("name", known_worlds())
+def test_the_worlds_that_come_with_the_plant_are_taken(name: str) -> None:
+    assert load_world(name).name == name
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("http://localhost/x.sdf", "no name of a file"),
+        ("https://fuel.gazebosim.org/x", "no name of a file"),
+        ("package://nobody/x.sdf", "there is no package 'nobody'"),
+        ("package://world/../../x.sdf", "leads out of the folder"),
+        ("package://errand/nowhere.sdf", "there is no file"),
+        ("file:///etc/passwd", "leads out of the folder"),
+        ("package://world/none.sdf", "no such file"),
+        ("package://world/", "no name of a file"),
+    ],
+)
+def test_a_name_that_leads_elsewhere_is_refused_in_its_line(home: Path, name: str, said: str) -> None:
+    (home / "world.dmd.yaml").write_text(DIRECTIVES.replace("package://world/walls.sdf", name))
+    error = refusal(home)
+    assert said in str(error)
+    assert (error.file, error.line) == (home / "world.dmd.yaml", 4)
+
+
+@pytest.mark.parametrize("name", ["http://x/walls.obj", "../walls.obj", "none.obj", "model://nobody/x.obj"])
+def test_what_a_model_names_is_refused_in_its_line(home: Path, name: str) -> None:
+    (home / "walls.sdf").write_text(MODEL.replace("walls.obj", name))
+    error = refusal(home)
+    assert (error.file, error.line) == (home / "walls.sdf", 2)
+
+
+def test_a_world_that_includes_itself_is_refused(home: Path) -> None:
+    (home / "world.dmd.yaml").write_text(DIRECTIVES + "- add_directives: {file: package://world/more.dmd.yaml}\n")
+    (home / "more.dmd.yaml").write_text("directives:\n- add_directives: {file: package://world/world.dmd.yaml}\n")
+    error = refusal(home)
+    assert "includes itself" in str(error)
+    assert (error.file, error.line) == (home / "more.dmd.yaml", 2)
+
+
+def test_directives_that_multiply_are_refused(home: Path) -> None:
+    for n in range(15):
+        text = f"- add_directives: {{file: package://world/{n + 1}.dmd.yaml}}\n" * 4
+        (home / f"{n}.dmd.yaml").write_text(f"directives:\n{text}")
+    (home / "15.dmd.yaml").write_text("directives: []\n")
+    (home / "world.dmd.yaml").write_text("directives:\n- add_directives: {file: package://world/0.dmd.yaml}\n")
+    assert "too many others" in str(refusal(home))
+
+
+def test_a_model_that_includes_itself_is_refused(home: Path) -> None:
+    (home / "walls.sdf").write_text(MODEL.replace("</model>", "<include><uri>walls.sdf</uri></include></model>"))
+    assert "includes itself" in str(refusal(home))
+
+
+@pytest.mark.parametrize(
+    ("model", "said"),
+    [
+        ("<a>" * (MOST_XML_DEPTH + 1), "nested more than"),
+        ("<a>" * 100_000, "nested more than"),
+        ("<sdf><model>\n</sdf>", "broken XML"),
+        ('<!DOCTYPE a [<!ENTITY b "c">]><sdf>&b;</sdf>', "document types"),
+        ("", "broken XML"),
+    ],
+)
+def test_a_broken_model_is_refused_in_its_line(home: Path, model: str, said: str) -> None:
+    (home / "walls.sdf").write_text(model)
+    error = refusal(home)
+    assert said in str(error)
+    assert (error.file, error.line is not None) == (home / "walls.sdf", True)
+
+
+def test_a_texture_is_no_pipe_and_not_too_large(home: Path) -> None:
+    (home / "picture.png").write_bytes(png(13_000, 13_000))
+    error = refusal(home)
+    assert "13000 x 13000 pixels" in str(error)
+    assert (error.file, error.line) == (home / "walls.mtl", 3)
+    (home / "picture.png").unlink()
+    os.mkfifo(home / "picture.png")
+    begun = time.perf_counter()
+    assert "pipe" in str(refusal(home))
+    assert time.perf_counter() - begun < 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (DIRECTIVES + "directives: []\n", 9),
+        (DIRECTIVES.replace("    name: walls\n", "    name: walls\n    name: walls\n"), 4),
+        (DIRECTIVES.replace("!Rpy", "!Roll"), 8),
+        ("models: []\n", 1),
+    ],
+)
+def test_broken_directives_are_refused_in_their_line(home: Path, text: str, line: int) -> None:
+    (home / "world.dmd.yaml").write_text(text)
+    assert refusal(home).line == line
+
+
+def test_an_imported_model_is_looked_at_as_well(home: Path) -> None:
+    check_model(home / "walls.sdf", home)
+    (home / "walls.obj").unlink()
+    with pytest.raises(InputError, match=r"walls\.sdf:2: walls\.obj: there is no such file"):
+        check_model(home / "walls.sdf", home)

@@ -2,27 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from py_trees.common import Status
-
-from executive.mission.goal import Area, GoalCondition, GoalKind
+from executive.mission.goal import Area, GoalCondition, GoalKind, When
+from executive.run.executions import Execution, is_speech
 from executive.run.outcome import Outcome, RobotResult
+from executive.tree.behaviours.board import Constant
 from executive.tree.compiler import CompiledTree, StepPart
-from executive.tree.node import NodeSpec
 from plant import referee
 from skills.files.errors import listing
-from skills.speak.skill import Speak
+
+SHOWN_CHARS = 60
+_MOVING = frozenset({GoalKind.GRASPED, GoalKind.PLACED, GoalKind.HANDED_OVER, GoalKind.CLEARED})
 
 
 @dataclass(frozen=True)
 class Share:
-    """What another robot did of a mission before it was handed on: the first `done` parts of its tree."""
+    """What another robot did of a mission, before it was handed on or beside this one.
+
+    The first `done` parts of its tree belong to what is judged; all that it moved was moved by the mission.
+    """
 
     tree: CompiledTree
     result: RobotResult
     done: int
+
+
+@dataclass(frozen=True)
+class _Move:
+    """A time in which a mission moved objects of some classes on purpose (none: of any)."""
+
+    classes: frozenset[str]
+    from_s: float
+    until_s: float
+
+    def concerns(self, goal: GoalCondition) -> bool:
+        """Whether it may move what a condition is about."""
+        return not self.classes or not goal.classes or not self.classes.isdisjoint(goal.classes)
 
 
 def verdict_of(
@@ -35,74 +53,133 @@ def verdict_of(
 ) -> referee.Verdict:
     """The verdict on a tree that has run; `judge` is the referee's, on the goal conditions.
 
-    A run that did not end with success has not fulfilled its mission, whatever holds. One with a step that has no goal
-    condition is not judged, unless a condition of another step does not hold. What other robots did `before` belongs to
-    the mission as well, and what happened before `since_s` (simulated time) does not.
+    A run that did not end with success has not fulfilled its mission, whatever holds. Of one that did, all that can be
+    judged counts: what it brought about, what it answered, and what it said. Steps that leave nothing to judge are
+    named. What other robots did `before` belongs to the mission as well, and what happened before `since_s` (simulated
+    time) does not.
     """
-    shares = [condition for share in before for condition in _of_parts(share.tree, share.result, _parts_of(share))]
-    conditions = [*shares, *conditions_of(tree, result)]
+    conditions = conditions_of(tree, result, before=before)
     verdict = judge([replace(condition, since_s=since_s) for condition in conditions])
-    without = [part for part in _done(tree, result) if part.goal is None]
     if result.outcome is not Outcome.SUCCESS:
         why = _joined(f"The mission ended with {result.outcome.value}.", verdict.why)
         return replace(verdict, success=False, why=why, holds=verdict.success)
-    if verdict.success is False or not (without or verdict.success is None):
-        return verdict
-    names = {node.path_id: node.name for node in tree.root.walk()}
-    steps = listing(dict.fromkeys(names.get(part.path_id, part.path_id) for part in without))
-    missing = f"No goal condition stands for {steps}." if without else "There are no goal conditions."
-    return replace(verdict, success=None, why=_joined(missing, verdict.why))
+    said = dict.fromkeys(_speech(tree, result))
+    if said:
+        success = verdict.success is not False and all(holds for holds, _ in said)
+        verdict = replace(verdict, success=success, why=_joined(verdict.why, *(told for _, told in said)))
+    unseen = listing(_unseen(tree, result)) if _unseen(tree, result) else ""
+    if verdict.success is None:
+        nothing = f"No goal condition stands for {unseen}." if unseen else "There are no goal conditions."
+        return replace(verdict, why=_joined(nothing, verdict.why))
+    return replace(verdict, why=_joined(verdict.why, f"Not judged: {unseen}." if unseen else ""))
 
 
-def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.GoalCondition, ...]:
-    """The goal conditions of a tree that has run: of all its parts that were done.
+def _unseen(tree: CompiledTree, result: RobotResult) -> Sequence[str]:
+    """The names of skills that were done on their own and leave nothing to judge."""
+    done = {one.path_id for one in result.executions if one.done}
+    names = {node.path_id: node.name for node in tree.root.walk() if not is_speech(node)}
+    paths = [_node_of(part) for part in tree.parts if part.goal is None]
+    return list(dict.fromkeys(names[path] for path in paths if path in done and path in names))
 
-    A count is one condition, however many trips it takes; an answer belongs to the check that gave it; what comes
-    before a step without condition needs to have been so at some time only, and so does where a robot went that stepped
-    aside for another afterwards.
+
+def conditions_of(
+    tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = ()
+) -> tuple[referee.GoalCondition, ...]:
+    """The goal conditions of a tree that has run: one for each time that a part was done, and one for each answer.
+
+    A count is one condition, however many trips it takes. Where a robot went must hold until it drives again, and
+    where an object lies or who holds it until the mission moves such an object again.
     """
-    return _of_parts(tree, result, _done(tree, result))
+    shares = (*before, Share(tree, result, len(tree.parts)))
+    moves = [move for share in shares for move in _moves(share)]
+    return tuple(condition for share in shares for condition in _of_share(share, moves, last=share is shares[-1]))
 
 
-def _parts_of(share: Share) -> Sequence[StepPart]:
-    return [part for part in share.tree.parts[: share.done] if part.skill is not Speak]
-
-
-def _of_parts(tree: CompiledTree, result: RobotResult, parts: Sequence[StepPart]) -> tuple[referee.GoalCondition, ...]:
-    found: list[referee.GoalCondition] = []
-    for n, part in enumerate(parts):
+def _of_share(share: Share, moves: Sequence[_Move], *, last: bool) -> Iterator[referee.GoalCondition]:
+    result = share.result
+    for part in share.tree.parts[: share.done]:
         if part.goal is None:
             continue
-        below = f"{part.path_id}/"
-        path = next((path for path in result.answers if f"{path}/".startswith(below)), "")
-        times_s = [finding.t_s for finding in result.findings if finding.path_id == path]
-        condition = condition_of(part.goal, robot=tree.robot_name, answer=result.answers.get(path))
-        condition = replace(condition, answered_s=times_s[-1] if times_s else None)
-        was = result.stepped_aside and part.goal.kind is GoalKind.WENT
-        found.append(replace(condition, passing=was or any(later.goal is None for later in parts[n + 1 :])))
-    return tuple(found)
+        condition = condition_of(part.goal, robot=share.tree.robot_name, answer=None)
+        executions = [one for one in result.executions if one.path_id == _node_of(part) and one.done]
+        if part.goal.kind is GoalKind.ANSWERED:
+            yield from _answers(part, condition, result, done=bool(executions))
+            continue
+        if not executions and result.outcome is not Outcome.SUCCESS:
+            yield condition
+        for one in executions:
+            yield _timed(condition, part.goal, one, share, moves, last=last)
 
 
-def _done(tree: CompiledTree, result: RobotResult) -> list[StepPart]:
-    """The parts that were done. Of a mission that succeeded, what failed or was not begun was not called for: it was
-    skipped, stands in a branch that was not taken, or something else was done in its place; so was what stands below
-    a node that failed. What was only said leaves nothing in the world to judge."""
-    parts = [part for part in tree.parts if part.skill is not Speak]
-    if result.outcome is not Outcome.SUCCESS:
-        return parts
-    statuses = {path: state.status for path, state in result.states.items()}
-    done = frozenset(_done_below(tree.mission, statuses))
-    return [part for part in parts if (part.node or part.path_id) in done]
+def _answers(
+    part: StepPart, condition: referee.GoalCondition, result: RobotResult, *, done: bool
+) -> Iterator[referee.GoalCondition]:
+    """One condition for each answer that a check gave, whatever became of what it stands in: it was said."""
+    below = f"{part.path_id}/"
+    answers = [one for one in result.findings if f"{one.path_id}/".startswith(below) and isinstance(one.answer, bool)]
+    for finding in answers:
+        yield replace(condition, answer=bool(finding.answer), answered_s=finding.t_s)
+    if not answers and done:
+        yield condition
 
 
-def _done_below(node: NodeSpec, statuses: Mapping[str, Status]) -> Iterator[str]:
-    """The path ids of nodes that succeeded, without those below one that failed."""
-    status = statuses.get(node.path_id)
-    if status is Status.SUCCESS:
-        yield node.path_id
-    if status is not Status.FAILURE:
-        for child in node.children:
-            yield from _done_below(child, statuses)
+def _timed(
+    condition: referee.GoalCondition,
+    goal: GoalCondition,
+    one: Execution,
+    share: Share,
+    moves: Sequence[_Move],
+    *,
+    last: bool,
+) -> referee.GoalCondition:
+    """The condition of one execution, with the times at which it must hold."""
+    result, ended_s = share.result, math.inf if one.ended_s is None else one.ended_s
+    between = [_Move(frozenset(), each.began_s, _end(each)) for other in result.preempting for each in other.executions]
+    later = [move for move in (*moves, *between) if move.until_s > ended_s and move.concerns(goal)]
+    drove = not last or result.stepped_aside or bool(result.preempting) or (result.moved_s or 0.0) > ended_s
+    let_go = goal.kind is GoalKind.GRASPED and later
+    when = goal.when
+    if when is When.END_OF_MISSION and (let_go or (goal.kind is GoalKind.WENT and drove)):
+        when = When.END_OF_STEP
+    taken_s = tuple((move.from_s, move.until_s) for move in later)
+    return replace(condition, when=referee.When[when.name], began_s=one.began_s, ended_s=one.ended_s, taken_s=taken_s)
+
+
+def _moves(share: Share) -> Iterator[_Move]:
+    """When a robot moved objects on purpose: in all parts that do, also where they failed or were stopped."""
+    for part in share.tree.parts:
+        goal = part.goal
+        if goal is None:
+            if part.skill is None or part.skill.gripper_after is None:
+                continue
+        elif goal.kind not in _MOVING or goal.when is When.ALWAYS:
+            continue
+        classes = frozenset(() if goal is None else goal.classes)
+        for one in share.result.executions:
+            if one.path_id == _node_of(part):
+                yield _Move(classes, one.began_s, _end(one))
+
+
+def _end(one: Execution) -> float:
+    return math.inf if one.ended_s is None else one.ended_s
+
+
+def _node_of(part: StepPart) -> str:
+    return part.node or part.path_id
+
+
+def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str]]:
+    """For each time that a step was to say a text: whether the robot said it, and a sentence."""
+    texts = {node.path_id: node.options["inputs"]["text"] for node in tree.root.walk() if is_speech(node)}
+    for one in result.executions:
+        if one.done and one.path_id in texts:
+            binding = texts[one.path_id]
+            text = " ".join(str(binding.value).split()) if isinstance(binding, Constant) else None
+            end_s = _end(one)
+            heard = [said.text for said in result.said if one.began_s - 1e-3 <= said.t_s <= end_s + 1e-3]
+            found = next((each for each in heard if text in (None, each)), None)
+            told = (found or text or "")[:SHOWN_CHARS]
+            yield found is not None, f'It said "{told}".' if found is not None else f'It did not say "{told}".'
 
 
 def _joined(*sentences: str) -> str:
@@ -121,6 +198,7 @@ def condition_of(condition: GoalCondition, *, robot: str, answer: bool | None) -
         wanted=condition.wanted,
         answer=answer,
         robot=robot,
+        when=referee.When[condition.when.name],
     )
 
 

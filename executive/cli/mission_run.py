@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from executive.cli.artifacts import Artifacts, draw_answer
 from executive.cli.backend import Backend
 from executive.cli.durable import Durable, mission_events
 from executive.cli.found_out import with_found_out
+from executive.cli.goal_conditions import Share
 from executive.cli.happening_log import HappeningLog
 from executive.cli.page_view import PageView, log_map
 from executive.cli.profiling import profiled
@@ -162,7 +163,8 @@ def _judged(
 ) -> tuple[Finished, Sequence[EndedTree]]:
     """The report of a run with what the referee saw, and the tree of each robot as it ended."""
     trees = {each.tree.robot_name: result.trees.get(each.tree.robot_name, each.tree) for each in prepared.all}
-    robots = {each.robot_name: _robot_report(each, trees[each.robot_name], backend, prepared) for each in result.robots}
+    shares = {each.robot_name: Share(trees[each.robot_name], each, 0) for each in result.robots}
+    robots = {name: _robot_report(name, shares, backend, prepared) for name in shares}
     worst = min(robots, key=lambda name: (robots[name].achieved, name != result.worst.robot_name))
     views = {each.robot_name: node_view(trees[each.robot_name].root, each.states) for each in result.robots}
     ended = [EndedTree(trees[name], view, robots[name]) for name, view in views.items()]
@@ -170,9 +172,12 @@ def _judged(
     return Finished(replace(report, robots=robots) if prepared.robots else report, views[worst]), ended
 
 
-def _robot_report(ended: RobotResult, tree: CompiledTree, backend: Backend, prepared: Prepared) -> RobotReport:
-    robot = prepared.robots.get(ended.robot_name)
-    return robot_report(ended, tree, prepared.kind if robot is None else robot.kind, backend.judge(tree, ended))
+def _robot_report(name: str, shares: Mapping[str, Share], backend: Backend, prepared: Prepared) -> RobotReport:
+    """What one robot did; what the others moved in the same run was moved by the mission, too."""
+    robot, own = prepared.robots.get(name), shares[name]
+    others = [share for other, share in shares.items() if other != name]
+    seen = backend.judge(own.tree, own.result, before=others)
+    return robot_report(own.result, own.tree, prepared.kind if robot is None else robot.kind, seen)
 
 
 def robot_report(ended: RobotResult, tree: CompiledTree, kind: str, seen: RefereeReport | None) -> RobotReport:

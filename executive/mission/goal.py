@@ -1,4 +1,4 @@
-"""What is to be so when a mission is done: the goal conditions of commands, as plain data that a referee can judge."""
+"""Goal conditions: what commands must bring about, and when it must hold, as plain data that a referee can judge."""
 
 from __future__ import annotations
 
@@ -15,9 +15,14 @@ __all__ = [
     "Area",
     "GoalCondition",
     "GoalKind",
+    "When",
     "clearing_goals",
     "command_goal",
     "drive_goal",
+    "given_goal",
+    "held_goal",
+    "lifted_goal",
+    "put_goal",
     "surface_area",
     "surfaces_to_search",
 ]
@@ -29,14 +34,23 @@ POSE_NEAR_M: Final = 0.25
 
 
 class GoalKind(enum.Enum):
-    """What is to have happened, or to be so at the end."""
+    """What must hold."""
 
-    GRASPED = "grasped"  # taken from a source area and lifted, at some time
+    GRASPED = "grasped"  # taken from a source area and lifted, and still held
     HANDED_OVER = "handed over"  # let go, on what a person receives it with
     PLACED = "placed"  # resting in a goal area, let go
     WENT = "went"  # the robot in a goal area
     ANSWERED = "answered"  # the answer is what is true of the source areas
     CLEARED = "cleared"  # nothing rests in the source areas; with goal areas, all that did rests there
+
+
+class When(enum.Enum):
+    """At which times a condition must hold. A later step of the same mission may end the last."""
+
+    SOME_TIME = "at some time"  # once while the step ran
+    END_OF_STEP = "at the end of the step"
+    END_OF_MISSION = "at the end of the mission"  # and at the end of the step
+    ALWAYS = "always"  # all the time while the step ran
 
 
 @dataclass(frozen=True)
@@ -52,7 +66,7 @@ class Area:
 class GoalCondition:
     """One condition. `classes` fulfil it, `count` of them, together called `wanted`; they come from a `source` area
     (none: anywhere) and they or the robot go to a `goal` area; `person` is the one to be handed to or asked for (None:
-    anyone)."""
+    anyone); `when` tells at which times it must hold."""
 
     kind: GoalKind
     classes: tuple[str, ...] = ()
@@ -61,6 +75,7 @@ class GoalCondition:
     goal: tuple[Area, ...] = ()
     person: str | None = None
     wanted: str = ""
+    when: When = When.END_OF_MISSION
 
 
 def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition | None:
@@ -83,6 +98,26 @@ def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[
 def drive_goal(pose: Pose) -> GoalCondition:
     """The robot at a pose."""
     return GoalCondition(GoalKind.WENT, goal=(_square(f"({pose.x:.2f}, {pose.y:.2f})", pose, POSE_NEAR_M),))
+
+
+def held_goal() -> GoalCondition:
+    """Anything in the gripper all the time."""
+    return GoalCondition(GoalKind.GRASPED, when=When.ALWAYS)
+
+
+def lifted_goal() -> GoalCondition:
+    """Anything lifted, and held."""
+    return GoalCondition(GoalKind.GRASPED)
+
+
+def put_goal(knowledge: Knowledge, surface: str) -> GoalCondition:
+    """Anything put on a surface."""
+    return GoalCondition(GoalKind.PLACED, goal=(surface_area(knowledge, surface),))
+
+
+def given_goal(person: str | None) -> GoalCondition:
+    """Anything handed over to a person (None: to anyone)."""
+    return GoalCondition(GoalKind.HANDED_OVER, person=person)
 
 
 def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
@@ -151,7 +186,7 @@ def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) ->
     assert command.goal is not None
     person = knowledge.person(command.goal)
     if person is not None:
-        return GoalCondition(GoalKind.WENT, person=person)
+        return GoalCondition(GoalKind.WENT, person=person, when=When.END_OF_STEP)  # the person may walk on
     return GoalCondition(GoalKind.WENT, goal=(_place_area(knowledge, command.goal),))
 
 

@@ -6,6 +6,7 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from executive.run.executions import Execution
 from executive.run.findings import Finding, Said
 from executive.tree.compiler import CompiledTree
 from executive.tree.snapshot import Snapshot
@@ -28,7 +29,8 @@ class RobotResult:
 
     `answers` has the last answer of each node, `findings` all answers in order, and `said` what the robot said.
     `preempting` are the results of the missions that came in between, in the order of their ends. `stepped_aside` when
-    the robot made way for another after its end.
+    the robot made way for another after its end. `executions` tells when each part of the mission ran, and `moved_s`
+    when a skill that may drive last did (s on the robot's clock; None: never).
     """
 
     robot_name: str
@@ -42,6 +44,8 @@ class RobotResult:
     findings: tuple[Finding, ...] = ()
     said: tuple[Said, ...] = ()
     stepped_aside: bool = False
+    executions: tuple[Execution, ...] = ()
+    moved_s: float | None = None
 
 
 @dataclass(frozen=True)

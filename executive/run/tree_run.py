@@ -11,6 +11,7 @@ from py_trees.common import Status
 from executive.mission.goal import GoalKind
 from executive.record.profile import Profile
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
+from executive.run.executions import Executions
 from executive.run.findings import Findings, claim, told
 from executive.run.journal import Journal, TickNote
 from executive.run.outcome import Outcome, RobotResult
@@ -56,6 +57,7 @@ class TreeRun:
         self._ended_early = self._suspended = False
         self._endings: list[str] = []
         self._observed = Observed(self.root)
+        self._executions = Executions(tree, self._observed.nodes, context.board, context.clock)
         self._leaves = tuple(node for node in self._observed.nodes if isinstance(node, SkillLeaf))
         buttons = {node.path_id for node in tree.root.walk() if any(buttons_of(node))}
         waits = (node for node in self._observed.nodes if isinstance(node, WaitFor))
@@ -103,6 +105,7 @@ class TreeRun:
             self._set_gates(breakpoints)
         self._tick()
         changes = self.log_changes()
+        self._executions.after_tick(change.path_id for change in changes)
         if self.journal is not None:
             self.journal.note(self._tick_note(changes))
         return bool(changes)
@@ -188,8 +191,20 @@ class TreeRun:
             message = claim("" if self._tells_nothing_more() else message, findings, self._skipped())
         elif findings and outcome is Outcome.FAILURE:
             message = f"{message} (found out: {told(findings)})"
-        name, mission = self.tree.robot_name, self.tree.mission_name
-        return RobotResult(name, outcome, cause, message, answers, self.states, mission, preempting, findings, said)
+        return RobotResult(
+            robot_name=self.tree.robot_name,
+            outcome=outcome,
+            cause=cause,
+            message=message,
+            answers=answers,
+            states=self.states,
+            mission=self.tree.mission_name,
+            preempting=preempting,
+            findings=findings,
+            said=said,
+            executions=self._executions.all,
+            moved_s=self._executions.moved_s,
+        )
 
     def _tells_nothing_more(self) -> bool:
         """Whether the last sentence of a mission that gave answers is one of them, or merely where the robot stands."""

@@ -18,6 +18,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.decorators import Decorator
 
+from executive.run.executions import execution_keys
 from executive.run.findings import finding_keys
 from executive.store.recollection import Recollection
 from executive.store.records import Memory, StepRecord
@@ -72,7 +73,9 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     if tree.root is not tree.mission:
         root = dataclasses.replace(tree.root, children=(*tree.root.children[:-1], root))
     own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(CompiledTree)}
-    board = {**memory.board, finding_keys(tree.robot_name, tree.mission_name).again: _answered(tree, memory)}
+    names = tree.robot_name, tree.mission_name
+    again = {finding_keys(*names).again: _answered(tree, memory), execution_keys(*names).again: _ended(tree, memory)}
+    board = {**memory.board, **again}
     return ResumedTree(**{**own, "root": root}, board=board, changes=change.made), recollection
 
 
@@ -110,6 +113,13 @@ def _answered(tree: CompiledTree, memory: Memory) -> frozenset[str]:
     """The nodes that have given their answer and, since what they rest on is told once more, give it again."""
     answers = {node.path_id for node in tree.mission.walk() if node.kind == "answer"}
     return frozenset(path for path in answers if path in memory.steps and memory.steps[path].status is Status.SUCCESS)
+
+
+def _ended(tree: CompiledTree, memory: Memory) -> frozenset[str]:
+    """The nodes that have ended and, since what they rest on is told once more, end again."""
+    interrupts = [node for node in tree.mission.walk() if node.kind == "interrupt"]
+    called = {below.path_id for node in interrupts for below in node.walk()}
+    return frozenset(path for path, step in memory.steps.items() if step.ended) - called
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,23 @@ import shapely
 
 
 class GoalKind(enum.Enum):
-    """What is to have happened, or to be so at the end."""
+    """What must hold."""
 
-    GRASPED = "grasped"  # taken from a source region and lifted, at some time
+    GRASPED = "grasped"  # taken from a source region and lifted, and still held
     HANDED_OVER = "handed over"  # on the tray of a person, let go
     PLACED = "placed"  # resting in a goal region, let go
     WENT = "went"  # the robot's body in a goal region
     ANSWERED = "answered"  # the answer is what is true of the source regions
     CLEARED = "cleared"  # nothing rests in the source regions; with goal regions, all that did rests there, let go
+
+
+class When(enum.Enum):
+    """At which times a condition must hold. The step ran from `began_s` to `ended_s`."""
+
+    SOME_TIME = "at some time"  # once while the step ran
+    END_OF_STEP = "at the end of the step"
+    END_OF_MISSION = "at the end of the mission"  # and at the end of the step
+    ALWAYS = "always"  # all the time while the step ran
 
 
 @dataclass(frozen=True)
@@ -47,13 +56,16 @@ class Region:
 class GoalCondition:
     """One goal condition.
 
-    `classes` are the object classes that fulfil it, `wanted` what they are called together (empty: the classes) and
-    `count` how many objects (0 counts as 1); `source` is where they were to be taken from (empty: anywhere) or, for an
-    answer, where was to be looked; `goal` where they or the robot were to go (any of the regions); `person` the one to
-    be handed to or, where the class is "person", asked for (None: anyone); `answer` what was said, and `answered_s`
-    when (None: now; where people are counts now); `robot` who was to do it (None: any); with `passing` it is enough
-    that it was so at some time, since later steps may undo it. What happened before `since_s` (simulated time) does not
-    count: it was another mission's doing.
+    `classes` are the object classes that fulfil it (none: any), `wanted` what they are called together (empty: the
+    classes) and `count` how many objects (0 counts as 1). `source` is where the objects were taken from (empty:
+    anywhere) or, for an answer, where the robot looked; `goal` where the objects or the robot go (any of the regions).
+    `person` receives the object or, where the class is "person", is asked for (None: anyone). `answer` is what was
+    said, at `answered_s` (None: now). `robot` is the one that acts (None: any).
+
+    `when` says at which times it must hold. The step ran from `began_s` (None: since `since_s`) to `ended_s` (None: it
+    ends now). An object that must stay until the end of the mission may be lifted again within the intervals
+    `taken_s`: there a later step of the same mission takes it. What happened before `since_s` (simulated time) does
+    not count: it was another mission's doing.
     """
 
     kind: GoalKind
@@ -66,8 +78,16 @@ class GoalCondition:
     answered_s: float | None = None
     robot: str | None = None
     wanted: str = ""
-    passing: bool = False
+    when: When = When.END_OF_MISSION
+    began_s: float | None = None
+    ended_s: float | None = None
+    taken_s: tuple[tuple[float, float], ...] = ()
     since_s: float = 0.0
+
+    @property
+    def from_s(self) -> float:
+        """When its step began."""
+        return self.since_s if self.began_s is None else max(self.began_s, self.since_s)
 
     @property
     def needed(self) -> int:

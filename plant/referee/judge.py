@@ -8,34 +8,47 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant.referee.contacts import Collision
-from plant.referee.goal import GoalCondition, GoalKind, Region, Verdict
-from plant.referee.object_history import Lift, ObjectHistory
+from plant.referee.goal import GoalCondition, GoalKind, Region, Verdict, When
+from plant.referee.object_history import SETTLE_S, Lift, ObjectHistory
 from skills.robot import FloatArray
 
 NEAR_PERSON_M = 2.0
 NAMED_REGIONS = 3
 PERSON = "person"
-_STATE_KINDS = (GoalKind.WENT, GoalKind.PLACED, GoalKind.HANDED_OVER)
+ON_TRAY_GAP_S = 0.5
+
+
+@dataclass(frozen=True)
+class TimedPath:
+    """Where a robot or a person went: points (m, world) with the times (s) at which they were reached, (N, 4)."""
+
+    points: FloatArray
+
+    def at(self, time_s: float) -> FloatArray:
+        """The position at a time, (3,)."""
+        return self.points[self._index(time_s), :3]
+
+    def between(self, from_s: float, until_s: float) -> FloatArray:
+        """The positions from just before a time to another, (N, 3)."""
+        first = max(0, int(np.searchsorted(self.points[:, 3], from_s)) - 1)
+        return self.points[first : self._index(until_s) + 1, :3]
+
+    def _index(self, time_s: float) -> int:
+        return max(0, int(np.searchsorted(self.points[:, 3], time_s, side="right")) - 1)
 
 
 @dataclass(frozen=True)
 class Truth:
-    """The record: histories of the objects, where robots and people are now (m, world), and their paths.
+    """The record up to `now_s`: histories of the objects, and the paths of robots and people by name.
 
-    A path is an array (N, 4) of points (m, world) and when they were reached (s); `given` says when which object last
-    rested on whose tray.
+    `given` has for each object and person the times (s) from and to which the object rested on the person's tray.
     """
 
+    now_s: float
     histories: tuple[ObjectHistory, ...]
-    bases: Mapping[str, FloatArray]
-    paths: Mapping[str, FloatArray]
-    persons: Mapping[str, FloatArray]
-    given: Mapping[tuple[str, str], float]
-
-    def path_since(self, robot: str, since_s: float) -> FloatArray:
-        """Where a robot was at a time and went from there, (N, 3)."""
-        path = self.paths[robot]
-        return path[max(0, int(np.searchsorted(path[:, 3], since_s)) - 1) :, :3]
+    robots: Mapping[str, TimedPath]
+    persons: Mapping[str, TimedPath]
+    given: Mapping[tuple[str, str], Sequence[tuple[float, float]]]
 
 
 @dataclass(frozen=True)
@@ -47,8 +60,8 @@ class Finding:
 
 
 def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[Collision]) -> Verdict:
-    """The verdict on all conditions: the last is judged by the present state, earlier ones by the record."""
-    findings = [_judge_one(conditions, i, truth) for i in range(len(conditions))]
+    """The verdict on all conditions, each at the times at which it must hold."""
+    findings = [_judge_one(condition, truth) for condition in conditions]
     success = all(finding.holds for finding in findings) if findings else None
     since_s = min((condition.since_s for condition in conditions), default=0.0)
     bumps = [bump for bump in bumps if bump.time_s >= since_s]
@@ -56,7 +69,7 @@ def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[
     drops = sum(when_s >= since_s for history in truth.histories for when_s in history.dropped_s)
     return Verdict(
         success,
-        " ".join(finding.sentence for finding in findings),
+        " ".join(dict.fromkeys(finding.sentence for finding in findings)),
         collisions=len(own),
         drops=drops,
         people_hit=sum(bump.person is not None for bump in own),
@@ -65,53 +78,98 @@ def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[
     )
 
 
-def _judge_one(conditions: Sequence[GoalCondition], i: int, truth: Truth) -> Finding:
-    """One condition; a state that a later condition overtakes may have passed."""
-    past = conditions[i].passing or any(_overtakes(later, conditions[i]) for later in conditions[i + 1 :])
-    finding = _JUDGES[conditions[i].kind](conditions[i], truth, past)
+def _judge_one(condition: GoalCondition, truth: Truth) -> Finding:
+    finding = _JUDGES[condition.kind](condition, truth)
     return Finding(finding.holds, finding.sentence[0].upper() + finding.sentence[1:])
 
 
-def _overtakes(later: GoalCondition, condition: GoalCondition) -> bool:
-    """Whether fulfilling the later condition may undo the state of the earlier."""
-    if condition.kind is GoalKind.WENT:
-        return True
-    return later.kind in (*_STATE_KINDS, GoalKind.GRASPED) and bool(set(later.classes) & set(condition.classes))
+def _until_s(condition: GoalCondition, truth: Truth) -> float:
+    """When its step ended."""
+    return truth.now_s if condition.ended_s is None else min(condition.ended_s, truth.now_s)
 
 
-def _judge_grasped(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
-    """Lifted from the source at some time."""
-    done = {history: lift for history in _of_class(condition, truth) if (lift := _lift(history, condition)) is not None}
+def _is_past(condition: GoalCondition) -> bool:
+    """Whether only the past counts, not the end of the mission."""
+    return condition.when is not When.END_OF_MISSION and condition.ended_s is not None
+
+
+def _taken_again(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
+    """Whether a later step of the same mission lifted it."""
+    ended_s = _until_s(condition, truth)
+    return any(
+        lift.time_s > ended_s and from_s <= lift.time_s <= until_s + SETTLE_S
+        for lift in history.lifts
+        for from_s, until_s in condition.taken_s
+    )
+
+
+def _judge_grasped(condition: GoalCondition, truth: Truth) -> Finding:
+    """Lifted from the source, and still in the gripper where that must hold."""
+    until_s = _until_s(condition, truth)
+    from_s = condition.from_s if condition.when is When.SOME_TIME else condition.since_s
+    candidates = ((one, _lift(one, condition, from_s, until_s)) for one in _of_class(condition, truth))
+    lifted = {history: lift for history, lift in candidates if lift is not None}
+    done = {one: lift for one, lift in lifted.items() if _is_held(one, condition, until_s)}
     if len(done) >= condition.needed:
         froms = (f"the {history.name} was lifted{_from(condition, lift)}" for history, lift in done.items())
         return Finding(True, f"{' and '.join(froms)}.")
-    lifted = [history for history in truth.histories if history.lifts_since(condition.since_s)]
-    other = [history for history in lifted if history not in done]
+    if len(lifted) >= condition.needed:
+        lost = [history for history in lifted if history not in done]
+        when = "to the end of the mission" if condition.when is When.END_OF_MISSION else "to the end of the step"
+        return Finding(False, f"{_names(lost)} {_were(lost)} lifted, but not held {when}.")
+    moved = [history for history in truth.histories if history.lifts_since(condition.since_s)]
+    other = [history for history in moved if history not in done]
     was = f"; {_names(other)} {_were(other)}" if other else ""
     return Finding(False, f"{_tally(done, condition)} lifted{_out_of(condition.source)}{was}.")
 
 
-def _judge_handed_over(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
+def _is_held(history: ObjectHistory, condition: GoalCondition, until_s: float) -> bool:
+    """Whether a robot has it in its gripper at the times at which it must."""
+
+    def own(robot: str | None) -> bool:
+        return robot is not None and condition.robot in (None, robot)
+
+    if condition.when is When.SOME_TIME:
+        return True
+    if condition.when is When.ALWAYS:
+        return own(history.held_always(condition.from_s, until_s))
+    if condition.ended_s is not None and not own(history.held_at(until_s)):
+        return False
+    return condition.when is not When.END_OF_MISSION or own(history.held_by)
+
+
+def _judge_handed_over(condition: GoalCondition, truth: Truth) -> Finding:
     """Resting on the person's tray, let go."""
-    people = {name: p for name, p in truth.persons.items() if condition.person in (None, name)}
+    people = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}
     if not people:
         return Finding(False, f"There is no person {condition.person or ''} to hand anything to.".replace("  ", " "))
-    objects = [history for history in _of_class(condition, truth) if _lift(history, condition) is not None]
-    if past:
-        done = [history for history in objects if _was_given(history, people, condition, truth)]
+    until_s = _until_s(condition, truth)
+    objects = [one for one in _of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
+    given = [one for one in objects if _was_given(one, people, condition, truth)]
+    if _is_past(condition):
+        done = given
     else:
-        done = [one for one in objects if one.on_tray_of in people and not one.lies_where_others_put_it]
+        there = [one for one in objects if one.on_tray_of in people and not one.lies_where_others_put_it]
+        done = [one for one in given if one in there or _taken_again(one, condition, truth)]
+        done = there if condition.ended_s is None else done
     if len(done) >= condition.needed:
+        past = any(one.on_tray_of not in people for one in done)
         verb = _were(done) + " put" if past else "rests" if len(done) == 1 else "rest"
         return Finding(True, f"{_names(done)} {verb} on {_either(people)}'s tray.")
-    return Finding(False, _why_not_handed(condition, objects, people))
+    now_W = {name: path.at(truth.now_s) for name, path in people.items()}
+    return Finding(False, _why_not_handed(condition, objects, now_W))
 
 
 def _was_given(history: ObjectHistory, people: Collection[str], condition: GoalCondition, truth: Truth) -> bool:
-    """Whether it rested on the tray of one of the people after it was lifted."""
-    lift = _lift(history, condition)
-    given_s = (truth.given.get((history.name, person), -np.inf) for person in people)
-    return lift is not None and any(when_s >= lift.time_s for when_s in given_s)
+    """Whether it came to rest on the tray of one of the people, and rested there at the times at which it must."""
+    until_s = _until_s(condition, truth)
+    for person in people:
+        for first_s, last_s in truth.given.get((history.name, person), ()):
+            in_time = condition.from_s <= first_s <= until_s + SETTLE_S
+            stayed = condition.when is When.SOME_TIME or last_s >= until_s - ON_TRAY_GAP_S
+            if in_time and stayed and _lift(history, condition, condition.since_s, first_s) is not None:
+                return True
+    return False
 
 
 def _why_not_handed(
@@ -125,16 +183,18 @@ def _why_not_handed(
     where = f"{history.last.p_WO[2]:.2f} m high, {apart:.2f} m from {_either(people)}"
     if history.held_by is not None:
         return f"The {history.name} is still in the gripper, {where}."
+    if history.on_tray_of in people:
+        return f"The {history.name} was not yet on the tray of {history.on_tray_of} at the end of its step."
     return f"The {history.name} {'rests' if history.resting else 'moves'} {where}, not on the tray."
 
 
-def _judge_placed(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
+def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
     """Resting in the goal, let go."""
-    objects = [history for history in _of_class(condition, truth) if _lift(history, condition) is not None]
-    own = [history for history in objects if past or not history.lies_where_others_put_it]
-    done = {history: p for history in own if (p := _rest_in(history, condition, past)) is not None}
+    until_s = _until_s(condition, truth)
+    objects = [one for one in _of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
+    done = {one: p_W for one in objects if (p_W := _put_in(one, condition, truth)) is not None}
     if len(done) >= condition.needed:
-        verb = "was put" if past else "rests"
+        verb = "was put" if _is_past(condition) else "rests"
         ons = (f"the {history.name} {verb} on {_region_at(condition.goal, p)}" for history, p in done.items())
         return Finding(True, f"{' and '.join(ons)}.")
     if not objects:
@@ -142,47 +202,95 @@ def _judge_placed(condition: GoalCondition, truth: Truth, past: bool) -> Finding
     elsewhere = [history for history in objects if history not in done]
     if not elsewhere:
         return Finding(False, f"{_tally(done, condition)} put on {_where(condition.goal)}.")
-    x, y, z = elsewhere[0].last.p_WO
-    state = "is in a gripper" if elsewhere[0].held_by else "is" if elsewhere[0].resting else "moves"
-    missed = f"the {elsewhere[0].name} {state} at ({x:.2f}, {y:.2f}, {z:.2f}), not resting on {_where(condition.goal)}"
+    missed = _where_it_is(elsewhere[0], condition, truth)
     return Finding(False, f"{_tally(done, condition)} put there; {missed}." if done else f"{missed}.")
 
 
-def _judge_went(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
-    """The body in the place, now or (when overtaken) at some time."""
-    robots = [name for name in truth.bases if condition.robot in (None, name)]
-    if condition.person is not None and robots:
-        return _judge_near_person(condition, robots[0], truth, past)
-    for name in robots:
-        points = truth.path_since(name, condition.since_s) if past else truth.bases[name][None, :]
-        there = next((on for p in points if (on := _region_at(condition.goal, p)) is not None), None)
-        if there is not None:
-            return Finding(True, f"{name} {'was' if past else 'is'} at {there}.")
+def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> str:
+    """Where an object is that does not rest in the goal, or did not when it was to."""
+    now = _rest_in(history, condition.goal)
+    if now is not None and not history.lies_where_others_put_it:
+        return f"the {history.name} was not on {_where(condition.goal)} at the end of its step"
+    x, y, z = history.last.p_WO
+    state = "is in a gripper" if history.held_by else "is" if history.resting else "moves"
+    return f"the {history.name} {state} at ({x:.2f}, {y:.2f}, {z:.2f}), not resting on {_where(condition.goal)}"
+
+
+def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> FloatArray | None:
+    """Where in the goal a robot put it, if it was there at the times at which it must be."""
+    until_s = _until_s(condition, truth)
+    if condition.when is When.SOME_TIME:
+        rests = history.own_rests_W(condition.from_s, until_s + SETTLE_S)
+        return next((p_W for p_W in rests if _region_at(condition.goal, p_W) is not None), None)
+    now_W = None if history.lies_where_others_put_it else _rest_in(history, condition.goal)
+    if condition.ended_s is None:
+        return now_W
+    put = history.put_by(until_s)
+    if put is None or put[0] < condition.from_s or _region_at(condition.goal, put[1]) is None:
+        return None
+    if condition.when is not When.END_OF_MISSION or now_W is not None or _taken_again(history, condition, truth):
+        return put[1]
+    return None
+
+
+def _judge_went(condition: GoalCondition, truth: Truth) -> Finding:
+    """The body in the place at the times at which it must be."""
+    robots = [name for name in truth.robots if condition.robot in (None, name)]
     if not robots:
         return Finding(False, f"There is no robot {condition.robot}.")
-    x, y, _ = truth.bases[robots[0]]
-    return Finding(False, f"{robots[0]} is at ({x:.2f}, {y:.2f}), not at {_where(condition.goal)}.")
+    if condition.person is not None:
+        return _judge_near_person(condition, robots[0], truth)
+    findings = [_judge_at(condition, name, truth) for name in robots]
+    return next((finding for finding in findings if finding.holds), findings[0])
 
 
-def _judge_near_person(condition: GoalCondition, robot: str, truth: Truth, past: bool) -> Finding:
-    """The robot near a person, now or (when overtaken) at some time."""
-    person = condition.person or ""
-    p_WP = truth.persons.get(person)
-    if p_WP is None:
+def _judge_at(condition: GoalCondition, robot: str, truth: Truth) -> Finding:
+    verb = "was" if _is_past(condition) else "is"
+    points = _points(condition, truth.robots[robot], truth)
+    inside = [_region_at(condition.goal, p_W) for p_W in points]
+    if (any if condition.when is When.SOME_TIME else all)(on is not None for on in inside):
+        return Finding(True, f"{robot} {verb} at {next(filter(None, inside))}.")
+    outside = next(p_W for p_W, on in zip(reversed(points), reversed(inside), strict=True) if on is None)
+    x, y, _ = outside
+    return Finding(False, f"{robot} {verb} at ({x:.2f}, {y:.2f}), not at {_where(condition.goal)}.")
+
+
+def _points(condition: GoalCondition, path: TimedPath, truth: Truth) -> Sequence[FloatArray]:
+    """The positions that count, in the order of time."""
+    until_s = _until_s(condition, truth)
+    if condition.when in (When.SOME_TIME, When.ALWAYS):
+        return list(path.between(condition.from_s, until_s))
+    if condition.when is When.END_OF_MISSION:
+        return [path.at(until_s), path.at(truth.now_s)]
+    return [path.at(until_s)]
+
+
+def _judge_near_person(condition: GoalCondition, robot: str, truth: Truth) -> Finding:
+    """The robot near a person at the times at which it must be; the person may walk."""
+    person, path = condition.person or "", truth.robots[robot]
+    other = truth.persons.get(person)
+    if other is None:
         return Finding(False, f"there is no person {person} to go to.")
-    points = truth.path_since(robot, condition.since_s) if past else [truth.bases[robot]]
-    apart_m = min(_apart_m(p, p_WP) for p in points)
-    return Finding(apart_m <= NEAR_PERSON_M, f"{robot} {'was' if past else 'is'} {apart_m:.1f} m from {person}.")
-
-
-def _judge_answered(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
-    """The answer equal to the truth at the time when it was given."""
-    if condition.classes == (PERSON,):
-        people = ((name, p_W) for name, p_W in truth.persons.items() if condition.person in (None, name))
-        there = [f"{name} is in {on}" for name, p_W in people if (on := _region_at(condition.source, p_W)) is not None]
-        nothing = f"{condition.person or 'nobody'} is {'not ' if condition.person else ''}in {_where(condition.source)}"
+    until_s = _until_s(condition, truth)
+    if condition.when is When.SOME_TIME:
+        apart_m = min(_apart_m(p, other.at(until_s)) for p in path.between(condition.from_s, until_s))
     else:
-        then_s = condition.answered_s
+        apart_m = _apart_m(path.at(until_s), other.at(until_s))
+    verb = "was" if _is_past(condition) else "is"
+    return Finding(apart_m <= NEAR_PERSON_M, f"{robot} {verb} {apart_m:.1f} m from {person}.")
+
+
+def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
+    """The answer equal to the truth at the time when it was given."""
+    then_s = condition.answered_s
+    if condition.classes == (PERSON,):
+        when_s = truth.now_s if then_s is None else then_s
+        people = ((name, path.at(when_s)) for name, path in truth.persons.items() if condition.person in (None, name))
+        verb = "is" if then_s is None else "was"
+        there = [f"{name} {verb} in {on}" for name, p_W in people if (on := _region_at(condition.source, p_W))]
+        who = condition.person or "nobody"
+        nothing = f"{who} {verb} {'not ' if condition.person else ''}in {_where(condition.source)}"
+    else:
         rest = (
             (each, (each.last.p_WO if each.resting else None) if then_s is None else each.at(then_s))
             for each in _of_class(condition, truth)
@@ -199,18 +307,17 @@ def _judge_answered(condition: GoalCondition, truth: Truth, past: bool) -> Findi
     return Finding(condition.answer is fact, f"the answer was {said}, and {found}.")
 
 
-def _judge_cleared(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
+def _judge_cleared(condition: GoalCondition, truth: Truth) -> Finding:
     """All that rested in the source rests in the goal; without a goal, no longer in the source."""
-    source, since_s = condition.source, condition.since_s
-    there = [one for one in truth.histories if _was_in(one, source, since_s)]
+    source = condition.source
+    there = [one for one in truth.histories if _was_in(one, condition, truth)]
     if not there:
         return Finding(True, f"nothing stood on {_where(source)}.")
     if not condition.goal:
-        still = [one for one in there if _region_at(source, one.last.p_WO) is not None]
-        left = [one for one in still if not (past and one.lifts_since(since_s))]
+        left = [one for one in there if _is_left(one, condition, truth)]
         told = f"{_names(left)} {'is' if len(left) == 1 else 'are'}" if left else "nothing is"
         return Finding(not left, f"{told} left on {_where(source)}.")
-    missing = [one for one in there if _rest_in(one, condition, past) is None]
+    missing = [one for one in there if _put_in(one, condition, truth) is None]
     if not missing:
         return Finding(True, f"{_names(there)} {'stands' if len(there) == 1 else 'stand'} on {_where(condition.goal)}.")
     return Finding(
@@ -218,12 +325,30 @@ def _judge_cleared(condition: GoalCondition, truth: Truth, past: bool) -> Findin
     )
 
 
-def _was_in(history: ObjectHistory, regions: Sequence[Region], since_s: float) -> bool:
-    """Whether it rested in one of the regions then, or did since."""
-    return any(_region_at(regions, p) is not None for p in (*history.rested_W(since_s), history.last.p_WO))
+def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
+    """Whether it rested in the source when the step began, or came to rest there while it ran."""
+    from_s, until_s = condition.from_s, _until_s(condition, truth)
+    came = zip(history.rested_s, history.rests_W, strict=True)
+    began_W = history.at(from_s)
+    places = [*(p_W for when_s, p_W in came if from_s < when_s <= until_s), *(() if began_W is None else (began_W,))]
+    return any(_region_at(condition.source, p_W) is not None for p_W in places)
 
 
-_JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth, bool], Finding]] = {
+def _is_left(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
+    """Whether it was in the source at the end of the step, or is there now though nobody put it back."""
+    until_s = _until_s(condition, truth)
+    put = history.put_by(until_s)
+    then_W = put[1] if put is not None else history.at(until_s)
+    now = _region_at(condition.source, history.last.p_WO) is not None
+    if condition.ended_s is None:
+        return now
+    if then_W is not None and _region_at(condition.source, then_W) is not None:
+        return True
+    back = history.lies_where_others_put_it or _taken_again(history, condition, truth)
+    return condition.when is When.END_OF_MISSION and now and not back
+
+
+_JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth], Finding]] = {
     GoalKind.GRASPED: _judge_grasped,
     GoalKind.HANDED_OVER: _judge_handed_over,
     GoalKind.PLACED: _judge_placed,
@@ -234,26 +359,26 @@ _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth, bool], Finding]] = {
 
 
 def _of_class(condition: GoalCondition, truth: Truth) -> list[ObjectHistory]:
-    return [history for history in truth.histories if history.class_name in condition.classes]
+    return [one for one in truth.histories if not condition.classes or one.class_name in condition.classes]
 
 
-def _lift(history: ObjectHistory, condition: GoalCondition) -> Lift | None:
-    """The first time that the condition's robot lifted it, from the source where one was named."""
+def _lift(history: ObjectHistory, condition: GoalCondition, from_s: float, until_s: float) -> Lift | None:
+    """The first time that the condition's robot lifted it, from the source where one is named."""
     return next(
         (
             lift
-            for lift in history.lifts_since(condition.since_s)
-            if condition.robot in (None, lift.robot)
+            for lift in history.lifts_since(from_s)
+            if lift.time_s <= until_s + SETTLE_S
+            and condition.robot in (None, lift.robot)
             and (not condition.source or _region_at(condition.source, lift.from_W) is not None)
         ),
         None,
     )
 
 
-def _rest_in(history: ObjectHistory, condition: GoalCondition, past: bool) -> FloatArray | None:
-    """Where in the goal it rests, or did after it was carried; None when nowhere."""
-    rests = history.own_rests_W(condition.since_s) if past else [history.last.p_WO] if history.resting else []
-    return next((p for p in rests if _region_at(condition.goal, p) is not None), None)
+def _rest_in(history: ObjectHistory, goal: Sequence[Region]) -> FloatArray | None:
+    """Where in the goal it rests now; None when nowhere."""
+    return history.last.p_WO if history.resting and _region_at(goal, history.last.p_WO) is not None else None
 
 
 def _region_at(regions: Sequence[Region], p_W: FloatArray) -> str | None:
@@ -280,7 +405,7 @@ def _were(histories: Sequence[ObjectHistory]) -> str:
 
 
 def _wanted(condition: GoalCondition) -> str:
-    return condition.wanted or " or ".join(condition.classes)
+    return condition.wanted or " or ".join(condition.classes) or "object"
 
 
 def _tally(done: Collection[ObjectHistory], condition: GoalCondition) -> str:
@@ -310,5 +435,5 @@ def _in(regions: Sequence[Region]) -> str:
     return f" on {_where(regions)}" if regions else ""
 
 
-def _either(people: Mapping[str, FloatArray]) -> str:
+def _either(people: Iterable[str]) -> str:
     return " or ".join(people)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -18,6 +19,7 @@ STILL_M_S = 0.05
 WITH_HAND_M_S = 0.2
 REST_S = 0.2
 FLICKER_S = 0.15
+SETTLE_S = 1.0
 _PLAIN = (
     *("events", "dropped_s", "touches", "speed_m_s", "_grip_s", "_grip_robot", "_grip_z_m", "_supported_s"),
     *("_still_since_s", "_carried", "_left_z_m", "_dropped", "_tray_s", "_tray_of", "_by_others"),
@@ -90,11 +92,11 @@ class ObjectHistory:
     _tray_of: str | None = None
     _by_others: list[int] = field(default_factory=list)
 
-    def own_rests_W(self, since_s: float = 0.0) -> list[FloatArray]:
-        """Where it came to rest since then, but for its first place and where somebody who is no robot put it."""
+    def own_rests_W(self, from_s: float, until_s: float = math.inf) -> list[FloatArray]:
+        """Where it came to rest in that time, except its first place and where somebody who is no robot put it."""
         rests = enumerate(zip(self.rested_s, self.rests_W, strict=True))
         own = [(when_s, p_W) for number, (when_s, p_W) in rests if number > 0 and number not in self._by_others]
-        return [p_W for when_s, p_W in own if when_s >= since_s]
+        return [p_W for when_s, p_W in own if from_s <= when_s <= until_s]
 
     def rested_W(self, since_s: float) -> list[FloatArray]:
         """Where it rested then, or came to rest since."""
@@ -153,6 +155,43 @@ class ObjectHistory:
         since_s, p_W = places[-1] if places else (self.rested_s[0], self.rests_W[0])
         gone = any(since_s < lift.time_s <= time_s for lift in self.lifts)
         return None if gone else p_W
+
+    def put_by(self, time_s: float) -> tuple[float, FloatArray] | None:
+        """Since when and where it rested at a time, or came to rest within SETTLE_S after it; None: it did not.
+
+        What somebody who is no robot put down does not count, nor does its first place.
+        """
+        lifted_s = max((lift.time_s for lift in self.lifts if lift.time_s <= time_s), default=-math.inf)
+        again_s = min((lift.time_s for lift in self.lifts if lift.time_s > time_s), default=math.inf)
+        rests = [
+            (number, when_s)
+            for number, when_s in enumerate(self.rested_s)
+            if lifted_s < when_s <= min(time_s + SETTLE_S, again_s)
+        ]
+        if not rests and again_s == math.inf and self.resting and self.last.time_s <= time_s + SETTLE_S:
+            return self.last.time_s, self.last.p_WO
+        before = [rest for rest in rests if rest[1] <= time_s]
+        number, when_s = before[-1] if before else rests[0] if rests else (0, 0.0)
+        if number == 0 or number in self._by_others:
+            return None
+        return when_s, self.rests_W[number]
+
+    def held_at(self, time_s: float) -> str | None:
+        """The robot that had it in its gripper at a time, or lifted it within SETTLE_S after it; None: nobody."""
+        before = [lift for lift in self.lifts if lift.time_s <= time_s]
+        after = [lift for lift in self.lifts if time_s < lift.time_s <= time_s + SETTLE_S]
+        held = [lift for lift in before[-1:] if not self._ended_between(lift.time_s, time_s)]
+        return next((lift.robot for lift in (*held, *after)), None)
+
+    def held_always(self, from_s: float, until_s: float) -> str | None:
+        """The robot that had it in its gripper all that time; None: nobody."""
+        before = [lift for lift in self.lifts if lift.time_s <= from_s + SETTLE_S]
+        held = (lift.robot for lift in before[-1:] if not self._ended_between(lift.time_s, until_s))
+        return next(held, None)
+
+    def _ended_between(self, from_s: float, until_s: float) -> bool:
+        """Whether it came to rest, or was dropped, in that time."""
+        return any(from_s < when_s <= until_s for when_s in (*self.rested_s, *self.dropped_s))
 
     def take(self, sample: ObjectSample) -> None:
         """Take in one more sample."""

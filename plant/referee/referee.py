@@ -17,7 +17,7 @@ from pydrake.systems.framework import Context
 from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
 from plant.referee.entities import Entities, Kind
 from plant.referee.goal import GoalCondition, Verdict
-from plant.referee.judge import Truth, judge
+from plant.referee.judge import ON_TRAY_GAP_S, TimedPath, Truth, judge
 from plant.referee.object_history import Lift, ObjectHistory, ObjectSample
 from plant.snapshot.values import State, array_of
 from skills.robot import FloatArray
@@ -53,10 +53,12 @@ class Referee:
         self._counter = CollisionCounter(self._entities.all)
         self._histories = {name: ObjectHistory(name, self._entities.classes[name]) for name in self._entities.objects}
         self._paths: dict[str, list[FloatArray]] = {name: [] for name in robots}
-        self._given: dict[tuple[str, str], float] = {}
+        self._given: dict[tuple[str, str], list[tuple[float, float]]] = {}
         self.contact_points = 0
         self._bases: dict[str, FloatArray] = {}
         self._persons: dict[str, FloatArray] = {}
+        self._person_paths: dict[str, list[FloatArray]] = {name: [] for name in self._entities.persons}
+        self._now_s = 0.0
         self._speeds_m_s: deque[Mapping[str, float]] = deque(maxlen=BEFORE_SAMPLES)
 
     @property
@@ -100,6 +102,9 @@ class Referee:
         self._persons = {name: self._position(plant_context, body) for name, body in self._entities.persons.items()}
         for name, p_WB in self._bases.items():
             _extend(self._paths[name], p_WB, time_s)
+        for name, p_W in self._persons.items():
+            _extend(self._person_paths[name], p_W, time_s)
+        self._now_s = time_s
         neighbours = self._neighbours(pairs)
         for name, body in self._entities.objects.items():
             history, touches = self._histories[name], neighbours.get(int(body.index()), {})
@@ -110,24 +115,25 @@ class Referee:
         self._note_given(time_s)
 
     def judge(self, conditions: Sequence[GoalCondition]) -> Verdict:
-        """Whether all conditions hold now. Raises ValueError before the first sample."""
+        """Whether all conditions hold at their times. Raises ValueError before the first sample."""
         if not self._bases:
             raise ValueError("the referee has not observed anything yet")
         truth = Truth(
+            now_s=self._now_s,
             histories=tuple(self._histories.values()),
-            bases=self._bases,
-            paths={name: self._timed_path(name) for name in self._paths},
-            persons=self._persons,
+            robots={name: TimedPath(self._timed_path(name)) for name in self._paths},
+            persons={name: TimedPath(_timed(path)) for name, path in self._person_paths.items()},
             given=dict(self._given),
         )
         return judge(conditions, truth, bumps=self._counter.collisions)
 
     def state(self) -> State:
-        """The whole record, without the paths."""
+        """The whole record, without the paths; of people, only where they are."""
         return {
             "bumps": self._counter.state(),
             "histories": {name: history.state() for name, history in self._histories.items()},
-            "given": [[*pair, time_s] for pair, time_s in self._given.items()],
+            "given": [[*pair, *stay] for pair, stays in self._given.items() for stay in stays],
+            "now_s": self._now_s,
             "bases": {name: p_W.tolist() for name, p_W in self._bases.items()},
             "persons": {name: p_W.tolist() for name, p_W in self._persons.items()},
         }
@@ -139,15 +145,19 @@ class Referee:
         self._counter.restore(state["bumps"])
         for name, history in self._histories.items():
             history.restore(state["histories"][name])
-        self._given = {(name, person): time_s for name, person, time_s in state["given"]}
+        self._given, self._now_s = {}, state["now_s"]
+        for name, person, *stay in state["given"]:
+            self._given.setdefault((name, person), []).append((stay[0], stay[1]))
         self._bases = {name: array_of(p_W) for name, p_W in state["bases"].items()}
         self._persons = {name: array_of(p_W) for name, p_W in state["persons"].items()}
         self._paths = {name: list(path) for name, path in paths.items()}
+        self._person_paths = {name: [np.append(p_W, self._now_s)] for name, p_W in self._persons.items()}
 
     def forget_past(self) -> None:
         """Another mission is judged by what happens from now on."""
         self._counter.collisions, self._given = [], {}
         self._paths = {name: [] for name in self._paths}
+        self._person_paths = {name: [] for name in self._person_paths}
         for history in self._histories.values():
             history.forget_past()
 
@@ -160,7 +170,7 @@ class Referee:
         return self._paths[robot]
 
     def _timed_path(self, robot: str) -> FloatArray:
-        return np.array(self._paths[robot], dtype=np.float64).reshape(-1, PATH_VALUES)
+        return _timed(self._paths[robot])
 
     def _speeds_before(self) -> dict[str, float]:
         """The least speed of each robot just before now: a push that began unnoticed does not count as its own."""
@@ -213,10 +223,17 @@ class Referee:
         return self._plant.EvalBodyPoseInWorld(plant_context, self._entities.hands[robot])
 
     def _note_given(self, time_s: float) -> None:
-        """Remember which object came to rest on whose tray, and when it last did."""
+        """Remember which object rests on whose tray, and in which times."""
         for history in self._histories.values():
             if history.on_tray_of is not None:
-                self._given[history.name, history.on_tray_of] = time_s
+                stays = self._given.setdefault((history.name, history.on_tray_of), [])
+                goes_on = bool(stays) and time_s - stays[-1][1] <= ON_TRAY_GAP_S
+                first_s = stays.pop()[0] if goes_on else time_s
+                stays.append((first_s, time_s))
+
+
+def _timed(path: Sequence[FloatArray]) -> FloatArray:
+    return np.array(path, dtype=np.float64).reshape(-1, PATH_VALUES)
 
 
 def _extend(path: list[FloatArray], p_W: FloatArray, time_s: float) -> None:

@@ -12,7 +12,7 @@ from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, Multibod
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.referee import GoalCondition, GoalKind, Referee, Region
+from plant.referee import GoalCondition, GoalKind, Referee, Region, When
 from plant.referee.entities import Kind
 from plant.spot.kind import SPOT
 
@@ -133,7 +133,7 @@ class Stage:
         return self.referee.judge(conditions).success
 
 
-GRASPED = GoalCondition(GoalKind.GRASPED, ("coke", "beer"), source=(TABLE,))
+GRASPED = GoalCondition(GoalKind.GRASPED, ("coke", "beer"), source=(TABLE,), when=When.SOME_TIME)
 HANDED = GoalCondition(GoalKind.HANDED_OVER, ("coke",), person="robin")
 PLACED = GoalCondition(GoalKind.PLACED, ("coke",), goal=(SHELF,))
 AT_ROBIN = (0.0, 2.4, 0.9)
@@ -233,9 +233,10 @@ def test_what_turns_over_on_the_tray_is_no_drop_but_what_falls_off_it_is():
 
 def test_taken_from_the_tray_again_it_was_handed_over():
     stage = given().watch()
+    given_s = stage.time
     stage.hold("coke", np.add(ON_TRAY, (0, 0, 0.2))).watch()
     assert not stage.holds(HANDED)
-    passing = stage.referee.judge([dataclasses.replace(HANDED, passing=True)])
+    passing = stage.referee.judge([dataclasses.replace(HANDED, when=When.END_OF_STEP, ended_s=given_s)])
     assert passing.success
     assert "The coke was put on robin's tray." in passing.why
 
@@ -300,11 +301,69 @@ def test_placed_on_the_wrong_surface_is_said():
     assert "not resting on the table" in verdict.why
 
 
-def test_placed_earlier_and_then_taken_again_still_counts_in_a_sequence():
-    stage = placed_stage().let_go().watch().lift("coke", ON_SHELF)
-    again = GoalCondition(GoalKind.GRASPED, ("coke",), source=(SHELF,))
-    assert stage.holds(PLACED, again)
-    assert not stage.holds(PLACED)
+def put_then(stage, *taken_s):
+    """That the coke was put on the shelf until now, from where later steps take it again in such times."""
+    return dataclasses.replace(PLACED, ended_s=stage.time, taken_s=taken_s)
+
+
+def test_an_object_must_stay_where_it_was_put_until_a_later_step_takes_it():
+    stage = placed_stage().let_go().watch()
+    put = put_then(stage)
+    assert stage.holds(put)
+    taken = dataclasses.replace(put, taken_s=((stage.time, stage.time + 9.0),))
+    stage.watch(2.0).lift("coke", ON_SHELF)
+    assert not stage.holds(put)
+    assert stage.holds(taken)
+    assert stage.holds(dataclasses.replace(put, when=When.END_OF_STEP))
+
+
+def test_an_object_that_falls_after_its_step_is_missed_though_a_later_step_might_have_taken_it():
+    stage = placed_stage().let_go().watch()
+    put = put_then(stage, (stage.time, stage.time + 9.0))
+    stage.watch(2.0).fall("coke", ON_SHELF, (-1.5, 0.6, HALF - TOUCH))
+    assert not stage.holds(put)
+    assert stage.holds(dataclasses.replace(put, when=When.END_OF_STEP))
+
+
+def test_an_object_that_was_put_there_only_after_its_step_was_not_put_by_it():
+    stage = Stage().lift()
+    late = put_then(stage)
+    stage.watch(2.0).carry("coke", np.add(ON_TABLE, (0, 0, 0.3)), ON_SHELF).let_go().watch()
+    assert stage.holds(PLACED)
+    assert not stage.holds(late)
+
+
+def test_what_one_round_put_there_does_not_count_for_the_next():
+    stage = placed_stage().let_go().watch()
+    first = put_then(stage)
+    second = dataclasses.replace(PLACED, began_s=stage.time, ended_s=stage.time + 2.0)
+    stage.watch(3.0)
+    assert stage.holds(first)
+    assert not stage.holds(second)
+
+
+def test_an_object_that_comes_to_rest_just_after_its_step_was_put_by_it():
+    stage = placed_stage().let_go()
+    put = put_then(stage)
+    assert stage.watch().holds(put)
+
+
+def test_a_grasped_object_must_be_held_at_the_end_of_its_step():
+    stage = Stage().lift()
+    held = dataclasses.replace(GRASPED, when=When.END_OF_STEP, ended_s=stage.time)
+    stage.let_go().fall("coke", np.add(ON_TABLE, (0, 0, 0.3)), ON_TABLE).watch(2.0)
+    assert stage.holds(held)
+    assert not stage.holds(dataclasses.replace(held, ended_s=stage.time))
+    assert not stage.holds(dataclasses.replace(held, when=When.END_OF_MISSION))
+
+
+def test_what_is_always_held_was_let_go_at_no_time():
+    stage = Stage().lift().watch(2.0)
+    always = GoalCondition(GoalKind.GRASPED, when=When.ALWAYS, began_s=1.5, ended_s=stage.time)
+    assert stage.holds(always)
+    stage.let_go().fall("coke", np.add(ON_TABLE, (0, 0, 0.3)), ON_TABLE).lift()
+    assert stage.holds(always)
+    assert not stage.holds(dataclasses.replace(always, ended_s=stage.time))
 
 
 def moved(stage, name, p_WO):
@@ -325,10 +384,11 @@ def test_what_somebody_else_moves_down_is_neither_a_drop_nor_a_knock():
 
 
 def test_what_the_robot_placed_stays_placed_when_somebody_takes_it_away_later():
-    stage = moved(placed_stage().let_go().watch(), "coke", ON_TABLE)
-    again = GoalCondition(GoalKind.GRASPED, ("coke",), source=(TABLE,))
-    assert not stage.holds(PLACED)
-    assert stage.lift("coke", ON_TABLE).holds(PLACED, again)
+    stage = placed_stage().let_go().watch()
+    put = put_then(stage, (stage.time, stage.time + 9.0))
+    moved(stage.watch(2.0), "coke", ON_TABLE)
+    assert not stage.holds(put)
+    assert stage.lift("coke", ON_TABLE).holds(put)
 
 
 def test_slipping_out_of_the_gripper_is_one_drop():
@@ -433,7 +493,10 @@ def test_went_is_judged_where_the_body_is_at_the_end():
     stage.put("body", (2.0, -3.0, 0.5)).watch()
     assert stage.holds(to_kitchen)
     assert not stage.holds(to_hall)
-    assert stage.holds(to_hall, to_kitchen)
+    assert stage.holds(dataclasses.replace(to_hall, when=When.END_OF_STEP, ended_s=0.4), to_kitchen)
+    assert not stage.holds(dataclasses.replace(to_kitchen, when=When.END_OF_STEP, ended_s=0.4))
+    assert stage.holds(dataclasses.replace(to_kitchen, when=When.SOME_TIME))
+    assert not stage.holds(dataclasses.replace(to_kitchen, when=When.ALWAYS))
     assert "(2.00, -3.00), not at the hall" in stage.referee.judge([to_hall]).why
 
 
@@ -445,9 +508,10 @@ def test_going_to_a_person_is_judged_by_the_distance_to_them(place, now):
     stage.put("body", place).watch()
     assert stage.holds(to_robin) is now
     assert not stage.holds(dataclasses.replace(to_robin, person="eve"))
+    then_s = stage.time - 0.1
     stage.put("body", (-4.0, -4.0, 0.5)).watch()
-    away = GoalCondition(GoalKind.WENT, goal=(square("far", -4.0, -4.0),), robot="alice")
-    assert stage.holds(to_robin, away) is now
+    assert stage.holds(dataclasses.replace(to_robin, when=When.END_OF_STEP, ended_s=then_s)) is now
+    assert not stage.holds(to_robin)
 
 
 @pytest.mark.parametrize(("answer", "true_of"), [(True, TABLE), (False, SHELF)])
@@ -581,7 +645,7 @@ def test_a_second_mission_is_not_fulfilled_by_what_the_first_handed_over_or_was_
     second = since_now(stage, HANDED)
     assert stage.holds(HANDED)
     assert not stage.holds(*second)
-    there = GoalCondition(GoalKind.WENT, goal=(square("the gate", 0.0, 0.0),), passing=True)
+    there = GoalCondition(GoalKind.WENT, goal=(square("the gate", 0.0, 0.0),), when=When.SOME_TIME)
     stage.put("body", (0, 0, 0.6)).watch(0.1).put("body", (-3, -3, 0.6)).watch(0.1)
     assert stage.holds(there)
     assert not stage.holds(*since_now(stage, there))
@@ -589,7 +653,7 @@ def test_a_second_mission_is_not_fulfilled_by_what_the_first_handed_over_or_was_
 
 def test_where_the_robot_stood_when_its_mission_began_counts_as_passed():
     stage = Stage().put("body", (0, 0, 0.6)).watch(1.0)
-    there = GoalCondition(GoalKind.WENT, goal=(square("the gate", 0.0, 0.0),), passing=True)
+    there = GoalCondition(GoalKind.WENT, goal=(square("the gate", 0.0, 0.0),), when=When.SOME_TIME)
     began = since_now(stage, there)
     stage.put("body", (-3, -3, 0.6)).watch(0.1)
     assert stage.holds(*began)

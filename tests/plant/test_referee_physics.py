@@ -11,12 +11,12 @@ from pydrake.multibody.tree import PdControllerGains, PrismaticJoint, SpatialIne
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.referee import GoalCondition, GoalKind, Referee, Region
+from plant.referee import GoalCondition, GoalKind, Referee, Region, When
 from plant.spot.kind import SPOT
 
 FRICTION = CoulombFriction(0.9, 0.9)
 TABLE = Region("the table", ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)), 0.7, 1.0)
-GRASPED = GoalCondition(GoalKind.GRASPED, ("coke",), source=(TABLE,))
+GRASPED = GoalCondition(GoalKind.GRASPED, ("coke",), source=(TABLE,), when=When.SOME_TIME)
 ON_TABLE = GoalCondition(GoalKind.ANSWERED, ("coke",), source=(TABLE,), answer=True)
 
 

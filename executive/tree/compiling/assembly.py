@@ -9,7 +9,16 @@ from typing import Any, Final
 from executive.mission.command import START, Command, Task
 from executive.mission.expression import kind_of, literal
 from executive.mission.file.model import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
-from executive.mission.goal import GoalCondition, clearing_goals, command_goal, drive_goal
+from executive.mission.goal import (
+    GoalCondition,
+    When,
+    clearing_goals,
+    command_goal,
+    drive_goal,
+    given_goal,
+    lifted_goal,
+    put_goal,
+)
 from executive.mission.gripper import UNNAMED, after_command, is_same
 from executive.mission.knowledge import Knowledge, Pose
 from executive.tree.behaviours.board import Constant
@@ -33,13 +42,12 @@ from executive.tree.compiling.skill_steps import skill_plan
 from executive.tree.compiling.steps import step_plan
 from executive.tree.compiling.trips import are_trips, refuse_several, trips_plan
 from executive.tree.node import NodeSpec
-from skills.api import Skill
+from skills.api import Skill, Surface
 from skills.files.errors import InputError, Problems, SourceLine, listing
 from skills.robot import Pose2D
 
 __all__ = ["Assembled", "StepPart", "assemble", "step_name"]
 
-NAVIGATE: Final = "navigate"
 NO_POLICY: Final = StepPolicy()
 _SKIPPING: Final = frozenset({"skip", "ask"})
 _ANSWERS: Final[Mapping[str, tuple[str, type]]] = {"answer": ("key", bool), "count": ("count_key", float)}
@@ -166,13 +174,14 @@ class _Assembler:
             node, goals = clear_plan(builder, bring), clearing_goals(get, bring, self.knowledge)
         else:
             node = trips_plan(builder, bring)
-            goals = (command_goal(get, self.knowledge), command_goal(bring, self.knowledge))
+            got = command_goal(get, self.knowledge)
+            goals = (None if got is None else replace(got, when=When.SOME_TIME), command_goal(bring, self.knowledge))
         held, opening = self.flow.held, self.flow.opening
         self.flow.held, self.flow.opening = None, False
-        got = after_command(get, held, self.knowledge)
+        between = after_command(get, held, self.knowledge)
         parts = (
             StepPart(node.path_id, get, goal=goals[0], held=held, opening=opening),
-            StepPart(node.path_id, bring, goal=goals[1], held=got, opening=False),
+            StepPart(node.path_id, bring, goal=goals[1], held=between, opening=False),
         )
         return Assembled((node,), parts)
 
@@ -215,10 +224,24 @@ class _Assembler:
             gives_to=lambda name, key, kind: give(self, name, key, kind, builder),
         )
         skill: type[Skill[Any]] = leaf.options["skill"]
-        part = StepPart(path_id, skill=skill, goal=_drive_goal(leaf), held=flow.held, opening=flow.opening)
+        part = StepPart(path_id, skill=skill, goal=self._skill_goal(leaf), held=flow.held, opening=flow.opening)
         flow.held = {None: flow.held, True: UNNAMED, False: None}[skill.gripper_after]
         flow.opening = flow.opening and skill.gripper_after is None
         return Assembled((leaf,), (part,))
+
+    def _skill_goal(self, leaf: NodeSpec) -> GoalCondition | None:
+        """What a skill on its own is to bring about; None: nothing that a referee can see, or not known before."""
+        inputs = {port: each.value for port, each in leaf.options["inputs"].items() if isinstance(each, Constant)}
+        match leaf.name:
+            case "navigate" if isinstance(pose := inputs.get("goal"), Pose2D):
+                return drive_goal(Pose(x=pose.x_m, y=pose.y_m, yaw=pose.yaw_rad))
+            case "grasp":
+                return lifted_goal()
+            case "place" if isinstance(surface := inputs.get("surface"), Surface):
+                return put_goal(self.knowledge, surface.name) if surface.name in self.knowledge.surfaces else None
+            case "hand_over":
+                return given_goal(self.knowledge.person(str(inputs.get("person", ""))))
+        return None
 
     def _giving(self, step: MissionStep, command: Command, node: NodeSpec, builder: PlanBuilder) -> NodeSpec:
         """The subtree of a status check whose answer later steps read. Raises InputError: it gives no such thing."""
@@ -308,14 +331,6 @@ def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
         return ()
     name = knowledge.thing(command.object.name) or command.object.name
     return surfaces_elsewhere(knowledge, name, builder.place(command.goal), builder.avoided)
-
-
-def _drive_goal(leaf: NodeSpec) -> GoalCondition | None:
-    """Where a drive on its own is to lead."""
-    pose = leaf.options["inputs"].get("goal")
-    if leaf.name != NAVIGATE or not isinstance(pose, Constant) or not isinstance(pose.value, Pose2D):
-        return None
-    return drive_goal(Pose(x=pose.value.x_m, y=pose.value.y_m, yaw=pose.value.yaw_rad))
 
 
 def _under(body: Assembled, policy: StepPolicy, frame: PolicyFrame) -> Assembled:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any, Final, Protocol
 
 from executive.mission.command import Command, Task
-from executive.mission.condition import READINGS, Condition, Look, ValueIs, parts_of
+from executive.mission.condition import READINGS, AllOf, Condition, Look, ValueIs, parts_of
 from executive.mission.expression import Expression, Kind, Template, Value, kind_of
 from executive.mission.file.blocks import (
     Ask,
@@ -25,7 +25,7 @@ from executive.mission.file.blocks import (
     Wait,
 )
 from executive.mission.file.model import MissionStep, StepPolicy
-from executive.mission.goal import command_goal
+from executive.mission.goal import command_goal, held_goal
 from executive.mission.gripper import UNSURE, InGripper
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.decisions import MustHold, MustNotBegin
@@ -139,12 +139,24 @@ def framed(assembler: Assembler, body: Assembled, group: Group, builder: PlanBui
         decision = instant_decision(group.holds, builder.at("while"), before.names)
         condition = MustHold(decision, str(group.holds))
         node = builder.node("guard", f"while {group.holds}", node, part="while", condition=condition)
+        if _is_holding(group.holds):
+            parts = (StepPart(node.path_id, goal=held_goal()), *parts)
     if group.always:
         assembler.flow.join([before.copy(), assembler.flow.copy()])
         last = _row(assembler, group.always, builder.at("always"), "in the end")
         parts += last.parts
         node = builder.node("always", "in the end, whatever happens", node, *last.nodes, part="whatever-happens")
     return Assembled((node,), parts)
+
+
+def _is_holding(condition: Condition) -> bool:
+    """Whether a condition says that the gripper holds something, alone or together with others."""
+    match condition:
+        case ValueIs(expression):
+            return expression.text.strip() == "holding"
+        case AllOf(parts):
+            return any(map(_is_holding, parts))
+    return False
 
 
 def set_plan(

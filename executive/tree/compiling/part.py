@@ -19,8 +19,8 @@ class StepPart:
     """A part of a mission with something to show for it: a command, or a skill on its own.
 
     `path_id` is that of its subtree, `node` that of its outermost node where it is another; `skill` the skill on its
-    own, `goal` what is to be so when it is done; of skills on their own only a drive to a fixed pose has one. `held` is
-    what the gripper holds before it; with `opening`, that is what it held when the mission began.
+    own, `goal` what it must bring about (None: nothing that a referee can see). `held` is what the gripper holds before
+    it; with `opening`, that is what it held when the mission began.
     """
 
     path_id: str

@@ -1,13 +1,17 @@
 """The goal conditions of missions, and what the referee is told of them."""
 
+import dataclasses
+
 import pytest
 
 from executive.cli.goal_conditions import condition_of, conditions_of, verdict_of
 from executive.mission.command import parse_command
+from executive.mission.expression import Template
+from executive.mission.file import blocks
 from executive.mission.file.model import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from executive.mission.goal import command_goal
 from executive.tree.compiler import compile_mission
-from plant.referee import GoalKind, Verdict
+from plant.referee import GoalKind, Verdict, When
 from skills.speak.skill import Speak
 
 
@@ -147,22 +151,23 @@ VERDICTS = [
     ((step(GO, StepPolicy()),), True, True),
     ((step(GO, StepPolicy()),), False, False),
     ((STOW,), True, None),
-    ((step(GO, StepPolicy()), STOW), True, None),
+    ((step(GO, StepPolicy()), STOW), True, True),
     ((step(GO, StepPolicy()), STOW), False, False),
 ]
 
 
 @pytest.mark.parametrize(("steps", "holds", "success"), VERDICTS)
-def test_a_mission_with_a_step_without_condition_is_not_judged(verdict_on, steps, holds, success):
+def test_what_can_be_judged_decides_and_a_mission_of_nothing_else_is_not_judged(verdict_on, steps, holds, success):
     assert verdict_on(*steps, holds=holds).success is success
 
 
 def test_a_step_without_condition_is_named(verdict_on):
-    assert "stow" in verdict_on(STOW).why
+    assert "No goal condition stands for stow" in verdict_on(STOW).why
+    assert "Not judged: stow." in verdict_on(step(GO, StepPolicy()), STOW).why
 
 
-def test_what_stands_before_a_step_without_condition_may_be_undone_by_it(conditions_by):
-    assert [one.passing for one in conditions_by(step(GO), STOW, step(GO))] == [True, False]
+def test_where_the_robot_went_must_hold_until_it_drives_again(conditions_by):
+    assert [one.when for one in conditions_by(step(GO), step(GO))] == [When.END_OF_STEP, When.END_OF_MISSION]
 
 
 def test_a_mission_that_failed_is_never_fulfilled(verdict_on, script):
@@ -172,14 +177,39 @@ def test_a_mission_that_failed_is_never_fulfilled(verdict_on, script):
     assert "failure" in verdict.why
 
 
-def test_what_is_said_needs_no_goal_condition(knowledge, registry, run_tree):
-    """A drive with a sentence before and after it is judged as the drive alone."""
-    spoken = MissionStep(skill=SkillCall("speak", {"text": "Hello"}))
-    there = MissionStep((parse_command("Take [Nothing] to [hall] and do [Nothing] to [Nothing]"),))
-    mission = Mission("tell", "flat", "Alice", (spoken, there, spoken))
-    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": Speak})
-    result = run_tree(tree).worst
-    asked = []
-    verdict = verdict_of(tree, result, lambda given: asked.extend(given) or Verdict(True, "there", 0, 0))
+@pytest.fixture
+def spoken(knowledge, registry, run_tree):
+    """The verdict on steps that say something, with the real skill; `forgets`: what was said is not on record."""
+
+    def after_running(*steps, forgets=False):
+        tree = compile_mission(
+            Mission("tell", "flat", "Alice", steps), knowledge=knowledge, registry={**registry, "speak": Speak}
+        )
+        result = run_tree(tree).worst
+        asked = []
+
+        def judge(given):
+            asked.extend(given)
+            return Verdict(True if given else None, "", 0, 0)
+
+        verdict = verdict_of(tree, dataclasses.replace(result, said=()) if forgets else result, judge)
+        return verdict, asked
+
+    return after_running
+
+
+HELLO = MissionStep(skill=SkillCall("speak", {"text": "Hello"}))
+
+
+def test_what_is_said_does_not_keep_the_robot_from_staying_where_it_went(spoken):
+    verdict, asked = spoken(HELLO, step(GO, StepPolicy()), HELLO)
     assert verdict.success is True
-    assert [(one.kind, one.passing) for one in asked] == [(GoalKind.WENT, False)]
+    assert [(one.kind, one.when) for one in asked] == [(GoalKind.WENT, When.END_OF_MISSION)]
+
+
+@pytest.mark.parametrize("block", [HELLO, MissionStep(block=blocks.Speak(Template("Hello")))])
+def test_a_mission_that_only_speaks_is_judged_by_what_was_said(spoken, block):
+    verdict, _ = spoken(MissionStep(block=blocks.Repeat((block,), 2)))
+    assert (verdict.success, verdict.why) == (True, 'It said "Hello".')
+    verdict, _ = spoken(MissionStep(block=blocks.Repeat((block,), 2)), forgets=True)
+    assert (verdict.success, verdict.why) == (False, 'It did not say "Hello".')

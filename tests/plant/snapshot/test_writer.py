@@ -1,6 +1,5 @@
 """What a snapshot writer writes: no more in the second hour than in the first minute."""
 
-
 import numpy as np
 import pytest
 

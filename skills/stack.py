@@ -208,9 +208,9 @@ def default_stack() -> RobotStack:
 
 @cache
 def _default_data() -> dict[str, Any]:
-    import yaml
+    from skills.files.yaml_source import read_yaml
 
-    data: dict[str, Any] = yaml.load(DEFAULT_FILE.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader)
+    data: dict[str, Any] = read_yaml(DEFAULT_FILE).data
     return data
 
 

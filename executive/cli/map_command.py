@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
-import yaml
 
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.signals import cancelled_by_signals
 from executive.cli.worlds import open_world
 from executive.run.control import Control
 from skills.files.errors import InputError
+from skills.files.outside import read_text
+from skills.files.yaml_source import read_yaml
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -235,21 +236,18 @@ def _mapper(world: World, out: Path) -> Mapper:
 
 
 def _route_points(path: Path) -> list[tuple[float, float]]:
-    """The points of a route. Raises InputError."""
+    """The points of a route: a YAML list of pairs, or a pair in each line. Raises InputError."""
+    text = read_text(path)
     try:
-        text = path.read_text(encoding="utf-8")
-        told = yaml.safe_load(text)
-        rows = (
-            told
-            if isinstance(told, list)
-            else [line.split("#")[0].replace(",", " ").split() for line in text.splitlines()]
-        )
-        points = [(float(x), float(y)) for x, y in (row for row in rows if row)]
+        told = read_yaml(path).data
+    except InputError:
+        told = None
+    try:
+        lines = (line.split("#")[0].replace(",", " ").split() for line in text.splitlines())
+        points = [(float(x), float(y)) for x, y in (row for row in (told if isinstance(told, list) else lines) if row)]
         if not 0 < len(points) <= MOST_POINTS or not all(math.isfinite(x + y) for x, y in points):
             raise ValueError
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", hint="check the path", file=path) from error
-    except (yaml.YAMLError, ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         hint = f"write x and y in metres from the start, one point in a line, at most {MOST_POINTS}"
         raise InputError("it is no route", hint=hint, file=path) from error
     return points

@@ -9,9 +9,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
-import yaml
-
 from skills.files.errors import InputError
+from skills.files.yaml_source import read_yaml
 
 __all__ = ["refuse_unaddressed"]
 
@@ -30,7 +29,7 @@ def refuse_unaddressed(arguments: Sequence[str]) -> None:
     try:
         asked, _ = options.parse_known_args(arguments)
         robot = _robot_of(asked.world)
-    except (ValueError, OSError, yaml.YAMLError):
+    except (ValueError, InputError):
         return
     if asked.robots is not None:
         return
@@ -54,6 +53,6 @@ def _robot_of(world: str) -> dict[str, Any]:
     worlds = find_spec("plant.worlds")
     folders = [Path(world), *(Path(each) / world for each in (worlds and worlds.submodule_search_locations) or ())]
     file = next(file for folder in folders if (file := folder / "knowledge.yaml").is_file() or folder is folders[-1])
-    knowledge = yaml.load(file.read_text(encoding="utf-8"), yaml.CSafeLoader)
+    knowledge = read_yaml(file).data
     robot = knowledge.get("robot") if isinstance(knowledge, dict) and "robots" not in knowledge else None
     return robot if isinstance(robot, dict) else {}

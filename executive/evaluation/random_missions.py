@@ -9,18 +9,15 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-import yaml
-
 from executive.evaluation.runs import Evaluation, RunSpec
 from executive.mission.knowledge import Knowledge
 from skills.detect.words import plural
 from skills.files.errors import InputError
+from skills.files.yaml_source import read_yaml
 
 __all__ = ["KINDS", "KnownWorld", "random_evaluation", "random_sentence"]
 
-_TABLE: Final[Mapping[str, Mapping[str, Any]]] = yaml.safe_load(
-    Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
-)
+_TABLE: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(Path(__file__).with_suffix(".yaml")).data
 KINDS: Final[Mapping[str, tuple[str, ...]]] = {kind: tuple(about["sentences"]) for kind, about in _TABLE.items()}
 """The sentences of each kind of mission, with slots for what the world has."""
 TURNS: Final = tuple(kind for kind, about in _TABLE.items() for _ in range(about["turns"]))

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-import yaml
+from skills.files.yaml_source import read_yaml
 
 TREE: Final = "tree"
 TRANSITIONS: Final = "transitions"
@@ -52,7 +52,7 @@ class Schema:
 @cache
 def schemas() -> Mapping[str, Schema]:
     """The schemas by topic."""
-    data = yaml.load(Path(__file__).with_name("schemas.yaml").read_text(encoding="utf-8"), yaml.CSafeLoader)
+    data = dict(read_yaml(Path(__file__).with_name("schemas.yaml")).data)
     types = data.pop("types")
     return MappingProxyType({topic: _schema(types, **entry) for topic, entry in data.items()})
 

@@ -13,6 +13,7 @@ import numpy as np
 import yaml
 
 from executive.mission.knowledge import Knowledge
+from skills.files.yaml_source import read_yaml
 from skills.testing.blocks import ROOM, Block, grid_of
 
 _FLOOR = Block(-2.1, -2.6, 4.1, 2.6, -0.1, 0.0, (150, 140, 130))
@@ -47,8 +48,7 @@ def _write_yaml(path: Path, data: Mapping[str, Any]) -> None:
 @cache
 def _facts() -> dict[str, Any]:
     """What is written down of the room: knowledge and objects."""
-    text = Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
-    facts: dict[str, Any] = yaml.safe_load(text)
+    facts: dict[str, Any] = read_yaml(Path(__file__).with_suffix(".yaml")).data
     return facts
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field
+
+from skills.files.yaml_source import read_yaml
 
 MODELS_FOLDER = Path(__file__).resolve().parent
 
@@ -36,5 +37,5 @@ class ModelClass(BaseModel):
 
 def load_catalogue() -> dict[str, ModelClass]:
     """All classes by name."""
-    text = (MODELS_FOLDER / "catalogue.yaml").read_text(encoding="utf-8")
-    return {name: ModelClass.model_validate(entry) for name, entry in yaml.load(text, Loader=yaml.CSafeLoader).items()}
+    entries = read_yaml(MODELS_FOLDER / "catalogue.yaml").data
+    return {name: ModelClass.model_validate(entry) for name, entry in entries.items()}

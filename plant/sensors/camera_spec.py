@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from skills.files.yaml_source import YamlSource, read_yaml
 from skills.robot import Intrinsics
 
 if TYPE_CHECKING:
@@ -79,29 +79,23 @@ class CameraSpec(BaseModel):
 
 
 def load_cameras(path: Path) -> dict[str, CameraSpec]:
-    """Camera specs by name, in the file's order. Raises ValueError that names file, line, camera and field."""
-    text = path.read_text(encoding="utf-8")
-    try:
-        tree = yaml.compose(text, Loader=yaml.CSafeLoader)
-        entries = yaml.load(text, Loader=yaml.CSafeLoader)
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise ValueError(f"{path}:{line}: not valid YAML: {error.problem}") from error
-    if not isinstance(entries, dict) or tree is None:
-        raise ValueError(f"{path}:1: must be a mapping from camera names to their data")
-    places = {key.value: f"{path}:{key.start_mark.line + 1}" for key, _ in tree.value}
-    return {name: _spec(places[name], name, entry) for name, entry in entries.items()}
+    """Camera specs by name, in the file's order. Raises InputError with file, line, camera and field."""
+    source = read_yaml(path)
+    if not isinstance(source.data, dict):
+        raise source.error((), "it holds no mapping from camera names to their data", "see plant/models/spot")
+    return {name: _spec(source, name, entry) for name, entry in source.data.items()}
 
 
-def _spec(place: str, name: str, entry: object) -> CameraSpec:
-    """One camera's data, read at a place "file:line"."""
+def _spec(source: YamlSource, name: str, entry: object) -> CameraSpec:
+    """The data of one camera."""
     if not isinstance(entry, dict):
-        raise ValueError(f"{place}: camera {name}: must be a mapping")
+        raise source.error((name,), f"camera {name}: should be a mapping of keys to values", "correct it")
     try:
         return CameraSpec(name=name, **entry)
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise ValueError(f"{place}: camera {name}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+    except (ValidationError, TypeError) as error:
+        first = error.errors()[0] if isinstance(error, ValidationError) else {"loc": (), "msg": "its keys are no words"}
+        where = ".".join(map(str, first["loc"]))
+        raise source.error((name, *first["loc"]), f"camera {name}: {where}: {first['msg']}", "correct it") from error
 
 
 def colour_render_camera(

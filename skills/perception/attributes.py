@@ -10,10 +10,10 @@ from typing import Final
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
+from skills.files.yaml_source import read_yaml
 from skills.perception.class_forms import class_forms
 from skills.perception.detection_3d import Detection3D
 
@@ -52,8 +52,8 @@ class ColourRange(BaseModel):
 @lru_cache(maxsize=1)
 def colour_words() -> Mapping[str, ColourRange]:
     """The colour words. Raises pydantic.ValidationError when the file beside this module is malformed."""
-    text = Path(__file__).with_name("colour_words.yaml").read_text(encoding="utf-8")
-    return TypeAdapter(dict[str, ColourRange]).validate_python(yaml.safe_load(text)["attributes"])
+    words = read_yaml(Path(__file__).with_name("colour_words.yaml")).data["attributes"]
+    return TypeAdapter(dict[str, ColourRange]).validate_python(words)
 
 
 def known_attributes() -> frozenset[str]:

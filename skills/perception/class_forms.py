@@ -8,8 +8,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, TypeAdapter
+
+from skills.files.yaml_source import read_yaml
 
 PERSON: Final = "person"
 """The class of people."""
@@ -49,5 +50,5 @@ class ClassForm(BaseModel):
 @lru_cache(maxsize=1)
 def class_forms() -> Mapping[str, ClassForm]:
     """The classes by name. Raises pydantic.ValidationError when the file beside this module is malformed."""
-    text = Path(__file__).with_name("class_forms.yaml").read_text(encoding="utf-8")
-    return MappingProxyType(TypeAdapter(dict[str, ClassForm]).validate_python(yaml.safe_load(text)))
+    forms = read_yaml(Path(__file__).with_name("class_forms.yaml")).data
+    return MappingProxyType(TypeAdapter(dict[str, ClassForm]).validate_python(forms))

@@ -6,12 +6,11 @@ import random
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
+from pathlib import Path
 from typing import Final
 
-import yaml
-
 from executive.speech.vocabulary import Vocabulary
+from skills.files.yaml_source import read_yaml
 
 __all__ = ["Grammar", "TrainingSentence", "load_grammar"]
 
@@ -103,8 +102,7 @@ class Grammar:
 
 def load_grammar(*, validation: bool = False) -> Grammar:
     """The grammar of `words.yaml` and `forms.yaml`; those for validation have other words."""
-    folder = resources.files(__package__)
-    words, forms = (yaml.safe_load((folder / name).read_text(encoding="utf-8")) for name in _FILES)
+    words, forms = (read_yaml(Path(__file__).with_name(name)).data for name in _FILES)
     return Grammar({kind: tuple(_kept(words[kind], validation=validation)) for kind in _KINDS}, forms)
 
 

@@ -10,15 +10,13 @@ from typing import Any, Final
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import ArrayLike
 
 from plant.models.builder.mesh import Colour
+from skills.files.yaml_source import read_yaml
 from skills.robot import FloatArray
 
-_DECORATION: Final[Mapping[str, Any]] = yaml.load(
-    Path(__file__).with_name("decoration.yaml").read_text(encoding="utf-8"), Loader=yaml.CSafeLoader
-)
+_DECORATION: Final[Mapping[str, Any]] = read_yaml(Path(__file__).with_name("decoration.yaml")).data
 COLOURS: Final[Mapping[str, Colour]] = {name: tuple(rgb) for name, rgb in _DECORATION["colours"].items()}
 GREYS: Final[tuple[Colour, ...]] = tuple(tuple(rgb) for rgb in _DECORATION["greys"])
 

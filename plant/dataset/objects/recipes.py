@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import yaml
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
@@ -31,6 +30,7 @@ from plant.models.builder.surfaces import (
     add_rounded_box,
     add_tube,
 )
+from skills.files.yaml_source import read_yaml
 from skills.robot import FloatArray
 
 _FOLDER: Final = Path(__file__).resolve().parent
@@ -113,7 +113,7 @@ class Recipe(BaseModel):
 @cache
 def load_recipes(name: str) -> Mapping[str, Recipe]:
     """The recipes of a file beside this module, by category. Keys with an underscore hold what several share."""
-    table: dict[str, Any] = yaml.load((_FOLDER / f"{name}.yaml").read_text(encoding="utf-8"), yaml.CSafeLoader)
+    table: dict[str, Any] = read_yaml(_FOLDER / f"{name}.yaml").data
     return {key: Recipe.model_validate(value) for key, value in table.items() if not key.startswith("_")}
 
 

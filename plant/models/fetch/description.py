@@ -10,9 +10,9 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-import yaml
 
 from plant.models import urdf
+from skills.files.yaml_source import read_yaml
 
 FACTS = Path(__file__).with_name("fetch.yaml")
 BASE_LINK, BODY_LINK, CASTERS_LINK, HAND_LINK, HEAD_LINK = "base_link", "body", "casters", "wrist_roll", "head_tilt"
@@ -25,7 +25,7 @@ HEAD_JOINTS = ("head_pan", "head_tilt")
 @cache
 def fetch_facts() -> Mapping[str, Any]:
     """The facts in `fetch.yaml`."""
-    facts: Mapping[str, Any] = yaml.load(FACTS.read_text(), Loader=yaml.CSafeLoader)
+    facts: Mapping[str, Any] = read_yaml(FACTS).data
     return facts
 
 

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import yaml
-
 from plant.models import urdf
+from skills.files.yaml_source import read_yaml
 
 FACTS = Path(__file__).with_name("spot.yaml")
 CAMERAS = Path(__file__).with_name("cameras.yaml")
@@ -27,7 +26,7 @@ _MESH_PREFIX = {"fl": "front_left", "fr": "front_right", "hl": "rear_left", "hr"
 @cache
 def spot_facts() -> Mapping[str, Any]:
     """The facts in `spot.yaml`."""
-    facts: Mapping[str, Any] = yaml.load(FACTS.read_text(), Loader=yaml.CSafeLoader)
+    facts: Mapping[str, Any] = read_yaml(FACTS).data
     return facts
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from plant.models.builder.expressions import evaluate
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.shapes import Box, Cylinder, Shape
+from skills.files.yaml_source import read_yaml
 
 Names = dict[str, Any]
 """Numbers, and names of materials."""
@@ -23,8 +23,7 @@ Faces = Mapping[str, str | None]
 
 @cache
 def _pieces() -> Mapping[str, Any]:
-    text = Path(__file__).with_name("furniture.yaml").read_text(encoding="utf-8")
-    table: Mapping[str, Any] = yaml.load(text, Loader=yaml.CSafeLoader)
+    table: Mapping[str, Any] = read_yaml(Path(__file__).with_name("furniture.yaml")).data
     return table
 
 

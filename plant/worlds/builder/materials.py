@@ -7,11 +7,11 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import yaml
 from pydantic import TypeAdapter
 
 from plant.models.builder.mesh import Material
 from plant.models.builder.pictures import cloth, noise, speckle, to_picture, wood
+from skills.files.yaml_source import read_yaml
 from skills.robot import FloatArray, Picture
 
 TEXTURE_PX = 384
@@ -20,8 +20,7 @@ TEXTURE_PX = 384
 @cache
 def materials() -> Mapping[str, Material]:
     """All materials of the world by name."""
-    text = Path(__file__).with_name("materials.yaml").read_text(encoding="utf-8")
-    return TypeAdapter(dict[str, Material]).validate_python(yaml.load(text, Loader=yaml.CSafeLoader))
+    return TypeAdapter(dict[str, Material]).validate_python(read_yaml(Path(__file__).with_name("materials.yaml")).data)
 
 
 def pictures(seed: int = 7) -> dict[str, Picture]:

@@ -7,8 +7,9 @@ from functools import cache
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
-import yaml
 from pydantic import BaseModel, ConfigDict
+
+from skills.files.yaml_source import read_yaml
 
 Rectangle = tuple[float, float, float, float]
 """(x0, y0, x1, y1)"""
@@ -90,5 +91,4 @@ class Plan(BaseModel):
 @cache
 def load_plan(name: str) -> Plan:
     """The plan of one of `PLANS`."""
-    text = Path(__file__).with_name(f"{name}.yaml").read_text(encoding="utf-8")
-    return Plan.model_validate(yaml.load(text, Loader=yaml.CSafeLoader))
+    return Plan.model_validate(read_yaml(Path(__file__).with_name(f"{name}.yaml")).data)

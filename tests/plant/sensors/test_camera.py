@@ -13,6 +13,7 @@ from pydrake.systems.framework import DiagramBuilder
 from plant.sensors.camera import Camera
 from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from plant.sensors.camera_spec import load_cameras
+from skills.files.errors import InputError
 from skills.robot import FrameTree, Intrinsics
 
 CAMERAS = Path(__file__).parents[3] / "plant" / "models" / "spot" / "cameras.yaml"
@@ -186,21 +187,21 @@ def test_picture_noise_grains_and_darkens_the_corners():
 def test_unknown_camera_key_is_refused_with_file_and_field(tmp_path):
     path = tmp_path / "cameras.yaml"
     path.write_text(CAMERAS.read_text().replace("colour: true", "color: true"))
-    with pytest.raises(ValueError, match=r"cameras\.yaml:\d+: camera hand: colou?r"):
+    with pytest.raises(InputError, match=r"cameras\.yaml:\d+: camera hand: colou?r"):
         load_cameras(path)
 
 
 def test_reversed_depth_range_is_refused(tmp_path):
     path = tmp_path / "cameras.yaml"
     path.write_text(CAMERAS.read_text().replace("[0.2, 4.0]", "[4.0, 0.2]"))
-    with pytest.raises(ValueError, match="hand: depth_range_m"):
+    with pytest.raises(InputError, match="hand: depth_range_m"):
         load_cameras(path)
 
 
 def test_broken_yaml_is_refused_with_its_line(tmp_path):
     path = tmp_path / "cameras.yaml"
     path.write_text("hand: {link: arm_wr1\nleft: {")
-    with pytest.raises(ValueError, match=r"cameras\.yaml:2: not valid YAML"):
+    with pytest.raises(InputError, match=r"cameras\.yaml:[23]: broken YAML"):
         load_cameras(path)
 
 

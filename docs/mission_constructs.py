@@ -218,9 +218,13 @@ CONDITIONS = (
     ("`look`", "`{look: is there a hammer in the workshop}`", "what a question in English asks for"),
     ("`door`", "`{door: [hall, kitchen]}`", "goes there and looks whether it is open"),
     ("`button`", "`{button: go}`", "at once: pressed since a `wait` or `repeat` began, else since the mission began"),
+    ("`max_age_s`", "`{object: beer, at: kitchen, max_age_s: 60}`", "beside what looks: an answer so old counts still"),
     ("`all`, `any`, `not`", "`{all: [count > 0, {button: go}]}`", "decided by as few looks as are needed"),
 )
 VALUES = """\
+Each time that a condition is asked (in each round, at each `every` of a `wait`, in each attempt) the robot looks
+again, unless `max_age_s` (seconds, or a text such as `2 min`) lets an earlier answer count.
+
 A value has a name and a type: a number, a text, or true and false. It comes from `variables` (the file's values at
 the beginning), from `set`, and from `gives`: `{answer: NAME}` beside a question, a `check` or an `ask`, `{count:
 NAME}` beside a sentence that counts, and `{PORT: NAME}` beside a skill. A value of `variables` keeps its type. A

@@ -47,9 +47,13 @@ class ValueIs:
 
 @dataclass(frozen=True)
 class Look:
-    """A status check (a command to find): the robot goes there and looks."""
+    """A status check (a command to find): the robot goes there and looks.
+
+    It does so each time that the condition is asked, unless its last answer is no older than `max_age_s`.
+    """
 
     command: Command
+    max_age_s: float = 0.0
 
     def __str__(self) -> str:
         at = "" if self.command.goal is None else f" at {self.command.goal}"
@@ -58,9 +62,13 @@ class Look:
 
 @dataclass(frozen=True)
 class DoorOpen:
-    """The door between two rooms, of those in the knowledge file, is open; the robot goes there and looks."""
+    """The door between two rooms, of those in the knowledge file, is open; the robot goes there and looks.
+
+    An answer that is no older than `max_age_s` is not asked for again.
+    """
 
     between: tuple[str, str]
+    max_age_s: float = 0.0
 
     def __str__(self) -> str:
         return f"the door between {self.between[0]} and {self.between[1]} is open"

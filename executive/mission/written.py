@@ -53,10 +53,10 @@ def written_condition(condition: Condition) -> str:
     match condition:
         case ValueIs(expression):
             return f"value {_quoted(expression.text)}"
-        case Look(command):
-            return str(command)
-        case DoorOpen((one, other)):
-            return f"door {_quoted(one)} - {_quoted(other)} open"
+        case Look(command, max_age_s):
+            return f"{command}{_aged(max_age_s)}"
+        case DoorOpen((one, other), max_age_s):
+            return f"door {_quoted(one)} - {_quoted(other)} open{_aged(max_age_s)}"
         case ButtonPressed(name):
             return f"button {_quoted(name)} pressed"
         case AllOf(parts):
@@ -65,6 +65,11 @@ def written_condition(condition: Condition) -> str:
             return f"any({', '.join(map(written_condition, parts))})"
         case Not(part):
             return f"not({written_condition(part)})"
+
+
+def _aged(max_age_s: float) -> str:
+    """How old an answer may be, where it may be old at all."""
+    return f" aged {_number(max_age_s)} s" if max_age_s else ""
 
 
 def parse_written(lines: Iterable[str]) -> Steps:
@@ -299,7 +304,7 @@ class _Reader:
     def condition(self) -> Condition:
         """A condition."""
         if (command := self.command()) is not None:
-            return Look(command)
+            return Look(command, self._age())
         if self.word("value"):
             return ValueIs(Expression(self.string()))
         if self.word("door"):
@@ -320,7 +325,11 @@ class _Reader:
         self.want("-")
         other = self.string()
         self.want("open")
-        return DoorOpen((one, other))
+        return DoorOpen((one, other), self._age())
+
+    def _age(self) -> float:
+        """How old an answer may be, where that is said."""
+        return self.seconds() if self.word("aged") else 0.0
 
     def _parts(self) -> tuple[Condition, ...]:
         self.want("(")

@@ -74,7 +74,10 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
         root = dataclasses.replace(tree.root, children=(*tree.root.children[:-1], root))
     own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(CompiledTree)}
     names = tree.robot_name, tree.mission_name
-    again = {finding_keys(*names).again: _answered(tree, memory), execution_keys(*names).again: _ended(tree, memory)}
+    again = {
+        finding_keys(*names).again: _answered(tree, memory) - over,
+        execution_keys(*names).again: _ended(tree, memory) - over,
+    }
     board = {**memory.board, **again}
     return ResumedTree(**{**own, "root": root}, board=board, changes=change.made), recollection
 
@@ -111,7 +114,7 @@ def _say_as_before(node: Behaviour, *, step: StepRecord, board: Mapping[str, Any
 
 def _answered(tree: CompiledTree, memory: Memory) -> frozenset[str]:
     """The nodes that have given their answer and, since what they rest on is told once more, give it again."""
-    answers = {node.path_id for node in tree.mission.walk() if node.kind == "answer"}
+    answers = {node.path_id for node in tree.mission.walk() if node.kind in ("answer", "check")}
     return frozenset(path for path in answers if path in memory.steps and memory.steps[path].status is Status.SUCCESS)
 
 

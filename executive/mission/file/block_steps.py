@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Final, Protocol
 
@@ -84,13 +85,13 @@ def condition_of(reader: Reader, scope: Scope, condition: ConditionFile, path: K
         if len(commands) != 1 or commands[0].task is not Task.FIND:
             hint = "ask one thing, as in 'is there a hammer in the workshop'"
             raise scope.error((*path, "look"), f"'{condition.look}' is not one question that a look answers", hint)
-        return Look(commands[0])
+        return Look(commands[0], condition.max_age_s)
     if condition.door is not None:
-        return _door(scope, condition.door, (*path, "door"), reader.knowledge)
+        return replace(_door(scope, condition.door, (*path, "door"), reader.knowledge), max_age_s=condition.max_age_s)
     if condition.button is not None:
         return ButtonPressed(condition.button)
     found = condition.object or _person(scope, condition.person or "", (*path, "person"), reader.knowledge)
-    return Look(reader.find_command(scope, path, found, condition.at))
+    return Look(reader.find_command(scope, path, found, condition.at), condition.max_age_s)
 
 
 def round_values(scope: Scope, repeat: RepeatFile, path: KeyPath, knowledge: Knowledge) -> Sequence[Value]:

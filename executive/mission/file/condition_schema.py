@@ -10,12 +10,13 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictInt, m
 from executive.mission.expression import TIME_OF_DAY
 from skills.files.errors import listing
 from skills.files.yaml_source import Name, Text
-from skills.quantities import Duration, Share
+from skills.quantities import Delay, Duration, Share
 
 __all__ = ["CONDITION", "DockFile", "RepeatFile", "Rounds", "Span", "Strict", "WaitFile", "WhileFile", "in_seconds"]
 
 _UNITS_S: Final = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 _SPAN: Final = re.compile(r"(\d+(?:\.\d+)?)\s*(s|min|h)?")
+_LOOKS: Final = ("look", "object", "person", "door")
 _CONDITIONS: Final = ("expression", "look", "object", "person", "door", "button", "all", "any", "not")
 
 
@@ -37,6 +38,12 @@ Span = Annotated[
     BeforeValidator(in_seconds, json_schema_input_type=float | Annotated[str, Field(pattern=rf"^{_SPAN.pattern}$")]),
 ]
 """A time span: seconds, or a text such as "30 min" or "2 h"."""
+Age = Annotated[
+    Delay,
+    Field(strict=True),
+    BeforeValidator(in_seconds, json_schema_input_type=float | Annotated[str, Field(pattern=rf"^{_SPAN.pattern}$")]),
+]
+"""How old something may be: as a `Span`, or 0."""
 Rounds = Annotated[StrictInt, Field(ge=1, le=100_000)]
 
 
@@ -62,6 +69,11 @@ class ConditionFile(Strict):
     all: Annotated[tuple[Condition, ...], Field(min_length=1)] | None = Field(None, description="All of these hold.")
     any: Annotated[tuple[Condition, ...], Field(min_length=1)] | None = Field(None, description="One of these holds.")
     not_: Condition | None = Field(None, alias="not", description="This does not hold.")
+    max_age_s: Age = Field(
+        0.0,
+        description="How old an answer may be that is not asked for again (seconds, or a text such as "
+        '"2 min"); 0: each time that the condition is asked, the robot looks again.',
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -79,6 +91,8 @@ class ConditionFile(Strict):
             raise ValueError(f"a condition is an expression or one of {listing(_CONDITIONS[1:])}; {said}")
         if self.at is not None and forms[0] not in ("object", "person"):
             raise ValueError("'at' goes with 'object' or 'person'")
+        if self.max_age_s and forms[0] not in _LOOKS:
+            raise ValueError(f"'max_age_s' goes with what takes a look: {listing(_LOOKS)}")
         return self
 
 

@@ -5,7 +5,8 @@ A decision is true, false, or not known yet (None): a look that it takes has not
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Protocol
 
@@ -116,9 +117,10 @@ class ValueHolds:
 
 @dataclass(frozen=True)
 class AnswerIs:
-    """The answer of a look, under a blackboard key."""
+    """The answer of a look, under a blackboard key; one that is up to `max_age_s` old is not asked for again."""
 
     key: str
+    max_age_s: float = 0.0
 
     def holds(self, view: View) -> bool | None:
         """The answer; None before the look."""
@@ -175,18 +177,20 @@ class DoesNotHold:
 def buttons_of(node: NodeSpec) -> Iterator[str]:
     """The buttons that a node decides by."""
     condition = node.options.get("condition")
-    yield from _buttons(condition.decision if isinstance(condition, MustHold) else node.options.get("decision"))
+    decision = condition.decision if isinstance(condition, MustHold) else node.options.get("decision")
+    yield from (part.button for part in _parts(decision) if isinstance(part, Pressed))
 
 
-def _buttons(decision: Any) -> Iterator[str]:
+def _parts(decision: Any) -> Iterator[Any]:
+    """What a decision is made of, in order."""
     match decision:
-        case Pressed(button):
-            yield button
         case AllHold(parts) | AnyHolds(parts):
             for part in parts:
-                yield from _buttons(part)
+                yield from _parts(part)
         case DoesNotHold(part):
-            yield from _buttons(part)
+            yield from _parts(part)
+        case _:
+            yield decision
 
 
 @dataclass
@@ -258,21 +262,22 @@ class Decide(ExplainedNode, Composite):
 
     A look that has begun is taken to its end. Decided: SUCCESS, the answer under `key`. A look RUNNING: RUNNING. A look
     FAILURE: FAILURE with its cause. An expression without a value: FAILURE with PRECONDITION. Without a look left and
-    not decided: FAILURE with ERROR. `looks` are the blackboard keys of the looks' answers, which are forgotten when it
-    begins.
+    not decided: FAILURE with ERROR. Each time that it begins it forgets the answers, but those that are no older than
+    their `max_age_s`; the n-th child is the look for the n-th answer of the decision.
     """
 
     decision: Decision
     words: str
     key: str
-    looks: Sequence[str] = ()
     context: RunContext
     children: list[Behaviour]
     _next: int = field(default=0, init=False)
+    _given_s: dict[str, float] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         Composite.__init__(self, self.name, list(self.children))
         self.view = View(self.context)
+        self._answers = [part for part in _parts(self.decision) if isinstance(part, AnswerIs)]
 
     def tick(self) -> Iterator[Behaviour]:
         """Decide, or take the next look."""
@@ -282,11 +287,14 @@ class Decide(ExplainedNode, Composite):
         while True:
             if not looks and self._decided():
                 break
-            looks = False
+            looked, looks = looks, False
             if self._next == len(self.children):
                 self._end(Failed(Cause.ERROR, f"it cannot be told whether {self.words}"))
                 break
             child = self.current_child = self.children[self._next]
+            if not looked and self._known(self._next):
+                self._next += 1
+                continue
             yield from child.tick()
             if child.status == Status.RUNNING:
                 self.status, self.cause, self.message = Status.RUNNING, None, message_of(child)
@@ -294,6 +302,7 @@ class Decide(ExplainedNode, Composite):
             if child.status != Status.SUCCESS:
                 self._end(Failed(cause_of(child), f"cannot tell whether {self.words}: {message_of(child)}"))
                 break
+            self._note(self._next)
             self._next += 1
         yield self
 
@@ -313,9 +322,24 @@ class Decide(ExplainedNode, Composite):
     def _restart(self) -> None:
         self._next = 0
         self.clear_explanation()
-        self.context.board.forget(self.looks)
+        self.context.board.forget(answer.key for answer in self._answers if not self._fresh(answer))
         for child in self.children:
             child.stop(Status.INVALID)
+
+    def _fresh(self, answer: AnswerIs) -> bool:
+        """Whether an answer of an earlier time need not be asked for again."""
+        given_s = self._given_s.get(answer.key)
+        old_s = math.inf if given_s is None else self.context.clock.now() - given_s
+        return answer.max_age_s > 0.0 and old_s <= answer.max_age_s
+
+    def _known(self, number: int) -> bool:
+        """Whether the answer of a look is there."""
+        return number < len(self._answers) and self._answers[number].key in self.context.board
+
+    def _note(self, number: int) -> None:
+        """Note when a look has given its answer."""
+        if number < len(self._answers):
+            self._given_s[self._answers[number].key] = self.context.clock.now()
 
     def _decided(self) -> bool:
         """Whether it has come to an end."""

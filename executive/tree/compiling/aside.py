@@ -32,7 +32,7 @@ def move_aside_plan(
     `tuck` draws the arm in between. What finds no room there is set down again anywhere on its surface, so that the
     gripper is free. In the end the robot goes back to where it stood, since from there a grasp was found without it.
     """
-    obstacle, surface, clear, pose = (f"{below.path_id}/{key}" for key in ("obstacle", "surface", "clear", "pose"))
+    obstacle, surface, clear, pose = map(below.key, ("obstacle", "surface", "clear", "pose"))
     what = below.node(
         "in the way",
         f"what is in the way of the {thing}?",

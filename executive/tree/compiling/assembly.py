@@ -253,7 +253,7 @@ class _Assembler:
                 hint = "write {answer: NAME} beside a question, or {count: NAME} beside one that counts"
                 raise InputError.at(step.source, f"this step gives {said}, not '{port}'", hint=hint)
             option, kind = _ANSWERS[port]
-            keys[option] = give(self, name, f"{builder.path_id}/{port}", kind, builder)
+            keys[option] = give(self, name, builder.key(port), kind, builder)
         return answering(node, keys) if keys else node
 
     def _declare(self, mission: Mission, builder: PlanBuilder) -> NodeSpec:

@@ -28,7 +28,7 @@ from executive.mission.file.model import MissionStep, StepPolicy
 from executive.mission.goal import command_goal, held_goal
 from executive.mission.gripper import UNSURE, InGripper
 from executive.tree.behaviours.board import FromBoard
-from executive.tree.behaviours.decisions import MustHold, MustNotBegin
+from executive.tree.behaviours.decisions import AnswerIs, MustHold, MustNotBegin
 from executive.tree.compiling.builder import PlanBuilder, pose_2d, slug
 from executive.tree.compiling.decisions import (
     Decided,
@@ -211,7 +211,7 @@ def _decided(
 ) -> tuple[NodeSpec, str, tuple[StepPart, ...]]:
     """The node that decides, the key of its answer, and the checks that it makes."""
     decided = decision_of(condition, builder, assembler.flow.names)
-    key = f"{builder.path_id}/decided"
+    key = builder.key("decided")
     return decide_plan(condition, decided, builder, key), key, _checks(decided, builder)
 
 
@@ -266,7 +266,7 @@ def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder, policy: S
         *body.nodes,
         mode=mode,
         words=words,
-        count=f"{builder.path_id}/rounds",
+        count=builder.key("rounds"),
         key=key,
         times=block.times,
         every_s=block.every_s or 0.0,
@@ -373,10 +373,10 @@ def _wait(assembler: Assembler, block: Wait, builder: PlanBuilder, policy: StepP
 def _check(assembler: Assembler, block: Check, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
     below = builder.at("check")
     decided = decision_of(block.condition, below, assembler.flow.names)
-    if isinstance(block.condition, Look):
-        key = _give_key(assembler, block.gives, f"{decided.looks[0].path_id}/answer", bool, builder)
+    if isinstance(block.condition, Look) and isinstance(decided.decision, AnswerIs) and not decided.decision.max_age_s:
+        key = _give_key(assembler, block.gives, decided.decision.key, bool, builder)
         return Assembled((answering(decided.looks[0], {"key": key}),), _checks(decided, builder))
-    key = _give_key(assembler, block.gives, f"{below.path_id}/decided", bool, builder)
+    key = _give_key(assembler, block.gives, below.key("decided"), bool, builder)
     decide = decide_plan(block.condition, decided, below, key)
     question = str(block.condition)
     node = builder.node("check", f"{question}?", decide, question=question, key=key)
@@ -398,7 +398,7 @@ def _speak(assembler: Assembler, block: Speak, builder: PlanBuilder, policy: Ste
     if not block.text.names:
         return Assembled((builder.skill("speak", {"text": block.text.filled({})}),))
     _check_template(block.text, builder, assembler)
-    key = f"{builder.path_id}/text"
+    key = builder.key("text")
     names = {**assembler.flow.names, "": Named(key, str)}
     fill = set_plan(builder, {key: block.text}, names, "fill", "put the values in")
     return Assembled((builder.sequence("speak", fill, builder.skill("speak", {"text": FromBoard(key)})),))
@@ -407,7 +407,7 @@ def _speak(assembler: Assembler, block: Speak, builder: PlanBuilder, policy: Ste
 def _ask(assembler: Assembler, block: Ask, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
     _check_template(block.text, builder, assembler)
     kind = float if block.match == "number" else str
-    key = _give_key(assembler, block.gives, f"{builder.path_id}/answer", kind, builder)
+    key = _give_key(assembler, block.gives, builder.key("answer"), kind, builder)
     names = {choice.lower(): choice for choice in block.choices} or _spoken(block.match, builder)
     default = _default(block, names, builder)
     leaf = builder.node(

@@ -82,6 +82,10 @@ class PlanBuilder:
         """The builder of a subtree below."""
         return replace(self, path_id="/".join((self.path_id, *map(slug, parts))))
 
+    def key(self, name: str) -> str:
+        """A blackboard key of this subtree; whoever writes it and whoever reads it are given the same one."""
+        return f"{self.path_id}/{name}"
+
     def node(self, kind: str, name: str, *children: NodeSpec, part: str = "", **options: Any) -> NodeSpec:
         """A node at this path id, or at the `part` below it."""
         path_id = f"{self.path_id}/{part}" if part else self.path_id

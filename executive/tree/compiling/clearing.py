@@ -44,7 +44,7 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     surfaces = required_surfaces(builder, thing, place)
     if shared := set(surfaces) & set(builder.knowledge.surfaces_in(to)):
         raise builder.error(f"everything that is on the {min(shared)} is to be brought there", "name two surfaces")
-    key, missed = f"{builder.path_id}/detection", f"{builder.path_id}/missed"
+    key, missed = builder.key("detection"), builder.key("missed")
     extra = {"avoid": FromBoardOr(missed, ())} if builder.has_ports("detect", ("avoid",)) else {}
     looks = (look for _, look in look_plans(builder.at("left"), thing, surfaces, key, extra))
     look = builder.at("left").node("selector", f"is anything left {where(builder.knowledge, place)}?", *looks)
@@ -60,7 +60,7 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
         look,
         move,
         key=key,
-        done=(done := f"{builder.path_id}/moved"),
+        done=(done := builder.key("moved")),
         missed=missed,
         did=("moved", f"to the {to}"),
         where=where(builder.knowledge, place),

@@ -47,7 +47,7 @@ class Named:
 
 @dataclass(frozen=True)
 class Decided:
-    """A decision, the looks that it takes, and the status checks behind them by path id."""
+    """A decision, the looks that it takes in the order of its answers, and the status checks behind them by path id."""
 
     decision: Decision
     looks: tuple[NodeSpec, ...] = ()
@@ -70,16 +70,18 @@ def decision_of(condition: Condition, builder: PlanBuilder, names: Mapping[str, 
                     hint = "compare it with something, as in 'count > 2'"
                     raise InputError.at(builder.source, f"'{expression}' is not true or false", hint=hint)
                 return ValueHolds(expression, keys_of(expression, names))
-            case Look(command):
+            case Look(command, max_age_s):
                 below = replace(builder.at(f"look-{len(looks) + 1}"), command=command)
                 refuse_several(below)
-                looks.append(find_plan(below))
+                answer = AnswerIs(below.key("answer"), max_age_s)
+                looks.append(find_plan(below, answer.key))
                 checks.append((below.path_id, part))
-                return AnswerIs(f"{below.path_id}/answer")
-            case DoorOpen(between):
+                return answer
+            case DoorOpen(between, max_age_s):
                 below = builder.at(f"look-{len(looks) + 1}")
-                looks.append(door_plan(below, between, key := f"{below.path_id}/answer"))
-                return AnswerIs(key)
+                answer = AnswerIs(below.key("answer"), max_age_s)
+                looks.append(door_plan(below, between, answer.key))
+                return answer
             case ButtonPressed(name):
                 return Pressed(name)
             case AllOf(parts):
@@ -110,7 +112,6 @@ def decide_plan(condition: Condition, decided: Decided, builder: PlanBuilder, ke
         decision=decided.decision,
         words=str(condition),
         key=key,
-        looks=tuple(f"{look.path_id}/answer" for look in decided.looks),
     )
 
 

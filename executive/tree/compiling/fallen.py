@@ -45,7 +45,7 @@ def unless_fallen(
 
 
 def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
-    keys = {name: f"{builder.path_id}/{name}" for name in ("pose", "spot", "floor", "around", "set-down", "detection")}
+    keys = {name: builder.key(name) for name in ("pose", "spot", "floor", "around", "set-down", "detection")}
     fell = builder.node(
         "fallen",
         f"where is the {item}?",
@@ -119,7 +119,7 @@ def _look_plan(builder: PlanBuilder, item: Thing, keys: dict[str, str]) -> NodeS
 
 def _near_plan(builder: PlanBuilder, item: Thing, detection: str) -> NodeSpec:
     """Look at the surfaces near where it was lost."""
-    facts, near = builder.knowledge, f"{builder.path_id}/surfaces"
+    facts, near = builder.knowledge, builder.key("surfaces")
     surfaces = builder.node(
         "surfaces near",
         "which surfaces are near?",

@@ -69,7 +69,7 @@ def pick_up_plan(
     A failure ends with the arm stowed. With `seen`, an earlier node has just written `key`: only further attempts begin
     with the search.
     """
-    near, tried, blocking = (f"{builder.path_id}/{key}" for key in ("near-detection", "tried-grasps", "in-the-way"))
+    near, tried, blocking = map(builder.key, ("near-detection", "tried-grasps", "in-the-way"))
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
     aside = not seen and can_move_aside(builder)
     grasp = _grasp_plan(builder, near, tried, blocking if aside else None)

@@ -41,7 +41,7 @@ def watched(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
 def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
     """To the dock, charge, and back to where it was; urgent when half of what it is called for is left."""
     facts, dock = builder.knowledge.battery, pose_2d(place)
-    key = f"{builder.path_id}/where"
+    key = builder.key("where")
     work = builder.at("charge").sequence(
         f"charge to {facts.charged:.0%}",
         builder.node("remember", "where it was", part="remember", key=key),

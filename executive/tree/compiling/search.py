@@ -23,6 +23,8 @@ NO_PORTS: Final[Ports] = MappingProxyType({})
 MOST_ELSEWHERE: Final = 3
 MOST_ASIDE: Final = 2
 ASIDE_M: Final = 0.45
+_TALLY: Final = "observations"
+"""The output port of a look for all that it saw."""
 
 
 def surfaces_elsewhere(
@@ -57,7 +59,7 @@ def look_plans(
 ) -> tuple[tuple[str, NodeSpec], ...]:
     """For each surface and viewpoint: drive there and look. The detection goes to `key`; `extra` are detect's.
 
-    With `tallied`, all that a look saw goes to the key that `tally_key` gives for its leaf.
+    With `tallied`, all that a look saw goes to a key of its own (see `tally_of`).
     """
     views = [(name, n) for name in surfaces for n in range(1, len(builder.knowledge.surfaces[name].viewpoints) + 1)]
     return tuple(
@@ -65,9 +67,10 @@ def look_plans(
     )
 
 
-def tally_key(leaf: str) -> str:
-    """The blackboard key of all that the leaf of a look saw."""
-    return f"{leaf}/all"
+def tally_of(leaf: NodeSpec) -> str:
+    """The blackboard key to which the leaf of a tallied look writes all that it saw."""
+    key: str = leaf.options["outputs"][_TALLY]
+    return key
 
 
 def _look_plan(
@@ -101,7 +104,7 @@ def people_looks(
 def _look_about_plan(builder: PlanBuilder, person: str, room: str, key: str, tallied: bool) -> NodeSpec:
     facts = builder.knowledge.places[room]
     ports = {"area_W": facts.polygon, "place": room, "person": person, "count": 0 if tallied else 1}
-    tally = {"observations": tally_key(f"{builder.path_id}/find-people")} if tallied else {}
+    tally = {_TALLY: builder.key("all")} if tallied else {}
     look = builder.skill("find_people", ports, {"observation": key, **tally})
     return builder.sequence(f"look about the {room}", builder.navigate(pose_2d(facts.pose), f"the {room}"), look)
 
@@ -118,7 +121,7 @@ def detect_plan(
     """Look for the object on some surfaces, by name or from the blackboard, from where the robot stands."""
     where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(builder.surface, surfaces))
     ports = {"classes": builder.sought(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
-    tally = {"observations": tally_key(f"{builder.path_id}/detect")} if tallied else {}
+    tally = {_TALLY: builder.key("all")} if tallied else {}
     return builder.skill("detect", {**ports, **extra}, {"observation": key, **tally})
 
 

@@ -22,7 +22,7 @@ from executive.tree.compiling.search import (
     required_surfaces,
     search_plan,
     surfaces_elsewhere,
-    tally_key,
+    tally_of,
     where,
 )
 from executive.tree.node import NodeSpec
@@ -56,7 +56,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
         name = builder.knowledge.thing(thing.name) or thing.name
         surfaces |= set(surfaces_elsewhere(builder.knowledge, name, place, builder.avoided))
     around = tuple(builder.surface(name) for name in builder.knowledge.surfaces if name in surfaces)
-    key = f"{builder.path_id}/detection"
+    key = builder.key("detection")
     search = search_plan(builder.at("find"), thing, place, key, anywhere=anywhere)
     get = pick_up_plan(builder, thing, search, key, around)
     if not builder.in_gripper:
@@ -66,15 +66,17 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     )
 
 
-def find_plan(builder: PlanBuilder) -> NodeSpec:
+def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
     """Look at the surfaces of the place and answer yes or no; where it is asked where or how many, tell that, too.
+
+    The answer goes to `answer_key`, which is a key of this subtree unless one is given.
 
     The first object that is seen ends the search, unless they are to be counted: then all surfaces are looked at.
     People are looked for in rooms.
     """
     command, knowledge = builder.command, builder.knowledge
     place = None if command.goal is None else builder.place(command.goal)
-    counting, key = command.object_count != 1, f"{builder.path_id}/detection"
+    counting, key = command.object_count != 1, builder.key("detection")
     person = None if command.object is None else knowledge.somebody(command.object.name)
     if person is not None:
         what = "somebody" if person == ANYBODY else person
@@ -90,6 +92,7 @@ def find_plan(builder: PlanBuilder) -> NodeSpec:
     below = builder.at("search")
     search = below.node("round" if counting else "selector", f"look for {what}", *(look for _, look in looks))
     leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
+    tallies = {look.children[-1].path_id: tally_of(look.children[-1]) for _, look in looks if counting}
     spot = where(knowledge, place)
     denied = f"{'not' if command.object_count > 1 or person in knowledge.people else 'no'} {asked} {spot}"
     if what == ANYTHING:
@@ -104,9 +107,9 @@ def find_plan(builder: PlanBuilder) -> NodeSpec:
         question=asked if place is None else f"{asked} {spot}",
         denied=denied,
         looks=MappingProxyType(leaves),
-        key=f"{builder.path_id}/answer",
+        key=answer_key or builder.key("answer"),
         tells=place is None,
-        tallies=MappingProxyType({leaf: tally_key(leaf) for own in leaves.values() for leaf in own if counting}),
+        tallies=MappingProxyType(tallies),
         needed=max(1, command.object_count),
         yes_or_no=what != ANYTHING,
     )

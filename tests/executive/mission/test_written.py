@@ -40,8 +40,8 @@ commands = st.builds(
 )
 leaves = st.one_of(
     st.builds(ValueIs, expressions),
-    st.builds(Look, commands),
-    st.builds(DoorOpen, st.tuples(names, names)),
+    st.builds(Look, commands, st.just(0.0) | seconds),
+    st.builds(DoorOpen, st.tuples(names, names), st.just(0.0) | seconds),
     st.builds(ButtonPressed, names),
 )
 conditions = st.recursive(

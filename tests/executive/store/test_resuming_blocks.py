@@ -5,7 +5,8 @@ from typing import ClassVar
 
 import pytest
 
-from executive.mission.condition import ValueIs
+from executive.mission.command import parse_command
+from executive.mission.condition import Look, Not, ValueIs
 from executive.mission.expression import Expression, Template
 from executive.mission.file.blocks import Ask, Check, Choose, Group, Repeat, Set, Together, Try, Wait
 from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep, OnFailure, SkillCall, StepPolicy
@@ -85,6 +86,7 @@ def value(text):
 
 
 WAIT = block(Wait(seconds=0.2))
+BEER = Look(parse_command("Take [Nothing] to [shelf] and do [find] to [beer]"))
 RETRIES = StepPolicy(retries=1)
 
 # Each construct, and what is done in all, whenever the process is killed.
@@ -118,13 +120,25 @@ BLOCKS = {
     ),
     "wait": ((*do("a"), WAIT, *do("d")), "ad"),
     "ask": ((block(Ask(Template("q?"), {"x": do("a"), "y": do("b", "c")}, limit_s=0.2, default="y")), *do("d")), "bcd"),
+    "until it is seen": ((block(Repeat(do("a"), until=BEER)), *do("d")), "aad"),
+    "while it is not seen": ((block(Repeat(do("a"), while_=Not(BEER))), *do("d")), "aad"),
     "skipped": ((block(Group(do("a", "fails", "b")), policy=StepPolicy(on_failure=OnFailure.SKIP)), *do("d")), "ad"),
 }  # fmt: skip
 
 
 @pytest.fixture
-def live(tmp_path, clock, robot, make, works, registry, knowledge):
-    """One life of the executive: to its end, or until it is killed after some tick."""
+def live(tmp_path, clock, robot, make, works, registry, knowledge, script, done):
+    """One life of the executive: to its end, or until it is killed after some tick.
+
+    What is looked for is there once "a" was done twice.
+    """
+
+    def detect(skill):
+        there = done.count("a") >= 2
+        seen = {"observation": make.COKE, "observations": (make.COKE,)}
+        return Succeeded("seen", seen) if there else Failed(Cause.POSTCONDITION, "not seen")
+
+    script.ends["detect"] = detect
 
     def one_life(steps, number, kill_after=None):
         tree = compile_mission(
@@ -194,3 +208,26 @@ def test_one_kill_after_the_other_leads_to_the_end_all_the_same(live, done, name
     while live(steps, "store", kill_after=9) is None and lives < 50:
         lives += 1
     assert ("".join(done), 1 < lives < 50) == (expected, True)
+
+
+def test_after_a_kill_in_any_tick_each_look_is_one_finding(live, done):
+    steps, _ = BLOCKS["while it is not seen"]
+    whole, wrong = live(steps, "whole"), []
+    for tick in range(1, whole.ticks):
+        done.clear()
+        live(steps, tick, kill_after=tick)
+        findings = live(steps, tick).worst.findings
+        if "".join("Y" if one.answer else "N" for one in findings) != "NNY":
+            wrong.append((tick, [(one.answer, one.t_s) for one in findings]))
+    assert not wrong, wrong
+
+
+def test_after_a_kill_in_any_tick_a_check_of_several_things_is_one_finding(live, done):
+    steps = (block(Check(value("n == 0"))), *do("a"))
+    whole = live(steps, "whole")
+    counts = {}
+    for tick in range(1, whole.ticks):
+        done.clear()
+        live(steps, tick, kill_after=tick)
+        counts[tick] = len(live(steps, tick).worst.findings)
+    assert set(counts.values()) == {1}, counts

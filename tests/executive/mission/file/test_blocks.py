@@ -1,6 +1,7 @@
 """Blocks in mission files: what they are read as, and what is refused with file, line and hint."""
 
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -81,6 +82,8 @@ def test_if(block):
         ("{object: beer, at: kitchen}", BEER),
         ("{object: beer}", Look(Command(task=Task.FIND, object=Thing("beer")))),
         ("{person: Robin, at: kitchen}", Look(Command(goal="kitchen", task=Task.FIND, object=Thing("Robin")))),
+        ("{object: beer, at: kitchen, max_age_s: 20}", replace(BEER, max_age_s=20.0)),
+        ("{look: is there a beer in the kitchen, max_age_s: 2 min}", replace(BEER, max_age_s=120.0)),
         ("{person: anybody}", Look(Command(task=Task.FIND, object=Thing("person")))),
         ("{button: go}", ButtonPressed("go")),
         ("{all: [holding, {button: go}]}", AllOf((ValueIs(Expression("holding")), ButtonPressed("go")))),
@@ -91,10 +94,11 @@ def test_if(block):
 def test_conditions(block, text, condition):
     found = block(f"- if: {text}\n  then: [dock]").condition
     if isinstance(found, Look):
-        assert (found.command.goal, found.command.task, found.command.object) == (
+        assert (found.command.goal, found.command.task, found.command.object, found.max_age_s) == (
             condition.command.goal,
             condition.command.task,
             condition.command.object,
+            condition.max_age_s,
         )
     else:
         assert found == condition
@@ -244,6 +248,7 @@ REFUSED = [
     ("- if: {all: []}\n  then: [dock]", 3, "should not be empty", ""),
     ("- if: {all: [holding], any: [holding]}\n  then: [dock]", 3, "it has all and any", ""),
     ("- if: {at: kitchen}\n  then: [dock]", 3, "it is empty", ""),
+    ("- if: {button: go, max_age_s: 5}\n  then: [dock]", 3, "'max_age_s' goes with what takes a look", ""),
     ("- if: {button: go, at: kitchen}\n  then: [dock]", 3, "'at' goes with 'object' or 'person'", ""),
     ("- if: {door: [kitchn, hall]}\n  then: [dock]", 3, "unknown room 'kitchn'", "did you mean 'kitchen'?"),
     ("- if: {door: [a, b, c]}\n  then: [dock]", 3, "too many parts", ""),

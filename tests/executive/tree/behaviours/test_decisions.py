@@ -181,7 +181,6 @@ def decide(run_context):
             decision=decision,
             words="it is so",
             key=KEY,
-            looks=(FIRST, SECOND),
             context=run_context,
             children=looks,
         )

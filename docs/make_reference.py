@@ -22,6 +22,7 @@ from executive.tree.registry import built_in_skills
 from executive.tree.types import describe_type, field_types
 from plant.worlds.world import SeedRules
 from skills.api import Skill
+from skills.durations import DURATION_PATTERN
 from skills.faults.kinds import STANDARD_FAULTS
 from skills.stack import SLOTS, components, skill_options, stack_schema
 
@@ -193,6 +194,8 @@ def _plain(facts: Mapping[str, Any]) -> str:
     if kind == "object":
         inner = facts.get("additionalProperties")
         return f"names to {_takes(inner)}" if isinstance(inner, dict) and inner else "names to values"
+    if facts.get("pattern") == DURATION_PATTERN:
+        return 'text such as "2 min"'
     return {"null": "nothing", "boolean": "true or false", "string": "text", "integer": "whole number"}.get(
         kind, str(kind)
     ) + _limits(facts)

@@ -1,7 +1,8 @@
-"""Types of ports and options: numbers with the range that a file may give them. A field's name ends in its unit.
+"""Quantities: numbers with unit and range, checked by one mechanism wherever a user can type them.
 
-Each is a `float` or `int` with bounds (`annotated_types`, which pydantic's `Field` gives as well): a mission file, a
-stack file and their JSON schemas keep to them. Code that fills the same dataclass is not checked.
+Each quantity is a `float` or `int` with a `Quantity` mark. pydantic models, the options of components and skills, and
+the options of the command line check it by `number_of`; a `QuantityError` names the range and the likely mistake. A
+field's name ends in its unit. Code that fills the same dataclass is not checked.
 """
 
 from __future__ import annotations
@@ -9,50 +10,288 @@ from __future__ import annotations
 import math
 import operator
 import re
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Final, get_args, get_origin
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Final, get_args, get_origin
 
-from annotated_types import GroupedMetadata, Interval, Unit
+from annotated_types import GroupedMetadata
 
-__all__ = ["bounds", "in_range", "range_text", "without_range", "without_unit"]
+from skills.durations import DURATION_FORM, DURATION_PATTERN, seconds_in
 
-Coordinate = Annotated[float, Interval(ge=-10_000.0, le=10_000.0), Unit("m")]
+if TYPE_CHECKING:
+    from pydantic_core.core_schema import CoreSchema
+
+__all__ = [
+    "Quantity",
+    "QuantityError",
+    "bounds",
+    "clock_text",
+    "in_range",
+    "number_in",
+    "number_of",
+    "quantity_of",
+    "range_text",
+    "shown",
+    "without_range",
+    "without_unit",
+]
+
+MOST_DIGITS: Final = 100
+LARGEST: Final = 10**300
+
+
+class QuantityError(ValueError):
+    """A value does not fit: `what` it should be, with the range, and a `hint` at the likely mistake."""
+
+    def __init__(self, what: str, hint: str) -> None:
+        super().__init__(f"{what}; {hint}")
+        self.what, self.hint = what, hint
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Marks a number with its range and unit; `mistake` replaces the hint at a likely mistake of units."""
+
+    ge: float | None = None
+    gt: float | None = None
+    le: float | None = None
+    lt: float | None = None
+    unit: str = ""
+    mistake: str = ""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], CoreSchema]) -> CoreSchema:
+        """Checks a field of this quantity by `number_of`; its JSON schema keeps the range."""
+        from pydantic_core import core_schema
+
+        hint = Annotated[source, self]
+
+        def checked(value: Any) -> float:
+            return number_of(value, hint)
+
+        limits = bounds(hint)
+        whole, real = core_schema.int_schema(**limits), core_schema.float_schema(**limits)
+        number: CoreSchema = whole if source is int else real
+        if self.unit != "s":
+            return core_schema.no_info_before_validator_function(checked, number)
+        written = core_schema.union_schema([number, core_schema.str_schema(pattern=DURATION_PATTERN)])
+        return core_schema.no_info_before_validator_function(checked, number, json_schema_input_schema=written)
+
+
+Coordinate = Annotated[
+    float, Quantity(ge=-10_000.0, le=10_000.0, unit="m", mistake="count from an origin near the building, in metres")
+]
 """x or y of the world frame."""
-Length = Annotated[float, Interval(gt=0.0, le=100.0), Unit("m")]
+Length = Annotated[float, Quantity(gt=0.0, le=100.0, unit="m")]
 """A size, reach or resolution."""
-Margin = Annotated[float, Interval(ge=0.0, le=10.0), Unit("m")]
+Margin = Annotated[float, Quantity(ge=0.0, le=10.0, unit="m")]
 """A distance that may be none."""
-Height = Annotated[float, Interval(ge=-1.0, le=3.0), Unit("m")]
+Height = Annotated[float, Quantity(ge=-1.0, le=3.0, unit="m")]
 """Above the floor."""
-Angle = Annotated[float, Interval(ge=-2.0 * math.pi, le=2.0 * math.pi), Unit("rad")]
+TopHeight = Annotated[float, Quantity(gt=0.0, le=3.0, unit="m")]
+"""Of a surface above the floor."""
+Opening = Annotated[float, Quantity(gt=0.0, le=10.0, unit="m")]
+"""The clear width of a door."""
+Angle = Annotated[float, Quantity(ge=-2.0 * math.pi, le=2.0 * math.pi, unit="rad")]
 """A heading or a signed turn."""
-Turn = Annotated[float, Interval(gt=0.0, le=math.pi), Unit("rad")]
+Turn = Annotated[float, Quantity(gt=0.0, le=math.pi, unit="rad")]
 """A turn or a tolerance without a sign."""
-Speed = Annotated[float, Interval(gt=0.0, le=3.0), Unit("m/s")]
+Speed = Annotated[float, Quantity(gt=0.0, le=3.0, unit="m/s")]
 """Of the base or the hand."""
-TurnRate = Annotated[float, Interval(gt=0.0, le=6.0), Unit("rad/s")]
+TurnRate = Annotated[float, Quantity(gt=0.0, le=6.0, unit="rad/s")]
 """Of the base or a joint."""
-Acceleration = Annotated[float, Interval(gt=0.0, le=20.0), Unit("m/s^2")]
-TurnAcceleration = Annotated[float, Interval(gt=0.0, le=50.0), Unit("rad/s^2")]
-Duration = Annotated[float, Interval(gt=0.0, le=86_400.0), Unit("s")]
+Acceleration = Annotated[float, Quantity(gt=0.0, le=20.0, unit="m/s^2")]
+TurnAcceleration = Annotated[float, Quantity(gt=0.0, le=50.0, unit="rad/s^2")]
+Duration = Annotated[float, Quantity(gt=0.0, le=86_400.0, unit="s")]
 """A period or a time limit."""
-Delay = Annotated[float, Interval(ge=0.0, le=86_400.0), Unit("s")]
+Delay = Annotated[float, Quantity(ge=0.0, le=86_400.0, unit="s")]
 """A wait that may be none."""
-Share = Annotated[float, Interval(ge=0.0, le=1.0)]
+LongDuration = Annotated[float, Quantity(gt=0.0, le=604_800.0, unit="s")]
+"""The limit of a whole run."""
+Wait = Annotated[float, Quantity(ge=0.0, le=1e9, unit="s")]
+"""How long a page or a queue is served."""
+Share = Annotated[float, Quantity(ge=0.0, le=1.0)]
 """A part of a whole: a charge, a score."""
-Cosine = Annotated[float, Interval(ge=-1.0, le=1.0)]
+Cosine = Annotated[float, Quantity(ge=-1.0, le=1.0)]
 """A part of a direction of length 1."""
-Factor = Annotated[float, Interval(gt=0.0, le=1_000.0)]
+Factor = Annotated[float, Quantity(gt=0.0, le=1_000.0)]
 """A gain or a weight."""
-Force = Annotated[float, Interval(gt=0.0, le=2_000.0), Unit("N")]
-Torque = Annotated[float, Interval(gt=0.0, le=2_000.0), Unit("N m")]
-Count = Annotated[int, Interval(ge=1, le=100_000)]
+Force = Annotated[float, Quantity(gt=0.0, le=2_000.0, unit="N")]
+Torque = Annotated[float, Quantity(gt=0.0, le=2_000.0, unit="N m")]
+Mass = Annotated[float, Quantity(gt=0.0, le=100.0, unit="kg")]
+Count = Annotated[int, Quantity(ge=1, le=100_000)]
 """How many, at least one."""
-Tries = Annotated[int, Interval(ge=0, le=1_000)]
+Tries = Annotated[int, Quantity(ge=0, le=1_000)]
 """How often, perhaps never."""
+Seed = Annotated[int, Quantity(ge=0, le=2**31 - 1)]
+"""What chooses the objects of a world and all noise."""
+Port = Annotated[int, Quantity(ge=0, le=65_535)]
+"""A port of this machine; 0 takes a free one."""
+Number = Annotated[float, Quantity()]
+"""A number of any size: a value of a mission."""
+Whole = Annotated[int, Quantity()]
+"""A whole number of any size: a value of a mission."""
 
 _UNIT: Final = re.compile(r"_(m|rad|s|n|m_s|rad_s|kg|deg)$")
 _WORDS: Final[Mapping[str, str]] = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
+_OTHERS: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
+    {
+        "": {"%": 0.01},
+        "m": {"mm": 0.001, "cm": 0.01, "km": 1000.0},
+        "rad": {"degrees": math.pi / 180.0},
+        "rad/s": {"degrees/s": math.pi / 180.0},
+        "m/s": {"km/h": 1.0 / 3.6},
+        "kg": {"g": 0.001},
+        "s": {"ms": 0.001},
+    }
+)
+"""Units that people write in place of a quantity's own, and their size in it."""
+_SPELLED: Final[Mapping[str, str]] = {
+    "deg": "degrees",
+    "degree": "degrees",
+    "\N{DEGREE SIGN}": "degrees",
+    "percent": "%",
+}
+_NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_WITH_UNIT: Final = re.compile(r"([+-]?\d+(?:\.\d+)?)\s*(\D{1,10})")
+_CLOCK: Final = re.compile(r"(\d{1,2}):(\d\d)")
+_COMMA: Final = re.compile(r"[+-]?\d+,\d+")
+_COUNTED: Final = (
+    "zero",
+    "one",
+    "two",
+    "three",
+    "four",
+    "five",
+    "six",
+    "seven",
+    "eight",
+    "nine",
+    "ten",
+    "eleven",
+    "twelve",
+)
+
+
+def number_of(value: Any, hint: Any) -> float:
+    """The number that a file gives for a quantity. A duration may be a text with units.
+
+    Raises QuantityError: it is no number, is not finite, is no whole number where one is wanted, or is out of range.
+    """
+    whole = without_range(hint) is int
+    wanted = "should be a whole number" if whole else "should be a number"
+    if isinstance(value, str):
+        seconds = seconds_in(value) if _unit(hint) == "s" else None
+        if seconds is None:
+            form = f", {DURATION_FORM}" if _unit(hint) == "s" else ""
+            raise QuantityError(f"{wanted}{form}", _text_hint(value, hint))
+        value = seconds
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise QuantityError(wanted, f"it reads {shown(value)} now")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise QuantityError("should be a finite number", f"it reads {shown(value)} now")
+    if isinstance(value, int) and abs(value) > LARGEST:
+        raise QuantityError("should be a smaller number", f"it reads {shown(value)} now")
+    if not in_range(value, hint):
+        raise QuantityError(f"should be {range_text(hint)}", f"it reads {shown(value)} now{_likely(value, hint)}")
+    if whole and isinstance(value, float):
+        hint_at = f"write {int(value)}" if value.is_integer() else f"it reads {shown(value)} now"
+        raise QuantityError(wanted, hint_at)
+    return int(value) if whole else float(value)
+
+
+def number_in(text: str, hint: Any) -> float:
+    """The number that a word of the command line gives for a quantity. Raises QuantityError as `number_of`."""
+    words = text.strip()
+    if _unit(hint) == "s" or not _NUMBER.fullmatch(words) or re.match(r"[+-]?0\d", words):
+        finite = words.lower().lstrip("+-") not in ("inf", "nan", "infinity")
+        return number_of(words if finite else math.nan, hint)
+    if len(words) > MOST_DIGITS:
+        what = f"is a number of {len(words)} digits (at most {MOST_DIGITS} are read)"
+        raise QuantityError(what, "write a shorter one")
+    return number_of(int(words) if re.fullmatch(r"[+-]?\d+", words) else float(words), hint)
+
+
+def clock_text(value: Any) -> str:
+    """A time of day as "08:30". Raises QuantityError: it is none from 00:00 to 23:59."""
+    match = _CLOCK.fullmatch(value.strip()) if isinstance(value, str) else None
+    if match is not None and int(match[1]) < 24 and int(match[2]) < 60:
+        return f"{int(match[1]):02d}:{match[2]}"
+    hint = "write it as in '08:30'"
+    if match is not None and (match[1], match[2]) == ("24", "00"):
+        hint = "write '00:00' for midnight"
+    elif isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 24:
+        hint = f"write '{value:02d}:00'"
+    raise QuantityError("should be a time of day from 00:00 to 23:59", f"it reads {shown(value)} now; {hint}")
+
+
+def shown(value: Any) -> str:
+    """A value as a user wrote it: text in quotes, `true`, `nothing`, `a list`; never longer than a line."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return _digits(value)
+    if isinstance(value, str):
+        return f"'{value[:60]}...'" if len(value) > 60 else f"'{value}'"
+    return (
+        "a mapping" if isinstance(value, Mapping) else "a list" if isinstance(value, list | tuple) else "another kind"
+    )
+
+
+def _digits(value: float) -> str:
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value).replace("inf", ".inf").replace("nan", ".nan")
+    if isinstance(value, int):
+        return str(value) if abs(value) < 10**15 else "a number too large to show"
+    return f"{value:.6g}"
+
+
+def _text_hint(text: str, hint: Any) -> str:
+    """What to write in place of a text that gives no number."""
+    words = text.strip()
+    if len(words) > MOST_DIGITS:
+        return "write a shorter one"
+    if _COMMA.fullmatch(words):
+        return f"write {words.replace(',', '.')}, with a point"
+    if re.fullmatch(r"0\d+", words):
+        return f"write {int(words)}, without the zero before it"
+    if _NUMBER.fullmatch(words):
+        return f"write {float(words):g}, without quotes"
+    if re.fullmatch(r"\d+:\d\d(?::\d\d)?", words) and _unit(hint) == "s":
+        return f"write as in '1 h 30 min': {shown(words)} could be hours or minutes"
+    if words.lower() in _COUNTED:
+        return f"write {_COUNTED.index(words.lower())}"
+    match = _WITH_UNIT.fullmatch(words)
+    unit = "" if match is None else _SPELLED.get(match[2].strip().lower(), match[2].strip().lower())
+    size = 1.0 if unit and unit == _unit(hint) else _OTHERS.get(_unit(hint), {}).get(unit)
+    if match is not None and size is not None:
+        return f"write {float(match[1]) * size:.3g} for {words}"
+    return f"it reads {shown(text)} now"
+
+
+def _likely(value: float, hint: Any) -> str:
+    """The number in the quantity's own unit where another unit would bring it into the range; else nothing."""
+    quantity = quantity_of(hint)
+    if quantity is not None and quantity.mistake:
+        return f"; {quantity.mistake}"
+    if abs(value) > 1e15:
+        return ""
+    sizes = _OTHERS.get(_unit(hint), {}) if without_range(hint) is float else {}
+    meant = {unit: value * size for unit, size in sizes.items() if in_range(value * size, hint)}
+    told = [f"{number:.3g} for {value:g} {unit}" for unit, number in meant.items()]
+    return f"; write {' or '.join(told)}" if told else ""
+
+
+def quantity_of(hint: Any) -> Quantity | None:
+    """The mark of an annotated type; None where it has none."""
+    return next((mark for mark in _marks(hint) if isinstance(mark, Quantity)), None)
+
+
+def _unit(hint: Any) -> str:
+    quantity = quantity_of(hint)
+    return "" if quantity is None else quantity.unit
 
 
 def bounds(hint: Any) -> dict[str, Any]:
@@ -87,7 +326,14 @@ def in_range(value: float, hint: Any) -> bool:
 
 
 def range_text(hint: Any) -> str:
-    """The bounds in words, with the unit: "above 0 and at most 3 m/s"; empty without bounds."""
-    limits = " and ".join(f"{_WORDS[name]} {limit:g}" for name, limit in bounds(hint).items())
-    units = [mark.unit for mark in _marks(hint) if isinstance(mark, Unit)]
-    return " ".join([limits, *units]) if limits else ""
+    """The bounds in words, with the unit: "from 0 to 1", "above 0 and at most 3 m/s"; empty without bounds."""
+    limits = {name: _limit(limit) for name, limit in bounds(hint).items()}
+    if limits.keys() == {"ge", "le"}:
+        words = f"from {limits['ge']} to {limits['le']}"
+    else:
+        words = " and ".join(f"{_WORDS[name]} {limit}" for name, limit in limits.items())
+    return " ".join(filter(None, [words, _unit(hint)])) if limits else ""
+
+
+def _limit(limit: float) -> str:
+    return str(int(limit)) if float(limit).is_integer() and abs(limit) < 1e12 else f"{limit:.4g}"

@@ -15,11 +15,12 @@ from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Protocol, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, Protocol, get_type_hints
 
 import numpy as np
 
-from skills.quantities import range_text
+from skills.files.schema_errors import first_error, nearest_of
+from skills.quantities import shown
 from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Pose2D
 
 if TYPE_CHECKING:
@@ -241,7 +242,7 @@ def _component(slot: str, given: Any) -> tuple[str, Any]:
     known = _names(slot)
     name = given.get(USE, known[0])
     if name not in known:
-        raise StackError((slot, USE), f"there is no {slot} {name!r}", f"known are {', '.join(known)}")
+        raise StackError((slot, USE), f"there is no {slot} {shown(name)}", nearest_of(str(name), known))
     return name, _typed(
         (slot,), _loaded(slot, name, SLOTS[slot]), {key: value for key, value in given.items() if key != USE}
     )
@@ -302,21 +303,8 @@ def _typed(path: tuple[str | int, ...], kind: type, given: Any) -> Any:
     try:
         return TypeAdapter(kind).validate_python(given)
     except ValidationError as error:
-        first = error.errors()[0]
-        takes, now = range_text(_hint_at(kind, first["loc"])), f"it reads {first['input']!r} now"[:120]
-        raise StackError((*path, *first["loc"]), f"should be {takes}" if takes else first["msg"], now) from error
-
-
-def _hint_at(hint: Any, path: Sequence[int | str]) -> Any:
-    """The type of what stands at a path in something of type `hint`."""
-    for part in path:
-        if dataclasses.is_dataclass(hint):
-            hint = get_type_hints(hint, include_extras=True)[str(part)]
-        else:
-            items = get_args(hint)
-            hint = items[int(part)] if int(part) < len(items) and items[int(part)] is not Ellipsis else items[0]
-        hint = next((one for one in get_args(hint) if type(None) in get_args(hint) and one is not type(None)), hint)
-    return hint
+        where, what, hint = first_error(error.errors())
+        raise StackError((*path, *where), what, hint) from error
 
 
 def _check_keys(path: tuple[str | int, ...], kind: type, given: Any) -> None:
@@ -329,11 +317,11 @@ def _check_keys(path: tuple[str | int, ...], kind: type, given: Any) -> None:
 
 def _known(path: tuple[str | int, ...], given: Any, known: Sequence[str]) -> None:
     if not isinstance(given, Mapping):
-        raise StackError(path, "should be a mapping of keys to values", f"known keys are {', '.join(known)}")
+        raise StackError(path, "should be a mapping of keys to values", nearest_of("", known))
     for key in given:
         if key not in known:
             named = f"key {key!r}" if str(key).isidentifier() else "key that is no plain word"
-            raise StackError((*path, key), f"unknown {named}", f"known keys are {', '.join(known)}")
+            raise StackError((*path, key), f"unknown {named}", nearest_of(str(key), known))
 
 
 def plain(stack: RobotStack) -> dict[str, Any]:

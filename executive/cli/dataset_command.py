@@ -14,6 +14,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json, refusals, show_table
 from executive.cli.refine_command import refine_command
 from executive.cli.score_command import score_command
@@ -22,6 +23,7 @@ from executive.cli.worker_pool import Pool
 from executive.evaluation.workers import Workers
 from plant.dataset.errors import DatasetError
 from skills.files.errors import InputError
+from skills.quantities import Count, Quantity, Seed
 
 if TYPE_CHECKING:
     from plant.dataset.shards import Summary
@@ -46,10 +48,10 @@ dataset.command(name="refine")(refine_command)
 @dataset.command(name="render")
 def render_command(
     out: Annotated[Path, typer.Option(help="Folder for the data set; one begun before is gone on with.")],
-    images: Annotated[int, typer.Option(min=1, help="How many pictures.")],
-    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same pictures.")] = 1,
-    jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="A local Dask cluster of so many workers.")] = None,
+    images: Annotated[int, quantity_option(Pictures, help="How many pictures.")],
+    seed: Annotated[int, quantity_option(Seed, help="The same seed gives the same pictures.")] = 1,
+    jobs: Annotated[int | None, quantity_option(Count, help="How many processes; all cores unless said.")] = None,
+    workers: Annotated[int | None, quantity_option(Count, help="A local Dask cluster of so many workers.")] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="tcp://HOST:PORT", help="The scheduler of a Dask cluster.")
     ] = None,
@@ -64,6 +66,9 @@ def render_command(
     _show(console, out, summary, time.monotonic() - began)
     if as_json:
         print_json({"out": str(out), **asdict(summary)})
+
+
+Pictures = Annotated[int, Quantity(ge=1, le=10_000_000)]
 
 
 def _rendered(out: Path, images: int, seed: int, pool: Pool, console: Console) -> Summary:

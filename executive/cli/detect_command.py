@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from executive.cli.detector_choice import detector_of, drawn
+from executive.cli.number_options import quantity_option
 from executive.cli.output import BAD_INPUT, console_for, print_json, refusals, show_table
 from executive.cli.picture_files import read_picture, write_picture
 from skills.detection import Detection, Detector
 from skills.files.errors import InputError
 from skills.perception.detector.onnx_detector import DetectorOptions
+from skills.quantities import Share
 
 __all__ = ["detect"]
 
@@ -46,7 +48,7 @@ class Looked:
 
 def detect(
     images: Annotated[list[Path], typer.Argument(metavar="IMAGE...", help="Pictures: PNG, JPEG, WebP, TIFF, BMP.")],
-    threshold: Annotated[float, typer.Option(min=0.0, max=1.0, help="The least score that is reported.")] = 0.5,
+    threshold: Annotated[float, quantity_option(Share, help="The least score that is reported.")] = 0.5,
     model: Annotated[Path | None, typer.Option(help="Another detector's file; else the one of Errand.")] = None,
     draw: Annotated[Path | None, typer.Option(help="A folder for the pictures with boxes drawn.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,

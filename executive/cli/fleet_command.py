@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from executive.cli.durable import STORE
+from executive.cli.number_options import quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.report import VERDICTS
 from executive.cli.run_options import (
@@ -19,13 +20,13 @@ from executive.cli.run_options import (
     VIEW_FOR,
     VIEW_PORT,
     robots_of,
-    time_limit_s,
 )
 from executive.cli.serve_command import AsJson
 from executive.mission.robots import display_name, robot_called
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from skills.files.errors import InputError
+from skills.quantities import Seed
 
 __all__ = ["fleet"]
 
@@ -51,7 +52,7 @@ def run(
         ),
     ],
     world: Annotated[str | None, typer.Option(help="World by name or folder; that of the first mission.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
+    seed: Annotated[int, quantity_option(Seed, help="Sets the things in the world and all noise.")] = 1,
     out: Annotated[
         Path | None, typer.Option(help="Folder for log, report and recording; `fleet` beside the store.")
     ] = None,
@@ -94,8 +95,7 @@ def run(
             next(iter(next(iter(dispatch.missions.values())).options.values())),
         )
         page = PageView(None, console, port=view_port) if view or view_for is not None else None
-        limit_s = time_limit_s(time_limit)
-        run_fleet(dispatch, out=folder, seed=seed, time_limit_s=limit_s, page=page, first=first)
+        run_fleet(dispatch, out=folder, seed=seed, time_limit_s=time_limit, page=page, first=first)
         results = told(missions, [each.id for each in queued])
         left = resumable_lines(missions, queue)
     achieved = [_achieved(each) for each in results if each["part_of"] is None]

@@ -14,6 +14,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, refusals, show_table
 from executive.record.history import History, read_history
 from executive.record.ros2 import write_ros2
@@ -23,6 +24,7 @@ from executive.view.map_picture import map_picture
 from executive.view.styles import style_of
 from executive.view.text import printable
 from skills.files.errors import InputError
+from skills.quantities import Delay
 
 
 def log(
@@ -32,7 +34,7 @@ def log(
     map_file: Annotated[
         Path | None, typer.Option("--map", help="Draw map, way, path and particles as PNG, and end.")
     ] = None,
-    at: Annotated[float, typer.Option(min=0.0, help="When the map is drawn (s); else at the end.")] = math.inf,
+    at: Annotated[float, quantity_option(Delay, help="When the map is drawn (s); else at the end.")] = math.inf,
     robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
 ) -> None:

@@ -16,6 +16,7 @@ from executive.cli.durable import STORE, give_up_broken, kept, new_run, run_argu
 from executive.cli.feasibility import refuse_impossible
 from executive.cli.listen_command import hear_request
 from executive.cli.mission_run import Finished
+from executive.cli.number_options import quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.page_view import PageView, queueing
 from executive.cli.requests import Prepared, prepare
@@ -37,7 +38,6 @@ from executive.cli.run_options import (
     VIEW_FOR,
     VIEW_PORT,
     robots_of,
-    time_limit_s,
     time_of_day,
 )
 from executive.cli.shown import control_for, show_files, show_run, voice_for
@@ -64,6 +64,7 @@ from executive.record.profile import Profile, lines
 from executive.speech.voice import Voice
 from executive.store.missions import MissionStore
 from skills.files.errors import InputError
+from skills.quantities import Count, Seed
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
 Say = Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')]
@@ -106,7 +107,7 @@ def run(
     listen_to: Annotated[Path | None, typer.Option("--listen", help="A wav file that says it.")] = None,
     world: World = None,
     given: SET = None,
-    seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
+    seed: Annotated[int, quantity_option(Seed, help="Sets the things in the world and all noise.")] = 1,
     wake: Wake = None,
     answer: Answer = None,
     questions: Questions = None,
@@ -154,7 +155,7 @@ def run(
         at = None if start is None else Start.of(start)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
         asked = replace(asked, given=given_values(given or ()), start=at, map=own_map)
-        asked = replace(asked, time_of_day=time_of_day(day_time), time_limit_s=time_limit_s(time_limit))
+        asked = replace(asked, time_of_day=time_of_day(day_time), time_limit_s=time_limit)
         asked = replace(asked, robots=setups)
         asked = _disturbed(asked, fault, random_faults, scenario)
         asked = replace(asked, variation=Variation(light, clutter, people, friction))
@@ -186,8 +187,8 @@ def evaluate(
     world: World = None,
     given: SET = None,
     seeds: Annotated[str | None, typer.Option(help="Such as 1-20 or 1,4,7; 1-20 unless said.")] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="How many processes on this machine.")] = 2,
-    workers: Annotated[int | None, typer.Option(min=1, help="A local Dask cluster of so many workers.")] = None,
+    jobs: Annotated[int, quantity_option(Count, help="How many processes on this machine.")] = 2,
+    workers: Annotated[int | None, quantity_option(Count, help="A local Dask cluster of so many workers.")] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="tcp://HOST:PORT", help="The scheduler of a Dask cluster.")
     ] = None,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from executive.cli.number_options import quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.signals import cancelled_by_signals
 from executive.cli.worlds import open_world
@@ -19,6 +20,7 @@ from executive.run.control import Control
 from skills.files.errors import InputError
 from skills.files.outside import read_text
 from skills.files.yaml_source import read_yaml
+from skills.quantities import LongDuration, Seed
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -51,12 +53,12 @@ def _group() -> None:
 def build(
     world: Annotated[str, typer.Option(help="World by name or folder.")],
     out: Annotated[Path, typer.Option("--out", help="The map's folder; a map that is in it already goes on.")],
-    seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
+    seed: Annotated[int, quantity_option(Seed, help="Sets the things in the world and all noise.")] = 1,
     route: Annotated[
         Path | None, typer.Option(help="Points x y (m) to drive to, from the start: one in a line, or a YAML list.")
     ] = None,
     most_s: Annotated[
-        float, typer.Option("--max-time", min=1.0, help="End after so many seconds of driving.")
+        float, quantity_option(LongDuration, "--max-time", help="End after so many seconds of driving.")
     ] = 7200.0,
     people: Annotated[
         bool, typer.Option(help="Whether the world's people are there; who stands about becomes part of the map.")

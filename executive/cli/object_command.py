@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from executive.cli.number_options import quantity_option
 from executive.cli.output import print_json, refusals
 from plant.models.imported import ImportedObject, read_imported
 from skills.files.errors import InputError
 from skills.perception.class_forms import class_forms
+from skills.quantities import Factor, Mass
 
 if TYPE_CHECKING:
     from plant.models.builder.importing import Wanted
@@ -34,12 +36,12 @@ def _group() -> None:
 def import_command(
     mesh: Annotated[Path, typer.Argument(metavar="MESH", help="A closed mesh: OBJ, STL, PLY, OFF, glTF or GLB.")],
     name: Annotated[str, typer.Option(help="What worlds call the model: letters, digits and _.")],
-    mass: Annotated[float, typer.Option(help="Its mass, kg.")],
+    mass: Annotated[float, quantity_option(Mass, help="Its mass, kg.")],
     out: Annotated[Path, typer.Option("--out", help="The model's folder; it is made.")],
     class_name: Annotated[
         str | None, typer.Option("--class", help="The class that the detector takes it for; else none of them.")
     ] = None,
-    scale: Annotated[float, typer.Option(help="Metres per unit of the file; 0.001 for millimetres.")] = 1.0,
+    scale: Annotated[float, quantity_option(Factor, help="Metres per unit of the file; 0.001 for millimetres.")] = 1.0,
     up: Annotated[str | None, typer.Option(help="The file's axis that is up: x, y or z; z, but y of glTF.")] = None,
     close_holes: Annotated[bool, typer.Option("--close-holes", help="Close an open mesh where it is open.")] = False,
     as_json: AsJson = False,

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from executive.cli.durable import STORE
+from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.requests import prepare
 from executive.cli.run_options import ROBOTS, SET, robots_of
@@ -26,6 +27,7 @@ from executive.store.trigger_source import refuse_missing_source
 from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, local, schedule_of
 from executive.store.wakeup import wake_server
 from skills.files.errors import InputError
+from skills.quantities import Count, Seed
 
 __all__ = ["queue"]
 
@@ -36,7 +38,9 @@ queue = typer.Typer(
     rich_markup_mode=None,
 )
 
-Number = Annotated[int, typer.Argument(metavar="NUMBER", help="The mission's number, as `errand queue list` shows it.")]
+Number = Annotated[
+    int, quantity_argument(Count, metavar="NUMBER", help="The mission's number, as `errand queue list` shows it.")
+]
 At = Annotated[
     str | None,
     typer.Option(metavar="TIME", help='Queue it at these times, as in "every weekday 09:00" or "2026-12-01 09:00".'),
@@ -62,7 +66,7 @@ def add(
     ] = None,
     say: Annotated[str | None, typer.Option(help="What is said.")] = None,
     world: Annotated[str | None, typer.Option(help="World by name or folder.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
+    seed: Annotated[int, quantity_option(Seed, help="Sets the things in the world and all noise.")] = 1,
     wake: Annotated[
         bool | None, typer.Option("--wake/--no-wake", help="Must the robot's name be said? If the world asks for it.")
     ] = None,

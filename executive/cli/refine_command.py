@@ -10,10 +10,12 @@ import typer
 from rich.console import Console
 
 from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, print_trained, trained
+from executive.cli.number_options import LearningRate, Minutes, quantity_option
 from executive.cli.output import console_for, refusals
 from skills.files.errors import InputError
 from skills.perception.detector.cascade_files import MODEL_FILE
 from skills.perception.training.schedule import REFINEMENT_RATE, RefineOptions, Schedule
+from skills.quantities import Count, Seed
 
 __all__ = ["refine_command"]
 
@@ -32,11 +34,11 @@ def refine_command(
     ] = False,
     minutes: Annotated[
         float | None,
-        typer.Option(min=0.01, help="How long to train; an hour and a half unless said.", show_default=False),
+        quantity_option(Minutes, help="How long to train; an hour and a half unless said.", show_default=False),
     ] = None,
-    epochs: Annotated[int | None, typer.Option(min=1, help="Instead: how many crops for each picture.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all random draws.")] = 1,
-    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="The highest learning rate.")] = REFINEMENT_RATE,
+    epochs: Annotated[int | None, quantity_option(Count, help="Instead: how many crops for each picture.")] = None,
+    seed: Annotated[int, quantity_option(Seed, help="Of the first weights and of all random draws.")] = 1,
+    rate: Annotated[float, quantity_option(LearningRate, help="The highest learning rate.")] = REFINEMENT_RATE,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
     start: Annotated[
         Path | None,

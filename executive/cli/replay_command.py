@@ -8,11 +8,13 @@ from typing import Annotated
 
 import typer
 
+from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, refusals
 from executive.record.history import History, read_history
 from executive.view.replay import fed, to_html
 from executive.view.server import PageContent, PageServer
 from skills.files.errors import InputError
+from skills.quantities import Port, Wait
 
 RECORDING = "recording.html"
 
@@ -21,8 +23,8 @@ def replay(
     file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
     html: Annotated[Path | None, typer.Option(help="Write one HTML file that needs no server, and end.")] = None,
     scene: Annotated[bool, typer.Option(help="With the 3D recording that lies beside the log.")] = True,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Serve here; 0 takes a free port.")] = 0,
-    view_for: Annotated[float | None, typer.Option(min=0.0, help="End after so many seconds.")] = None,
+    port: Annotated[int, quantity_option(Port, help="Serve here; 0 takes a free port.")] = 0,
+    view_for: Annotated[float | None, quantity_option(Wait, help="End after so many seconds.")] = None,
 ) -> None:
     """Show what happened in a run, at any time of it: tree, map, pictures, events, 3D recording."""
     with refusals():

@@ -8,10 +8,12 @@ from typing import Annotated, Final
 import typer
 
 from executive.cli.durable import STORE
+from executive.cli.number_options import quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.queue_run import go_on, run_or_set_aside, run_queue
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from skills.files.errors import InputError, listing
+from skills.quantities import Count
 
 __all__ = ["resume"]
 
@@ -21,7 +23,7 @@ _MAY_GO_ON: Final = (MissionState.RUNNING, MissionState.CANCELLED, MissionState.
 def resume(
     store: Annotated[Path, typer.Option(help="Where the missions are kept.")] = Path("out") / STORE,
     mission: Annotated[
-        int | None, typer.Option(help="Its number; by default the one that was broken off or cancelled last.")
+        int | None, quantity_option(Count, help="Its number; by default the one that was broken off or cancelled last.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while it runs.")] = False,

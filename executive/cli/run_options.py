@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
+
+from executive.cli.number_options import quantity_option
+from executive.mission.scenario import RandomFaults
+from executive.mission.variation import Clutter, Friction, MorePeople
+from skills.quantities import LongDuration, Port, QuantityError, Wait, clock_text
 
 if TYPE_CHECKING:
     from executive.mission.robots import RobotSetup
@@ -36,6 +42,7 @@ __all__ = [
 ]
 
 _NAME = "--start"
+_NUMERIC = re.compile(r"[-+]?\.?\d[\d.,]*(?:e[-+]?\d+)?", re.IGNORECASE)
 START = Annotated[
     str | None, typer.Option(_NAME, metavar="X Y YAW", help="Where the robot stands: metres and radians.")
 ]
@@ -55,20 +62,20 @@ SCENARIO = Annotated[
     list[Path] | None,
     typer.Option("--scenario", metavar="FILE", help="Faults and events: people walk, doors close, objects are moved."),
 ]
-RANDOM_FAULTS = Annotated[int, typer.Option("--random-faults", min=0, max=100, help="So many faults, by the seed.")]
+RANDOM_FAULTS = Annotated[int, quantity_option(RandomFaults, "--random-faults", help="So many faults, by the seed.")]
 TIME_OF_DAY = Annotated[
     str | None, typer.Option("--time-of-day", metavar="HH:MM", help="When the run begins; the time on this machine.")
 ]
 TIME_LIMIT = Annotated[
-    str | None,
-    typer.Option("--time-limit", metavar="TIME", help='The run ends after so long: seconds, or "2 h"; 20 min.'),
+    float | None,
+    quantity_option(LongDuration, "--time-limit", help='The run ends after so long: seconds, or "2 h"; 20 min.'),
 ]
 LIGHT = Annotated[
     str, typer.Option(metavar="NAME", help="normal, dim, bright, evening, low sun, or a brightness (1 is day light).")
 ]
-CLUTTER = Annotated[int, typer.Option(min=0, help="So many more objects lie about, by the seed.")]
-PEOPLE = Annotated[int, typer.Option(min=0, help="So many more people walk about, by the seed.")]
-FRICTION = Annotated[float, typer.Option(help="A factor on the friction of loose objects and robots.")]
+CLUTTER = Annotated[int, quantity_option(Clutter, help="So many more objects lie about, by the seed.")]
+PEOPLE = Annotated[int, quantity_option(MorePeople, help="So many more people walk about, by the seed.")]
+FRICTION = Annotated[float, quantity_option(Friction, help="A factor on the friction of loose objects and robots.")]
 ROBOTS = Annotated[
     str | None,
     typer.Option(
@@ -77,8 +84,8 @@ ROBOTS = Annotated[
 ]
 NO_RECORD = Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")]
 VIEW = Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")]
-VIEW_FOR = Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")]
-VIEW_PORT = Annotated[int, typer.Option(min=0, max=65535, help="The page's port; 0 takes a free one.")]
+VIEW_FOR = Annotated[float | None, quantity_option(Wait, help="The page stays so long (s) after the end.")]
+VIEW_PORT = Annotated[int, quantity_option(Port, help="The page's port; 0 takes a free one.")]
 SET = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value for a parameter of the mission file.")
 ]
@@ -100,36 +107,24 @@ def joined(arguments: Sequence[str]) -> list[str]:
 def _joined(arguments: list[str]) -> Iterator[str]:
     at = 0
     while at < len(arguments):
-        after = arguments[at + 1 : at + 4]
-        if arguments[at] == _NAME and len(after) == 3 and all(map(_is_number, after)):
-            yield f"{_NAME}={' '.join(after)}"
-            at += 4
+        words = arguments[at + 1 : at + 4]
+        if arguments[at] == _NAME and words and _NUMERIC.fullmatch(words[0]):
+            told = [*takewhile(lambda word: not word.startswith("--"), words)]
+            yield f"{_NAME}={' '.join(told)}"
+            at += 1 + len(told)
         else:
             yield arguments[at]
             at += 1
 
 
 def time_of_day(text: str | None) -> str | None:
-    """The time of day of an option. Raises InputError: it is none."""
-    from executive.mission.expression import TIME_OF_DAY as PATTERN
+    """The time of day of an option, as "08:30". Raises InputError: it is none."""
     from skills.files.errors import InputError
 
-    if text is not None and not PATTERN.fullmatch(text):
-        raise InputError(f"--time-of-day {text[:20]}: it is no time of day", hint='write it as "08:30"')
-    return text
-
-
-def time_limit_s(text: str | None) -> float | None:
-    """The seconds of an option. Raises InputError: it is no time span above zero, or more than a week."""
-    from executive.mission.file.condition_schema import in_seconds
-    from skills.files.errors import InputError
-
-    seconds = None if text is None else in_seconds(text)
-    if seconds is not None and not (isinstance(seconds, float) and 0.0 < seconds <= 604_800.0):
-        raise InputError(
-            f"--time-limit {str(text)[:20]}: it is no time span", hint='write seconds, or "30 min" or "2 h"'
-        )
-    return seconds
+    try:
+        return None if text is None else clock_text(text)
+    except QuantityError as error:
+        raise InputError(f"--time-of-day {text}: {error.what}", hint=error.hint) from error
 
 
 def robots_of(text: str | None) -> Mapping[str, RobotSetup]:
@@ -145,10 +140,3 @@ def start_pose(text: str | None) -> Pose2D | None:
     from executive.mission.request import Start
 
     return None if text is None else Start.of(text).pose
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False

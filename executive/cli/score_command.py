@@ -16,6 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from executive.cli.detector_choice import detector_of
 from executive.cli.learning import check_libraries
+from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json, refusals
 from executive.cli.picture_files import read_picture, write_picture
 from executive.cli.score_report import scores_json, show_scores
@@ -27,6 +28,7 @@ from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetect
 from skills.perception.detector.upright import turned, turned_back
 from skills.perception.training.scoring import BODY, BODY_CLASSES, by_camera, judged, picture_errors, score
 from skills.perception.training.scoring_labels import LabelledPicture, pictures_of_coco
+from skills.quantities import Count
 from skills.robot import Picture
 
 __all__ = ["score_command"]
@@ -53,8 +55,8 @@ def score_command(
     data: Annotated[Path, typer.Option(help="A COCO file; its pictures' names count from its folder.")],
     model: Annotated[Path | None, typer.Option(help="Another detector's file; else the one of Errand.")] = None,
     pictures: Annotated[Path | None, typer.Option(help="Another folder from which the names count.")] = None,
-    limit: Annotated[int | None, typer.Option(min=1, help="Only so many pictures, the first.")] = None,
-    worst: Annotated[int | None, typer.Option(min=1, help="How many of the worst pictures to name.")] = None,
+    limit: Annotated[int | None, quantity_option(Count, help="Only so many pictures, the first.")] = None,
+    worst: Annotated[int | None, quantity_option(Count, help="How many of the worst pictures to name.")] = None,
     sheet: Annotated[Path | None, typer.Option(help="Draw the worst pictures, 20 unless said, into this PNG.")] = None,
     views: Annotated[
         bool, typer.Option("--views", help="With test-time augmentation, as the detect skill uses it.")

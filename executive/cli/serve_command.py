@@ -10,11 +10,13 @@ from typing import Annotated, Final
 import typer
 
 from executive.cli.durable import STORE
+from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json, refusals
 from executive.cli.signals import ended_by_signals
 from executive.store.missions import MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.wakeup import WakeupPipe
+from skills.quantities import Port, Wait
 
 __all__ = ["AsJson", "Out", "Store", "serve"]
 
@@ -29,7 +31,7 @@ def serve(
     out: Out = Path("out"),
     store: Store = None,
     host: Annotated[str, typer.Option(help="Where HTTP calls are served.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="The port for HTTP calls; 0 takes a free one.")] = 8950,
+    port: Annotated[int, quantity_option(Port, help="The port for HTTP calls; 0 takes a free one.")] = 8950,
     token: Annotated[
         str | None,
         typer.Option(envvar="ERRAND_TOKEN", help="What calls must bear; by default one kept beside the store."),
@@ -37,7 +39,7 @@ def serve(
     until_idle: Annotated[bool, typer.Option("--until-idle", help="End when nothing is queued.")] = False,
     for_s: Annotated[
         float | None,
-        typer.Option("--for", metavar="SECONDS", min=0.0, help="End after so long; no mission begins then."),
+        quantity_option(Wait, "--for", help="End after so long; no mission begins then."),
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while a mission runs.")] = False,
     as_json: AsJson = False,

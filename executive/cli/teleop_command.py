@@ -15,6 +15,7 @@ import typer
 from executive.cli.assembly import simulate
 from executive.cli.backend import Scene
 from executive.cli.keys import keys_pressed
+from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, refusals
 from executive.cli.page_view import scene_actions
 from executive.cli.replay_command import served
@@ -31,6 +32,7 @@ from plant.worlds.world import World
 from skills.api import SkillContext
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
+from skills.quantities import Delay, Port, Seed
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack
 from skills.teleop.driver import Teleop, TeleopOptions
@@ -48,11 +50,11 @@ def teleop(
     world: Annotated[str, typer.Option("--world", help="A world by name or folder.")] = "flat",
     robot: Annotated[str, typer.Option("--robot", help="The robot's name.")] = "Alice",
     start: START = None,
-    seed: Annotated[int, typer.Option(min=0, help="Sets the objects and the sensors' noise.")] = 1,
+    seed: Annotated[int, quantity_option(Seed, help="Sets the objects and the sensors' noise.")] = 1,
     poses: Annotated[Path, typer.Option("--poses", help="Folder of the poses that are saved.")] = Path("poses"),
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Serve the page here; 0 takes a free port.")] = 0,
+    port: Annotated[int, quantity_option(Port, help="Serve the page here; 0 takes a free port.")] = 0,
     limit: Annotated[
-        float | None, typer.Option("--for", min=0.0, help="End after so many seconds on the robot's clock.")
+        float | None, quantity_option(Delay, "--for", help="End after so many seconds on the robot's clock.")
     ] = None,
 ) -> None:
     """Drive a robot's body and arm by hand. It stops when keys stop coming, and keeps the skills' limits."""

@@ -10,8 +10,10 @@ import typer
 from rich.console import Console
 
 from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, print_trained, trained
+from executive.cli.number_options import LearningRate, Minutes, quantity_option
 from executive.cli.output import console_for, refusals
 from skills.perception.training.schedule import HIGHEST_RATE, REFINING_RATE, Schedule, TrainOptions
+from skills.quantities import Count, Seed
 
 __all__ = ["train_command"]
 
@@ -22,15 +24,14 @@ def train_command(
     data: Annotated[Path, typer.Option(help="Folder of a data set that `errand dataset render` made.")],
     out: Annotated[Path, typer.Option(help="Folder for checkpoints, figures and the ONNX file.")],
     minutes: Annotated[
-        float | None, typer.Option(min=0.01, help="How long to train; four hours unless said.", show_default=False)
+        float | None, quantity_option(Minutes, help="How long to train; four hours unless said.", show_default=False)
     ] = None,
-    epochs: Annotated[int | None, typer.Option(min=1, help="Instead: how often to see each picture.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all random draws.")] = 1,
+    epochs: Annotated[int | None, quantity_option(Count, help="Instead: how often to see each picture.")] = None,
+    seed: Annotated[int, quantity_option(Seed, help="Of the first weights and of all random draws.")] = 1,
     rate: Annotated[
         float | None,
-        typer.Option(
-            min=1e-6,
-            max=0.1,
+        quantity_option(
+            LearningRate,
             help=f"The highest learning rate; {HIGHEST_RATE} unless said, and {REFINING_RATE} with --start.",
             show_default=False,
         ),

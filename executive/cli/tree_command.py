@@ -13,6 +13,7 @@ from typing import Annotated, Final
 import typer
 
 from executive.cli.missions_command import shipped_missions
+from executive.cli.number_options import quantity_option
 from executive.cli.output import refusals
 from executive.cli.requests import prepare
 from executive.mission.request import Request
@@ -24,6 +25,7 @@ from executive.view.mermaid import to_mermaid
 from executive.view.svg import to_svg
 from executive.view.text import to_text
 from skills.files.errors import InputError
+from skills.quantities import Count, Delay, Tries
 
 LOG_SUFFIX: Final = ".mcap"
 
@@ -59,9 +61,11 @@ def tree(
     say: Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')] = None,
     world: Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")] = None,
     form: Annotated[TreeFormat, typer.Option("--format", help="How to show it.")] = TreeFormat.TEXT,
-    depth: Annotated[int | None, typer.Option(min=0, help="Show only so many levels below the root.")] = None,
-    most: Annotated[int | None, typer.Option(min=1, help="Fold what is done or not begun above so many nodes.")] = None,
-    at: Annotated[float | None, typer.Option(min=0.0, help="Of a log: at this time (s), not at its end.")] = None,
+    depth: Annotated[int | None, quantity_option(Tries, help="Show only so many levels below the root.")] = None,
+    most: Annotated[
+        int | None, quantity_option(Count, help="Fold what is done or not begun beyond so many nodes.")
+    ] = None,
+    at: Annotated[float | None, quantity_option(Delay, help="Of a log: at this time (s), not at its end.")] = None,
     robot: Annotated[str | None, typer.Option(metavar="NAME", help="Of a log: of this one of several robots.")] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Write it to this file.")] = None,
     ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,

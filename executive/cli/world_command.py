@@ -14,17 +14,21 @@ import numpy as np
 import typer
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from executive.cli.number_options import quantity_option
 from executive.cli.output import refusals
 from executive.cli.run_options import START, StartCommand, start_pose
 from executive.cli.worlds import knowledge_of, open_world
 from plant.worlds.world import WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.files.errors import InputError
+from skills.files.schema_errors import first_error
+from skills.quantities import Angle, Coordinate, Opening, Quantity
 from skills.robot import Picture, Pose2D
 
 __all__ = ["world"]
 
 MAX_BYTES: Final = 20_000_000
+WallHeight = Annotated[float, Quantity(ge=1.3, le=10.0, unit="m")]
 Out = Annotated[Path, typer.Option("--out", help="The world's folder; it is made.")]
 
 world = typer.Typer(name="world", help="Worlds made of any map, and how a world looks.", rich_markup_mode=None)
@@ -35,11 +39,9 @@ class _Cylinders(BaseModel):
 
     model_config = ConfigDict(allow_inf_nan=False)
 
-    cylinders: tuple[
-        tuple[float, float, Annotated[float, Field(gt=0, le=10)], Annotated[float, Field(gt=0, le=10)]], ...
-    ] = Field(min_length=1, max_length=20_000)
-    start: tuple[float, float, float] | None = None
-    goal: tuple[float, float] | None = None
+    cylinders: tuple[tuple[Coordinate, Coordinate, Opening, Opening], ...] = Field(min_length=1, max_length=20_000)
+    start: tuple[Coordinate, Coordinate, Angle] | None = None
+    goal: tuple[Coordinate, Coordinate] | None = None
 
 
 @world.callback()
@@ -52,7 +54,7 @@ def from_map(
     map_file: Annotated[Path, typer.Argument(metavar="MAP.yaml", help="A map in the form of ROS map_server.")],
     out: Out,
     start: START = None,
-    wall_height: Annotated[float, typer.Option(min=1.3, max=10.0, help="Height of the walls, m.")] = 2.5,
+    wall_height: Annotated[float, quantity_option(WallHeight, help="Height of the walls, m.")] = 2.5,
 ) -> None:
     """Make a world of a map: walls, both grids, rooms and doors to be named."""
     from plant.worlds.builder.maps import FREE, OCCUPIED, UNKNOWN, Grid
@@ -132,10 +134,9 @@ def _cylinders(path: Path) -> _Cylinders:
     except json.JSONDecodeError as error:
         raise InputError(f"damaged JSON, {error.msg}", hint="correct it there", file=path, line=error.lineno) from error
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "it"
-        hint = "it must have 'cylinders': [[x, y, radius, height], ...]"
-        raise InputError(f"{where}: {first['msg']}", hint=hint, file=path) from error
+        where, what, hint = first_error(error.errors())
+        told = "it must have 'cylinders': [[x, y, radius, height], ...]"
+        raise InputError(f"{'.'.join(map(str, where)) or 'it'}: {what}; {hint}", hint=told, file=path) from error
     except (ValueError, RecursionError) as error:
         raise InputError(f"it is no JSON ({type(error).__name__})", hint="correct it", file=path) from error
 

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, StrictInt, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from executive.mission.file.condition_schema import Span
-from executive.mission.variation import MOST_CLUTTER, MOST_PEOPLE, NORMAL_LIGHT
+from executive.mission.scenario import RandomFaults
+from executive.mission.variation import (
+    NORMAL_LIGHT,
+    Brightness,
+    Clutter,
+    Friction,
+    MorePeople,
+)
 from skills.files.yaml_source import Name, Text
+from skills.quantities import LongDuration, Seed
 
 __all__ = ["EvaluationFile", "FaultsFile", "MissionEntry", "VariationsFile"]
 
@@ -42,13 +49,10 @@ class FaultsFile(_Strict):
 
     name: Name | None = Field(None, description="What the report calls it.")
     faults: tuple[Text, ...] = Field((), description="Faults by their words.")
-    random: Annotated[StrictInt, Field(ge=0, le=100)] = Field(0, description="How many more the run's seed draws.")
+    random: RandomFaults = Field(0, description="How many more the run's seed draws.")
 
 
-Light = Name | Annotated[float, Field(ge=0.0, le=5.0)]
-Clutter = Annotated[StrictInt, Field(ge=0, le=MOST_CLUTTER)]
-People = Annotated[StrictInt, Field(ge=0, le=MOST_PEOPLE)]
-Friction = Annotated[float, Field(ge=0.05, le=5.0)]
+Light = Name | Brightness
 _SOME = Field(min_length=1)
 
 
@@ -59,7 +63,7 @@ class VariationsFile(_Strict):
         (NORMAL_LIGHT,), description="Lights by name (normal, dim, bright, evening, low sun), or brightnesses."
     )
     clutter: Annotated[tuple[Clutter, ...], _SOME] = Field((0,), description="How many more objects lie about.")
-    people: Annotated[tuple[People, ...], _SOME] = Field((0,), description="How many more people walk about.")
+    people: Annotated[tuple[MorePeople, ...], _SOME] = Field((0,), description="How many more people walk about.")
     friction: Annotated[tuple[Friction, ...], _SOME] = Field(
         (1.0,), description="Factors on the friction of loose objects and robots."
     )
@@ -89,8 +93,8 @@ class EvaluationFile(_Strict):
     robots: Robots | Annotated[tuple[Robots, ...], _SOME] | None = Field(
         None, description="Robots by name, each with its kind, or a list of such mappings to be tried in turn."
     )
-    seeds: Text | Annotated[tuple[Annotated[StrictInt, Field(ge=0)], ...], _SOME] = Field(
+    seeds: Text | Annotated[tuple[Seed, ...], _SOME] = Field(
         "1-20", description="Seeds such as `1-20`, or a list of them."
     )
-    time_limit: Span | None = Field(None, description="Each run ends after so long on the robot's clock.")
+    time_limit: LongDuration | None = Field(None, description="Each run ends after so long on the robot's clock.")
     variations: VariationsFile = Field(VariationsFile.model_validate({}), description="What is varied.")

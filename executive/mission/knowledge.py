@@ -13,7 +13,7 @@ from executive.mission.robots import RobotsFile
 from skills.files.errors import InputError, suggestion
 from skills.files.yaml_source import Name, YamlSource, read_yaml, validate
 from skills.perception.class_forms import PERSON, THING, class_forms
-from skills.quantities import Angle, Coordinate
+from skills.quantities import Angle, Coordinate, Opening, Quantity, TopHeight
 
 __all__ = [
     "ANYBODY",
@@ -69,8 +69,10 @@ class RobotFacts(_Facts):
 class BatteryFacts(_Facts):
     """When the robot goes to the dock and until when it charges there; states of charge from 0 to 1."""
 
-    low: Annotated[float, Field(ge=0.0, lt=1.0, description="below this the mission is interrupted")] = 0.15
-    charged: Annotated[float, Field(gt=0.0, le=1.0, description="at this the mission goes on")] = 0.8
+    low: Annotated[float, Quantity(ge=0.0, lt=1.0)] = Field(
+        default=0.15, description="below this the mission is interrupted"
+    )
+    charged: Annotated[float, Quantity(gt=0.0, le=1.0)] = Field(default=0.8, description="at this the mission goes on")
 
     @model_validator(mode="after")
     def _in_order(self) -> BatteryFacts:
@@ -92,14 +94,14 @@ class Door(_Facts):
 
     between: tuple[str, str] = Field(description="the rooms on its two sides")
     at: Corner = Field(description="its middle (x, y)")
-    width: Annotated[float, Field(gt=0.0, le=10.0, description="clear width, m")]
+    width: Opening = Field(description="clear width, m")
 
 
 class SurfaceFacts(_Facts):
     """A flat top in a room: other names, height above the floor (m), outline, and poses from which it is seen whole."""
 
     place: str = Field(description="the room that it is in")
-    height: Annotated[float, Field(gt=0.0, le=3.0, description="of the top above the floor, m")]
+    height: TopHeight = Field(description="of the top above the floor, m")
     polygon: Polygon = Field(description="outline of the top, corners (x, y)")
     viewpoints: Annotated[tuple[Pose, ...], Field(min_length=1, description="poses from which it is seen whole")]
     aliases: tuple[Name, ...] = Field(default=(), description="other names")

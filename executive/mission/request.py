@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
 from executive.language.questions import QuestionPolicy
-from executive.mission.robots import RobotSetup
+from executive.mission.robots import RobotSetup, pose_in
 from executive.mission.scenario import NO_SCENARIO, Scenario
 from executive.mission.variation import NO_VARIATION, Variation
 from skills.files.errors import InputError
+from skills.quantities import QuantityError
 from skills.robot import Pose2D
 
 __all__ = ["Request", "Start"]
@@ -38,13 +38,9 @@ class Start:
         if text == _UNKNOWN:
             return Start()
         try:
-            x, y, yaw = map(float, text.split())
-            if not math.isfinite(x + y + yaw):
-                raise ValueError
-        except ValueError:
-            hint = f"give x and y in metres and the heading in radians, or '{_UNKNOWN}'"
-            raise InputError(f"'{text}' is no start", hint=hint) from None
-        return Start(Pose2D(x, y, yaw))
+            return Start(pose_in(text.split()))
+        except QuantityError as error:
+            raise InputError(f"--start {text[:60]}: {error.what}", hint=error.hint) from None
 
 
 @dataclass(frozen=True)

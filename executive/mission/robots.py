@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -13,7 +13,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from skills.files.errors import InputError, SourceLine, known_names, suggestion
 from skills.files.yaml_source import Name, YamlSource
-from skills.quantities import Angle, Coordinate, in_range
+from skills.quantities import Angle, Coordinate, QuantityError, number_in
 from skills.robot import Pose2D
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "display_name",
     "name_key",
     "parse_robots",
+    "pose_in",
     "robot_called",
     "robots_in",
     "same_name",
@@ -34,7 +35,6 @@ __all__ = [
 EVERYBODY: Final = frozenset({"all", "both", "everybody", "everyone", "you", "all robots", "all of you"})
 """Words that call all robots: none is the name of one."""
 _FORM: Final = "write NAME=KIND for each, for instance alice=spot,bob=fetch"
-_START_FORM: Final = "write NAME=KIND@X,Y,YAW, x and y in metres and the heading in radians"
 _NAME: Final = re.compile(r"[^\W\d_][\w' .-]*")
 _ASSIGNED: Final = re.compile(r"([^=@,]*)=(.*)", re.DOTALL)
 _NUMBER: Final = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?\s*", re.IGNORECASE)
@@ -180,6 +180,22 @@ def robots_in(
     return MappingProxyType(setups)
 
 
+def pose_in(words: Sequence[str]) -> Pose2D:
+    """The pose of three words: x and y (m) and the heading (rad). Raises QuantityError: they are none."""
+    named = (("x", Coordinate), ("y", Coordinate), ("the heading", Angle))
+    if len(words) != len(named):
+        raise QuantityError(
+            f"a pose has 3 numbers, not {len(words)}", "give x and y in metres and the heading in radians"
+        )
+    numbers = []
+    for word, (name, hint) in zip(words, named, strict=True):
+        try:
+            numbers.append(float(number_in(word, hint)))
+        except QuantityError as error:
+            raise QuantityError(f"{name} {error.what}", error.hint) from error
+    return Pose2D(*numbers)
+
+
 def _entries(text: str) -> Iterator[str]:
     """The parts of the option, one for each robot; the commas in a start separate none. Raises InputError: none."""
     if not text.strip(" ,"):
@@ -198,11 +214,7 @@ def _entries(text: str) -> Iterator[str]:
 
 
 def _start(name: str, text: str) -> Pose2D:
-    error = InputError(f"'{text[:60]}' is no start for {name}", hint=_START_FORM)
     try:
-        x, y, yaw = (float(part) for part in text.split(","))
-    except ValueError:
-        raise error from None
-    if not all(in_range(value, hint) for value, hint in ((x, Coordinate), (y, Coordinate), (yaw, Angle))):
-        raise error
-    return Pose2D(x, y, yaw)
+        return pose_in(text.split(","))
+    except QuantityError as error:
+        raise InputError(f"'{text[:60]}' is no start for {name}: {error.what}", hint=error.hint) from None

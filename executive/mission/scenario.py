@@ -5,9 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
-__all__ = ["NO_SCENARIO", "Scenario"]
+from skills.quantities import Quantity
+
+__all__ = ["NO_SCENARIO", "RandomFaults", "Scenario"]
+
+RandomFaults = Annotated[int, Quantity(ge=0, le=100)]
+"""How many faults a seed draws."""
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,15 @@ Events are people who walk, doors that close and open, and objects that somebody
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from executive.mission.file.people import StopFile
 from executive.mission.knowledge import Corner, Knowledge
-from executive.mission.scenario import Scenario
+from executive.mission.scenario import RandomFaults, Scenario
 from skills.faults.words import parse_fault
 from skills.files.errors import InputError, Problems, suggestion
 from skills.files.yaml_source import KeyPath, Name, Text, YamlSource, read_yaml, validate
@@ -22,8 +21,6 @@ from skills.quantities import Coordinate, Delay, Height, Speed
 
 __all__ = ["EventFile", "ScenarioFile", "checked_fault", "load_scenario", "scenario_of"]
 
-MOST_RANDOM: Final = 100
-_SECONDS: Final = re.compile(r"\s*(\d+(?:\.\d+)?)\s*s\s*")
 _KINDS: Final = ("person", "door", "object")
 _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "person": ("at", "to", "from", "speed", "loop", "yields"),
@@ -32,13 +29,6 @@ _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 
 
-def _seconds(value: Any) -> Any:
-    """A number of seconds, or its text with the unit."""
-    match = _SECONDS.fullmatch(value) if isinstance(value, str) else None
-    return value if match is None else float(match[1])
-
-
-Seconds = Annotated[Delay, BeforeValidator(_seconds), Field(strict=True)]
 Spot = tuple[Coordinate, Coordinate, Height]
 Stops = Annotated[tuple[Corner | Name | StopFile, ...], Field(min_length=1)]
 
@@ -53,18 +43,18 @@ class EventFile(_Strict):
     person: Name | None = Field(None, description="Somebody who walks; known in the world, or somebody new.")
     door: tuple[Name, Name] | None = Field(None, description="The two rooms that a door joins.")
     object: Name | None = Field(None, description="An object by its name in the world, or the first of a class.")
-    at: Seconds | None = Field(None, description="When, on the robot's clock: `20` or `20 s`.")
+    at: Delay | None = Field(None, description="When, on the robot's clock: `20`, `20 s` or `2 min`.")
     to: Corner | Spot | Name | Stops | None = Field(
         None,
         description="A person: a place, a point [x, y], or a list of them with pauses. An object: a surface, or "
         "[x, y, z] of what it is put on, in metres.",
     )
     from_: Corner | Name | None = Field(None, alias="from", description="Where somebody new stands at first.")
-    speed: Annotated[Speed, Field(strict=True)] = Field(1.2, description="How fast the person walks, in m/s.")
+    speed: Speed = Field(1.2, description="How fast the person walks, in m/s.")
     loop: StrictBool = Field(False, description="Whether the person goes on from the first place after the last.")
     yields: StrictBool = Field(True, description="Whether the person stops for a robot that is close ahead.")
-    closes: Seconds | None = Field(None, description="When the door begins to close.")
-    opens: Seconds | None = Field(None, description="When it begins to open; alone, it is closed at first.")
+    closes: Delay | None = Field(None, description="When the door begins to close.")
+    opens: Delay | None = Field(None, description="When it begins to open; alone, it is closed at first.")
 
     @model_validator(mode="after")
     def _of_one_kind(self) -> EventFile:
@@ -95,9 +85,7 @@ class ScenarioFile(_Strict):
     """What goes wrong and happens while a mission runs."""
 
     faults: tuple[Text, ...] = Field(default=(), description="Faults by their words.")
-    random: Annotated[int, Field(ge=0, le=MOST_RANDOM, strict=True)] = Field(
-        0, description="How many more faults the run's seed draws."
-    )
+    random: RandomFaults = Field(0, description="How many more faults the run's seed draws.")
     events: tuple[EventFile, ...] = Field(default=(), description="What happens in the world.")
 
 

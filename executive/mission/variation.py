@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from typing import Final
+from typing import Annotated, Final
 
 from skills.files.errors import InputError
+from skills.quantities import Quantity, QuantityError, number_of
 
-__all__ = ["MOST_CLUTTER", "MOST_PEOPLE", "NORMAL_LIGHT", "NO_VARIATION", "Variation"]
+__all__ = ["NORMAL_LIGHT", "NO_VARIATION", "Brightness", "Clutter", "Friction", "MorePeople", "Variation"]
 
 NORMAL_LIGHT: Final = "normal"
 MOST_CLUTTER: Final = 40
 MOST_PEOPLE: Final = 8
-_FRICTION: Final = (0.05, 5.0)
+Brightness = Annotated[float, Quantity(ge=0.0, le=5.0)]
+"""1 is day light."""
+Clutter = Annotated[int, Quantity(ge=0, le=MOST_CLUTTER)]
+MorePeople = Annotated[int, Quantity(ge=0, le=MOST_PEOPLE)]
+Friction = Annotated[float, Quantity(ge=0.05, le=5.0)]
+"""A factor; 1 is as usual."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +40,11 @@ class Variation:
     friction: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, value, most in (("clutter", self.clutter, MOST_CLUTTER), ("people", self.people, MOST_PEOPLE)):
-            if not 0 <= value <= most:
-                raise InputError(f"{name} {value} is out of range", hint=f"give 0 to {most}")
-        least, most_friction = _FRICTION
-        if not least <= self.friction <= most_friction:
-            hint = f"give {least:g} to {most_friction:g}; 1 is as usual"
-            raise InputError(f"friction {self.friction:g} is out of range", hint=hint)
+        for name, kind in (("clutter", Clutter), ("people", MorePeople), ("friction", Friction)):
+            try:
+                number_of(getattr(self, name), kind)
+            except QuantityError as error:
+                raise InputError(f"{name}: {error.what}", hint=error.hint) from error
 
     def __bool__(self) -> bool:
         return self != NO_VARIATION

@@ -47,9 +47,7 @@ class NodeView:
         if self.name == "navigate" and above is not None and above.name.startswith("go "):
             return above.name
         given = (port for port in self.ports if not (port.output or port.on_board) and port.value)
-        texts = [
-            port.value for port in given if "str" in port.type or ("Surface" in port.type and "," not in port.value)
-        ]
+        texts = [port.value for port in given if _tells_what(port)]
         return self.name.replace("_", " ") + (f" ({'; '.join(texts)})" if texts else "")
 
     def structure(self, above: NodeView | None = None) -> dict[str, Any]:
@@ -63,6 +61,11 @@ class NodeView:
             "ports": [asdict(port) for port in self.ports],
             "children": [child.structure(self) for child in self.children],
         }
+
+
+def _tells_what(port: Port) -> bool:
+    """Whether a port holds texts, or the name of one surface; logs of older versions say "str" for a text."""
+    return "text" in port.type or "str" in port.type or ("Surface" in port.type and "," not in port.value)
 
 
 def node_view(spec: NodeSpec, states: Mapping[str, NodeState] | None = None) -> NodeView:

@@ -21,7 +21,7 @@ from executive.mission.knowledge import Knowledge
 from executive.tree.types import describe_type, field_types, required
 from skills.api import Surface, Thing
 from skills.files.errors import listing, suggestion
-from skills.quantities import bounds, in_range, range_text, without_range, without_unit
+from skills.quantities import QuantityError, bounds, number_of, without_unit
 from skills.robot import Pose2D
 
 __all__ = ["FROM_KEY", "PortValueError", "gathered", "port_value"]
@@ -65,7 +65,7 @@ def gathered(values: Mapping[str, Any], inputs: type) -> dict[str, tuple[Path, A
 def port_value(value: Any, hint: Any, knowledge: Knowledge, path: Path = ()) -> Any:
     """`value` as the type `hint`, in its range. Raises PortValueError."""
     if bounds(hint):
-        return _in_range(port_value(value, without_range(hint), knowledge, path), hint, path)
+        return _number(value, hint, path)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if hint is Any:
         return value
@@ -193,10 +193,11 @@ def _plain(value: Any, hint: Any, path: Path) -> Any:
     return float(value) if hint is float else value
 
 
-def _in_range(value: float, hint: Any, path: Path) -> float:
-    if not in_range(value, hint):
-        raise PortValueError(path, f"{value:g} is out of range", f"give a value {range_text(hint)}")
-    return value
+def _number(value: Any, hint: Any, path: Path) -> float:
+    try:
+        return number_of(value, hint)
+    except QuantityError as error:
+        raise PortValueError(path, error.what, error.hint) from error
 
 
 def _pose(value: Any, knowledge: Knowledge, path: Path) -> Pose2D:

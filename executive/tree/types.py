@@ -7,7 +7,7 @@ import functools
 import types
 import typing
 from collections.abc import Mapping
-from typing import Any, Union
+from typing import Any, Final, Union
 
 from skills.quantities import bounds, in_range, range_text, without_range
 
@@ -57,15 +57,23 @@ def required(record: type) -> tuple[str, ...]:
 
 
 def describe_type(hint: Any) -> str:
-    """A type hint as a user reads it: "float above 0 and at most 3"."""
+    """A type hint as a user reads it: "number above 0 and at most 3 m/s", "list of text", "text or nothing"."""
     if bounds(hint):
         return f"{describe_type(without_range(hint))} {range_text(hint)}"
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is tuple and arguments[1:] == (Ellipsis,):
+        return f"list of {describe_type(arguments[0])}"
     if origin is tuple:
-        return f"tuple[{', '.join('...' if one is Ellipsis else describe_type(one) for one in arguments)}]"
+        return f"[{', '.join(map(describe_type, arguments))}]"
     if origin in (Union, types.UnionType):
-        return " | ".join("None" if one is type(None) else describe_type(one) for one in arguments)
-    return hint.__name__ if isinstance(hint, type) and not typing.get_args(hint) else str(hint).replace("typing.", "")
+        return " or ".join(map(describe_type, arguments))
+    plain = isinstance(hint, type) and not arguments
+    return _PLAIN.get(hint) or (hint.__name__ if plain else str(hint).replace("typing.", ""))
+
+
+_PLAIN: Final[Mapping[Any, str]] = types.MappingProxyType(
+    {float: "number", int: "whole number", str: "text", bool: "true or false", type(None): "nothing", Any: "any value"}
+)
 
 
 def field_types(record: type) -> Mapping[str, Any]:

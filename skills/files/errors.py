@@ -16,6 +16,7 @@ __all__ = [
     "SourceLine",
     "did_you_mean",
     "disk_is_full",
+    "few",
     "known_names",
     "listing",
     "suggestion",
@@ -23,6 +24,7 @@ __all__ = [
 
 NEAREST: Final = 3
 FEW: Final = 5
+MOST_LISTED: Final = 8
 MOST_LETTERS: Final = 1000
 _USED_BY: Final = "used by"
 _MOST_USERS: Final = 3
@@ -141,6 +143,14 @@ def known_names(word: str, known: Iterable[str]) -> str:
         return f"known are {listing(names)}"
     near = process.extract(word.lower(), {name: name.lower() for name in names}, scorer=fuzz.WRatio, limit=NEAREST)
     return f"known are {', '.join(name for _, _, name in near)} and {len(names) - len(near)} more"
+
+
+def few(words: Iterable[str]) -> str:
+    """The first words of a list, and how many more there are: "a, b, c and 12 more (see docs/reference)"."""
+    names = list(words)
+    if len(names) <= MOST_LISTED:
+        return listing(names)
+    return f"{', '.join(names[:MOST_LISTED])} and {len(names) - MOST_LISTED} more (see docs/reference)"
 
 
 def listing(words: Iterable[str], *, last: str = "and") -> str:

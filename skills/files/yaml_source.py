@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
-from types import MappingProxyType, UnionType
+from types import UnionType
 from typing import Annotated, Any, Final, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from skills.files.errors import InputError, did_you_mean, listing, suggestion
+from skills.files.errors import InputError, did_you_mean, few, suggestion
 from skills.files.outside import read_text
+from skills.files.schema_errors import plain_hint, plain_words
 from skills.files.yaml_nodes import MOST_NESTED, KeyPath, data_and_lines, quoted
-from skills.quantities import range_text, without_range
+from skills.files.yaml_scalars import as_written, truth_words
+from skills.quantities import QuantityError, without_range
 
 __all__ = ["KeyPath", "Name", "Text", "YamlSource", "read_yaml", "validate"]
 
@@ -35,12 +37,16 @@ _SECOND: Final = "but found another document"
 
 @dataclass(frozen=True)
 class YamlSource:
-    """A YAML document: its data, and the line (from 1) at which each key or list item stands."""
+    """A YAML document: its data, and the line (from 1) at which each key or list item stands.
+
+    `words` are those that YAML takes for true or false ("no", "on"), by their places.
+    """
 
     path: Path
     data: Any
     lines: Mapping[KeyPath, int]
     first_line: int = 1
+    words: Mapping[KeyPath, str] = field(default_factory=dict)
 
     def line(self, path: KeyPath) -> int:
         """The line of `path`, or of the nearest part of it that stands in the file."""
@@ -64,7 +70,7 @@ def read_yaml(
     text = read_text(file, most_bytes=MAX_BYTES, hint=hint)
     try:
         _refuse_deep(text, file)
-        root = _composed(text)
+        root = as_written(_composed(text))
         data, lines = data_and_lines(root, file, tags)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -82,7 +88,7 @@ def read_yaml(
         raise InputError(f"broken YAML: {error}", hint="correct it", file=file, line=1) from error
     except RecursionError as error:
         raise InputError("it is nested too deeply", hint="write it flatter", file=file, line=1) from error
-    return YamlSource(file, data, lines)
+    return YamlSource(file, data, lines, words=truth_words(root))
 
 
 def _refuse_deep(text: str, file: Path) -> None:
@@ -115,11 +121,11 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
         InputError: the first thing that does not fit the model, with its line and what would fit; the rest in `others`.
     """
     if not isinstance(source.data, dict):
-        hint = f"begin with the keys {listing(_field_names(model))}"
+        hint = f"begin with the keys {few(_field_names(model))}"
         raise InputError("the file holds no mapping of keys to values", hint=hint, file=source.path, line=1)
     known = _field_names(model)
     if source.data and not any(key in known or did_you_mean(str(key)[:40], known) for key in source.data):
-        what, hint = "none of its keys is known here", f"begin with the keys {listing(known)}"
+        what, hint = "none of its keys is known here", f"begin with the keys {few(known)}"
         raise InputError(what, hint=hint, file=source.path, line=1)
     try:
         return model.model_validate(source.data)
@@ -175,7 +181,7 @@ def _input_error(model: type[BaseModel], source: YamlSource, errors: list[ErrorD
     where = ".".join(str(part) for part in path)
     known = _field_names(_model_at(model, path[:-1]))
     if error["type"] == "extra_forbidden":
-        hint = suggestion(str(path[-1]), known, f"known keys are {listing(known)}")
+        hint = suggestion(str(path[-1]), known, f"known keys are {few(known)}")
         return source.error(path, f"unknown {quoted(path[-1])}", hint)
     if error["type"] == "missing" and isinstance(path[-1], int):
         parts = ".".join(str(part) for part in path[:-1])
@@ -183,49 +189,22 @@ def _input_error(model: type[BaseModel], source: YamlSource, errors: list[ErrorD
     if error["type"] == "missing":
         parent = ".".join(str(part) for part in path[:-1]) or "the file"
         return source.error(path[:-1], f"key {path[-1]!r} is missing in {parent}", f"add {path[-1]!r}")
-    what = " or ".join(dict.fromkeys(_plainly(each) for each in errors)).replace(" or should be ", " or ")
-    if error["type"] in _OUT_OF_RANGE and len(errors) == 1:
-        what = f"should be {range_text(_kind_at(model, path))}"
-    hint = _nearest_word(error) or f"it reads {error['input']!r} now"[:120]
+    what = " or ".join(dict.fromkeys(map(plain_words, errors))).replace(" or should be ", " or ")
+    telling = next((each for each in errors if isinstance(each.get("ctx", {}).get("error"), QuantityError)), error)
+    hint = _comma_hint(error, path, source) or plain_hint(telling, source.words.get(path))
     return source.error(path, f"{where or 'the file'}: {what[:1].lower()}{what[1:]}", hint)
 
 
-def _plainly(error: ErrorDetails) -> str:
-    """What is wrong, in plain words."""
-    context = error.get("ctx", {})
-    if error["type"] == "string_pattern_mismatch" and _FIRST not in context["pattern"]:
-        return f"should be as {context['pattern']} says"
-    if error["type"] == "too_short" and context["min_length"] > 1:
-        return f"should have {context['min_length']} parts or more"
-    said = _PLAINER.get(error["type"], error["msg"].removeprefix("Value error, "))
-    return f"should be {said.removeprefix('Input should be ')}" if said.startswith("Input should be ") else said
-
-
-def _nearest_word(error: ErrorDetails) -> str | None:
-    """A guess at which of the words that are allowed was meant."""
-    allowed = re.findall(r"'([^']*)'", str(error.get("ctx", {}).get("expected", "")))
-    near = did_you_mean(str(error["input"]), allowed)
-    return None if near is None else f"did you mean {near!r}?"
-
-
-_OUT_OF_RANGE: Final = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
-_PLAINER: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "model_type": "should be a mapping of keys to values",
-        "model_attributes_type": "should be a mapping of keys to values",
-        "dict_type": "should be a mapping of keys to values",
-        "tuple_type": "should be a list",
-        "string_type": "should be a text",
-        "float_type": "should be a number",
-        "int_type": "should be a whole number",
-        "bool_type": "should be true or false",
-        "string_too_short": "should not be empty",
-        "too_short": "should not be empty",
-        "too_long": "has too many parts",
-        "string_pattern_mismatch": "should hold something that can be seen, and no control characters",
-        "finite_number": "should be a finite number",
-    }
-)
+def _comma_hint(error: ErrorDetails, path: KeyPath, source: YamlSource) -> str | None:
+    """What to write for `{battery: 0,3}`, in which YAML sees the keys battery and 3; None for anything else."""
+    if error["type"] != "invalid_key":
+        return None
+    above: Any = source.data
+    for part in path[:-1]:
+        above = above[part]
+    before = next((key for key, after in pairwise(above) if after == path[-1] and above[after] is None), None)
+    whole = before is not None and type(above[before]) is int and type(path[-1]) is int
+    return f"write '{before}: {above[before]}.{path[-1]}', with a point" if whole else None
 
 
 def _field_names(model: type[BaseModel] | None) -> list[str]:

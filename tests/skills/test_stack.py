@@ -58,13 +58,13 @@ def test_a_skill_takes_its_options_from_the_stack():
         ({"planner": {"margin": 0.1}}, ("planner", "margin"), "margin_m"),
         ({"planner": {"margin_m": "wide"}}, ("planner", "margin_m"), "'wide'"),
         ({"planner": {"margin_m": float("nan")}}, ("planner", "margin_m"), "nan"),
-        ({"skills": {"hand_over": {"gaps_m": [0.5, 1e9]}}}, ("skills", "hand_over", "gaps_m", 1), "1000000000"),
+        ({"skills": {"hand_over": {"gaps_m": [0.5, 1e9]}}}, ("skills", "hand_over", "gaps_m", 1), "1e+09"),
         (
             {"localiser": {"use": "scan_matching", "matching": {"sigma": 1}}},
             ("localiser", "matching", "sigma"),
-            "sigma_m",
+            "did you mean 'sigma_m'?",
         ),
-        ({"skills": {"fly": {}}}, ("skills", "fly"), "navigate"),
+        ({"skills": {"fly": {}}}, ("skills", "fly"), "known are approach"),
         ({"skills": {"navigate": {"people": {"periods": 1}}}}, ("skills", "navigate", "people", "periods"), "period_s"),
         ({"costmap": 3}, ("costmap",), "use"),
         ([], (), "localiser"),
@@ -77,7 +77,7 @@ def test_what_does_not_fit_is_refused_with_its_place(data, path, hint):
     assert hint in error.value.hint
 
 
-@pytest.mark.parametrize("value", [-1, 0, 100, float("inf")])
+@pytest.mark.parametrize("value", [-1, 0, 100])
 def test_a_value_out_of_range_is_refused_with_the_range(value):
     with pytest.raises(StackError) as error:
         stack_of({"controller": {"max_speed_m_s": value}})

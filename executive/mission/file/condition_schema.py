@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Any, Final
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictInt, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from executive.mission.expression import TIME_OF_DAY
 from skills.files.errors import listing
 from skills.files.yaml_source import Name, Text
-from skills.quantities import Delay, Duration, Share
+from skills.quantities import Count, Delay, Duration, Share, clock_text
 
-__all__ = ["CONDITION", "DockFile", "RepeatFile", "Rounds", "Span", "Strict", "WaitFile", "WhileFile", "in_seconds"]
+__all__ = ["CONDITION", "DockFile", "RepeatFile", "Strict", "WaitFile", "WhileFile"]
 
-_UNITS_S: Final = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
-_SPAN: Final = re.compile(r"(\d+(?:\.\d+)?)\s*(s|min|h)?")
 _LOOKS: Final = ("look", "object", "person", "door")
 _CONDITIONS: Final = ("expression", "look", "object", "person", "door", "button", "all", "any", "not")
 
@@ -26,25 +22,8 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=False)
 
 
-def in_seconds(value: object) -> object:
-    """Seconds of a text such as "30 min"; anything else stays as it is."""
-    match = _SPAN.fullmatch(value.strip()) if isinstance(value, str) else None
-    return value if match is None else float(match[1]) * _UNITS_S[match[2] or ""]
-
-
-Span = Annotated[
-    Duration,
-    Field(strict=True),
-    BeforeValidator(in_seconds, json_schema_input_type=float | Annotated[str, Field(pattern=rf"^{_SPAN.pattern}$")]),
-]
-"""A time span: seconds, or a text such as "30 min" or "2 h"."""
-Age = Annotated[
-    Delay,
-    Field(strict=True),
-    BeforeValidator(in_seconds, json_schema_input_type=float | Annotated[str, Field(pattern=rf"^{_SPAN.pattern}$")]),
-]
-"""How old something may be: as a `Span`, or 0."""
-Rounds = Annotated[StrictInt, Field(ge=1, le=100_000)]
+Clock = Annotated[str, BeforeValidator(clock_text)]
+"""A time of day."""
 
 
 def _expression(value: object) -> object:
@@ -69,7 +48,7 @@ class ConditionFile(Strict):
     all: Annotated[tuple[Condition, ...], Field(min_length=1)] | None = Field(None, description="All of these hold.")
     any: Annotated[tuple[Condition, ...], Field(min_length=1)] | None = Field(None, description="One of these holds.")
     not_: Condition | None = Field(None, alias="not", description="This does not hold.")
-    max_age_s: Age = Field(
+    max_age_s: Delay = Field(
         0.0,
         description="How old an answer may be that is not asked for again (seconds, or a text such as "
         '"2 min"); 0: each time that the condition is asked, the robot looks again.',
@@ -104,12 +83,12 @@ ConditionFile.model_rebuild()
 class RepeatFile(Strict):
     """Rounds of `steps`."""
 
-    times: Rounds | None = Field(None, description="How many rounds; with a condition, how many at most.")
+    times: Count | None = Field(None, description="How many rounds; with a condition, how many at most.")
     until: Condition | None = Field(None, description="Rounds are made until this holds after one.")
     while_: Condition | None = Field(
         None, alias="while", description="Rounds are made as long as this holds before one."
     )
-    every: Span | None = Field(
+    every: Duration | None = Field(
         None, description='A round begins so long after the one before began: seconds, or "30 min".'
     )
     for_each: tuple[Any, ...] | Text | None = Field(
@@ -136,11 +115,9 @@ class WaitFile(Strict):
     """What is waited for: one of a condition, a time and a time of day."""
 
     for_: Condition | None = Field(None, alias="for", description="Wait until this holds.")
-    seconds: Span | None = Field(None, description='So long: seconds, or "10 min".')
-    until_clock: Annotated[str, Field(pattern=rf"^{TIME_OF_DAY.pattern}$")] | None = Field(
-        None, description='Until this time of day, as in "14:30".'
-    )
-    every: Span = Field(15.0, description="How often a condition that takes a look is looked at.")
+    seconds: Duration | None = Field(None, description='So long: seconds, or "10 min".')
+    until_clock: Clock | None = Field(None, description='Until this time of day, as in "14:30".')
+    every: Duration = Field(15.0, description="How often a condition that takes a look is looked at.")
 
     @model_validator(mode="after")
     def _one_form(self) -> WaitFile:

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["RouteFile", "StopFile", "routes_in"]
 
-Seconds = Annotated[Delay, Field(strict=True)]
-
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -28,7 +26,7 @@ class StopFile(_Strict):
     """A waypoint at which the person stands for a while."""
 
     at: Corner | Name = Field(description="A point (x, y) in metres, or a place by its name.")
-    pause: Seconds = Field(0.0, description="How long the person stands there, in seconds.")
+    pause: Delay = Field(0.0, description="How long the person stands there, in seconds.")
 
 
 class RouteFile(_Strict):
@@ -37,9 +35,9 @@ class RouteFile(_Strict):
     waypoints: Annotated[tuple[Corner | Name | StopFile, ...], Field(min_length=1)] = Field(
         description="Points (x, y) in metres or names of places, in order; the person begins at the first."
     )
-    speed: Annotated[Speed, Field(strict=True)] = Field(1.2, description="How fast the person walks, in m/s.")
+    speed: Speed = Field(1.2, description="How fast the person walks, in m/s.")
     loop: StrictBool = Field(False, description="Whether the first waypoint follows the last; by default, once.")
-    start: Seconds = Field(0.0, description="When the person sets off, in seconds from the beginning.")
+    start: Delay = Field(0.0, description="When the person sets off, in seconds from the beginning.")
     yields: StrictBool = Field(True, description="Whether the person stops for a robot that is close ahead.")
 
 

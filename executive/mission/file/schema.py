@@ -13,7 +13,6 @@ from pydantic import (
     Field,
     PrivateAttr,
     StrictBool,
-    StrictInt,
     field_validator,
     model_validator,
 )
@@ -24,8 +23,6 @@ from executive.mission.file.condition_schema import (
     Condition,
     DockFile,
     RepeatFile,
-    Rounds,
-    Span,
     Strict,
     WaitFile,
     WhileFile,
@@ -45,7 +42,7 @@ from executive.mission.file.people import RouteFile
 from executive.mission.robots import RobotsFile
 from skills.files.errors import InputError, listing
 from skills.files.yaml_source import Name, Text, YamlSource
-from skills.quantities import Duration, bounds, without_range, without_unit
+from skills.quantities import Count, Duration, Number, Quantity, Share, Whole, bounds, without_range, without_unit
 
 __all__ = [
     "GuardsFile",
@@ -58,9 +55,6 @@ __all__ = [
     "StepFile",
     "mission_json_schema",
 ]
-
-Seconds = Annotated[Duration, Field(strict=True)]
-Share = Annotated[float, Field(ge=0.0, le=1.0, strict=True)]
 
 
 def _choices(data: Any) -> Any:
@@ -80,9 +74,10 @@ Choices = Annotated[
         json_schema_input_type=dict[Name, "Steps | None"] | tuple[Name, ...],
     ),
 ]
-Attempts = Annotated[StrictInt, Field(ge=0, le=100)]
-Objects = Annotated[StrictInt, Field(ge=0, le=10)]
-Scalar = str | StrictBool | StrictInt | Annotated[float, Field(strict=True)] | None
+Attempts = Annotated[int, Quantity(ge=0, le=100)]
+Objects = Annotated[int, Quantity(ge=0, le=10)]
+Given = str | StrictBool | Whole | Number
+Scalar = Given | None
 COMMAND_KEYS: Final = ("take", "to", "do", "object")
 BLOCKS: Final = ("if", "repeat", "try", "together", "wait", "check", "dock", "group", "speak", "ask", "set")
 FORMS: Final = f"'say', some of 'take', 'to', 'do' and 'object', 'skill', 'use', or one of {listing(BLOCKS, last='or')}"
@@ -117,7 +112,7 @@ class GuardsFile(Strict):
 
     battery: Share | None = Field(None, description="The least charge of the battery, from 0 to 1.")
     localised: StrictBool | None = Field(None, description="Whether the robot must know where it is.")
-    time: Seconds | None = Field(
+    time: Duration | None = Field(
         None, description="The most seconds on the robot's clock since the run began; later than that it fails."
     )
     stale: StaleData | None = Field(
@@ -131,14 +126,14 @@ class QuestionFile(Strict):
     """The question to the operator for `on_failure: ask`."""
 
     text: Text | None = Field(None, description="The question; by default it tells what failed and why.")
-    limit: Seconds = Field(60.0, description="Seconds on the robot's clock to wait for an answer.")
+    limit: Duration = Field(60.0, description="Seconds on the robot's clock to wait for an answer.")
     default: Literal["skip", "stop"] = Field("stop", description="The answer when nobody answers in time.")
 
 
 class PolicyFile(Strict):
     """How something runs."""
 
-    timeout: Seconds | None = Field(None, description="Seconds on the robot's clock for each attempt.")
+    timeout: Duration | None = Field(None, description="Seconds on the robot's clock for each attempt.")
     retries: Attempts | None = Field(None, description="How many more attempts after a failure.")
     on_failure: OnFailure | None = Field(
         None,
@@ -226,7 +221,7 @@ class StepFile(PolicyFile):
     together: Annotated[tuple[StepFile, ...], Field(min_length=2)] | None = Field(
         None, description="Steps that run side by side: those that move different parts of the robot, or none."
     )
-    done_when: Literal["all", "any"] | Rounds | None = Field(
+    done_when: Literal["all", "any"] | Count | None = Field(
         None, description="How many steps of `together` must be done: all of them unless said."
     )
     wait: WaitFile | None = Field(None, description="Wait for a condition, some time, or until a time of day.")
@@ -249,7 +244,7 @@ class StepFile(PolicyFile):
     match: Literal["place", "person", "object", "number", "text"] | None = Field(
         None, description="What the answer is, where there are no choices."
     )
-    limit: Span = Field(60.0, description="How long to wait for an answer (robot's clock).")
+    limit: Duration = Field(60.0, description="How long to wait for an answer (robot's clock).")
     default: Scalar = Field(None, description="The answer when nobody answers in time; without one the step fails.")
     set: dict[Name, Scalar] | None = Field(None, description="Values by name: numbers, truths or expressions.")
 
@@ -297,7 +292,7 @@ class HandlerFile(Strict):
 
     if_: Condition = Field(alias="if", description="When this begins to hold, the steps are interrupted.")
     do: Steps = Field(description="What is done then; afterwards the steps go on.")
-    times: Rounds = Field(10, description="How often at most; once more is a failure.")
+    times: Count = Field(10, description="How often at most; once more is a failure.")
 
 
 class RoundFile(Strict):
@@ -385,7 +380,7 @@ class MissionFile(PolicyFile):
         "first: the likeliest is taken. refuse (the default): the file is refused.",
     )
     each: PolicyFile | None = Field(None, description="The policy of every step that does not say otherwise.")
-    variables: dict[Name, str | StrictBool | StrictInt | Annotated[float, Field(strict=True)]] | None = Field(
+    variables: dict[Name, Given] | None = Field(
         None, description="Values by name, as they are at the beginning; steps change them with `set` and `gives`."
     )
     steps: Steps | None = Field(description="What to do, one after the other. Left out where there are `parts`.")

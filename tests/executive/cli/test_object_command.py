@@ -72,10 +72,11 @@ def test_scripts_are_told_the_same_twice(mesh, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (("--mass", 0), "the mass 0 kg is not positive"),
-        (("--mass", -1.5), "the mass -1.5 kg is not positive"),
-        (("--mass", "nan"), "the mass nan kg is not positive"),
-        (("--scale", 0), "the scale 0 is not positive"),
+        (("--mass", 0), "--mass: should be above 0 and at most 100 kg; it reads 0 now"),
+        (("--mass", -1.5), "should be above 0 and at most 100 kg; it reads -1.5 now"),
+        (("--mass", "nan"), "should be a finite number"),
+        (("--mass", "300"), "it reads 300 now; write 0.3 for 300 g"),
+        (("--scale", 0), "--scale: should be above 0 and at most 1000"),
         (("--scale", 1000), "drill.stl: it is 200 x 60 x 40 m large; if its unit is millimetres, give --scale 1"),
         (("--name", "my drill"), "the name 'my drill' is no identifier"),
         (("--name", "wrench"), "the name 'wrench' is taken by a class of objects"),

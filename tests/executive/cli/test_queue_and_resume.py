@@ -457,7 +457,7 @@ def test_serve_ends_when_its_time_is_over(errand, mission, plant):
     assert plant.runs == []
 
 
-@pytest.mark.parametrize("seconds", ["1e300", "inf"])
+@pytest.mark.parametrize("seconds", ["1e9", "300 days"])
 def test_serve_may_have_all_the_time_there_is(errand, mission, plant, seconds):
     errand("queue", "add", mission("first"))
     assert errand("queue", "serve", "--for", seconds, "--until-idle", "--quiet").exit_code == 0

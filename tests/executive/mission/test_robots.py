@@ -45,7 +45,7 @@ def test_a_start_may_follow_the_kind():
         ("alice=spto", "unknown kind of robot 'spto'; did you mean 'spot'? (known are fetch and spot)"),
         ("alice=pr2", "unknown kind of robot 'pr2'; known are fetch and spot"),
         ("alice=", "unknown kind of robot ''; known are fetch and spot"),
-        ("alice=spot@1,2", "'1,2' is no start for alice; write NAME=KIND@X,Y,YAW"),
+        ("alice=spot@1,2", "'1,2' is no start for alice: a pose has 3 numbers, not 2"),
         ("alice=spot@x,2,3", "gives no robot with its kind|is no start for alice"),
         ("alice=spot@1,2,1e9", "is no start for alice"),
     ],

@@ -42,7 +42,7 @@ def test_assignable(source, target, expected):
 
 def test_types_are_described_as_users_read_them():
     assert [describe_type(hint) for hint in (float, tuple[str, ...], tuple[Speed, Count] | None)] == [
-        "float",
-        "tuple[str, ...]",
-        "tuple[float above 0 and at most 3 m/s, int at least 1 and at most 100000] | None",
+        "number",
+        "list of text",
+        "[number above 0 and at most 3 m/s, whole number from 1 to 100000] or nothing",
     ]

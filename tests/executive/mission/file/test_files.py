@@ -174,7 +174,7 @@ def test_a_plain_pose_is_a_goal(compile_text):
 def test_a_number_out_of_its_ports_range_is_refused_at_its_line(compile_text, speed):
     text = f"name: m\nsteps:\n  - skill: navigate\n    with:\n      goal: kitchen\n      max_speed: {speed}\n"
     error = refused(compile_text, text)
-    assert (error.line, "max_speed" in error.message, speed.strip("-.") in error.message) == (6, True, True)
+    assert (error.line, "max_speed" in error.message, speed in str(error)) == (6, True, True)
 
 
 DETECT = """\

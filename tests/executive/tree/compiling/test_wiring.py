@@ -49,13 +49,13 @@ def test_good_wiring_passes():
 @pytest.mark.parametrize(
     ("inputs", "words"),
     [
-        ({}, "input port 'speed' has no value; give it a float"),
+        ({}, "input port 'speed' has no value; give it a number"),
         ({"speed": "fast"}, "input port 'speed' got 'fast'"),
         ({"speed": True}, "input port 'speed' got True"),
         ({"speed": 1.0, "names": ("x", 3)}, "input port 'names'"),
         ({"speed": 1.0, "name": "x"}, "no input port 'name'; did you mean 'names'?"),
         ({"speed": FromBoard("a/later")}, "reads 'a/later', which nothing before it writes"),
-        ({"speed": FromBoard("a/word")}, "reads 'a/word', a str"),
+        ({"speed": FromBoard("a/word")}, "reads 'a/word', a text"),
     ],
 )
 def test_bad_inputs_are_refused_with_the_node(inputs, words):

@@ -79,7 +79,7 @@ class Quantity:
 
 
 Coordinate = Annotated[
-    float, Quantity(ge=-10_000.0, le=10_000.0, unit="m", mistake="count from an origin near the building, in metres")
+    float, Quantity(ge=-10_000.0, le=10_000.0, unit="m", mistake="subtract the same from all places")
 ]
 """x or y of the world frame."""
 Length = Annotated[float, Quantity(gt=0.0, le=100.0, unit="m")]

@@ -10,18 +10,18 @@ from typing import Annotated, Final, Literal
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
 from skills.estimate.compiled import distances
 from skills.files.errors import InputError
 from skills.files.outside import file_beside
 from skills.files.pictures import picture_shares
 from skills.files.yaml_source import YamlSource, read_yaml, validate
+from skills.quantities import Angle, Coordinate, Height, Quantity, Share
 from skills.robot import FloatArray
 
 BoolGrid = NDArray[np.bool_]
 MOST_CELLS: Final = 16_000_000
-MOST_FROM_ORIGIN_M: Final = 10_000.0
 UNKNOWN_GREY: Final = 205
 """What map_saver writes for unknown ground."""
 
@@ -89,20 +89,7 @@ def signed_distance(occupied: BoolGrid, resolution_m: float) -> NDArray[np.float
     return np.ascontiguousarray(np.where(occupied, 0.5 - inside, outside - 0.5) * resolution_m, dtype=np.float32)
 
 
-def _near_the_origin(value: float) -> float:
-    if abs(value) > MOST_FROM_ORIGIN_M:
-        raise ValueError(f"should lie within {MOST_FROM_ORIGIN_M:g} m of 0; subtract the same from all places")
-    return value
-
-
-def _in_radians(value: float) -> float:
-    if abs(value) > 2.0 * math.pi:
-        raise ValueError(f"should be an angle in radians; {value:g} degrees is {math.radians(value):.4g}")
-    return value
-
-
-_FromOrigin = Annotated[float, AfterValidator(_near_the_origin)]
-_Yaw = Annotated[float, AfterValidator(_in_radians)]
+CellSize = Annotated[float, Quantity(ge=0.005, le=1.0, unit="m")]
 
 
 class _MapFile(BaseModel):
@@ -111,14 +98,14 @@ class _MapFile(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     image: str
-    resolution: float = Field(ge=0.005, le=1.0)
-    origin: tuple[_FromOrigin, _FromOrigin, _Yaw]
-    occupied_thresh: float = Field(ge=0.0, le=1.0)
-    free_thresh: float = Field(ge=0.0, le=1.0)
+    resolution: CellSize
+    origin: tuple[Coordinate, Coordinate, Angle]
+    occupied_thresh: Share
+    free_thresh: Share
     negate: bool = False
     mode: Literal["trinary", "scale", "raw"] | None = None
     trinary: bool | None = None
-    height_band_m: tuple[float, float] | None = None
+    height_band_m: tuple[Height, Height] | None = None
 
     @property
     def read_as(self) -> str:

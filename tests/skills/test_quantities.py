@@ -43,7 +43,7 @@ def test_a_number_in_its_range_is_taken(value: Any, hint: Any, number: float) ->
         (300, Length, "above 0 and at most 100 m", "write 0.3 for 300 mm or 3 for 300 cm"),
         (300, Mass, "above 0 and at most 100 kg", "write 0.3 for 300 g"),
         (5, Speed, "above 0 and at most 3 m/s", "write 1.39 for 5 km/h"),
-        (500_000, Coordinate, "from -10000 to 10000 m", "an origin near the building"),
+        (500_000, Coordinate, "from -10000 to 10000 m", "subtract the same from all places"),
         (-5, Delay, "from 0 to 86400 s", "it reads -5 now"),
         (0, Count, "from 1 to 100000", "it reads 0 now"),
         (2.0, Count, "a whole number", "write 2"),

@@ -74,7 +74,12 @@ def test_unknown_ground_is_blocked_for_planning(tmp_path):
         ("negate: 0", "resolution: 1", 4, "key 'resolution' stands twice"),
         ("negate: 0", "mode: scale\ntrinary: true", 5, "trinary"),
         ("origin: [-1.0, -2.0, 0.0]", "origin: [448262.5, -2, 0.0]", 3, "origin"),
-        ("origin: [-1.0, -2.0, 0.0]", "origin: [0, 0, 90]", 3, "origin.2: should be an angle in radians; 90 degrees"),
+        (
+            "origin: [-1.0, -2.0, 0.0]",
+            "origin: [0, 0, 90]",
+            3,
+            "origin.2: should be from -6.283 to 6.283 rad; it reads 90 now; write 1.57",
+        ),
         ("origin: [-1.0, -2.0, 0.0]", "origin: [0, .nan, 0]", 3, "origin"),
         ("resolution: 0.1", "resolution: .inf", 2, "resolution"),
         ("image: room.pgm", "image: http://x/room.pgm", 1, "image"),

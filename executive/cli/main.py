@@ -88,7 +88,9 @@ ScenarioOrMission = Annotated[
         metavar="FILE", help="A scenario file, a mission file, or a name of `errand missions`.", show_default=False
     ),
 ]
-RandomMissions = Annotated[int | None, typer.Option(help="Run so many random English missions; each seed draws one.")]
+RandomMissions = Annotated[
+    int | None, quantity_option(Count, help="Run so many random English missions; each seed draws one.")
+]
 Worlds = Annotated[
     str | None, typer.Option(metavar="WORLD,...", help="The worlds of random missions, in turn; flat unless said.")
 ]

@@ -4,6 +4,7 @@
 # make train  adds the extra `train`: torch, to train the detector and the speech adapter
 # make check  lint, format and strict types
 # make bench  benchmarks, as ratios
+# make nightly  the smallest case of each measure, and other long checks
 # make docs   the documentation as a site: open out/site/index.html
 
 PYTHON ?= $(shell command -v python3.11 || echo python3)
@@ -22,7 +23,7 @@ define install
 	$$run apt-get update -qq && $$run apt-get install -y -qq --no-install-recommends $(1) >/dev/null; }
 endef
 
-.PHONY: env train demo test fast check bench docs format debian voices clean
+.PHONY: env train demo test fast nightly check bench docs format debian voices clean
 
 env: $(VENV)/.ready
 
@@ -58,10 +59,13 @@ demo: $(VENV)/.run
 	$(BIN)/errand run --say "Hey Alice, can you fetch me a drink from the kitchen" --world flat --seed 1
 
 test: env voices
-	$(BIN)/pytest -n $(JOBS) --dist worksteal --ignore=tests/benchmarks
+	$(BIN)/pytest -n $(JOBS) --dist worksteal --benchmark-skip
 
 fast: env
-	$(BIN)/pytest -n $(JOBS) --ignore=tests/benchmarks -m "not mission and not nightly"
+	$(BIN)/pytest -n $(JOBS) --benchmark-skip -m "not mission and not nightly"
+
+nightly: env voices
+	$(BIN)/pytest -n $(JOBS) --dist worksteal --benchmark-skip -m nightly
 
 check: env
 	$(BIN)/ruff check .

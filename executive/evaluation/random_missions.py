@@ -155,7 +155,7 @@ class _Slots(dict[str, str]):
         usual = self.usual_surfaces(names)
         return self.placed(self.choice("surface", [name for name in self._known.surfaces if name not in usual]))
 
-    def furnished(self, names: Iterable[str]) -> str:
+    def furnished(self, names: Iterable[str] = ()) -> str:
         """A room with surfaces, where objects of these classes are not to be expected."""
         known = self._known
         homes = {known.room(surface) for surface in self.usual_surfaces(names)}
@@ -216,6 +216,7 @@ _SLOTS: Final[Mapping[str, Callable[[_Slots], str]]] = MappingProxyType(
         "surface to clear": lambda slots: slots.placed(slots.to_clear()),
         "cleared onto": lambda slots: slots.cleared_onto(),
         "room": lambda slots: slots.room(),
+        "furnished room": lambda slots: slots.furnished(),
         "second room": lambda slots: slots.room("second room"),
         "surface": lambda slots: slots.surface(),
         "person": lambda slots: slots.person(),

@@ -93,12 +93,11 @@ class Clocked:
 
 
 class Driver:
-    """One Spot in a world. `maps` are the scan and the keep-out grid that it is given."""
+    """One Spot at the start of a world. `maps` are the scan and the keep-out grid that it is given."""
 
-    def __init__(
-        self, world: World, stack: RobotStack, maps: tuple[GridMap, GridMap], *, seed: int, start: Pose2D | None = None
-    ) -> None:
-        self.simulation = Simulation(world, seed=seed, visuals=False, starts={ROBOT: start}, robots={ROBOT: "spot"})
+    def __init__(self, world: World, stack: RobotStack, maps: tuple[GridMap, GridMap], *, seed: int) -> None:
+        starts = {ROBOT: world.start}
+        self.simulation = Simulation(world, seed=seed, visuals=False, starts=starts, robots={ROBOT: "spot"})
         self.planner, self.controller = Clocked(stack.planner, "problem"), Clocked(stack.controller, "build")
         options = stack.skills.get("navigate") or NavigateOptions()
         blind = replace(options, low_obstacles=WatchOptions(period_s=86_400.0))

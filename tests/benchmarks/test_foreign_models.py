@@ -52,9 +52,9 @@ def test_a_face_of_four_corners_becomes_two_triangles_and_negative_numbers_count
 
 
 def test_tools_are_of_their_class_small_things_of_none_and_lamps_and_furniture_are_left_out(catalogues: Path) -> None:
-    # name: family
+    # name: category
     expected = {"Hammer": "hammer", "Mug": "other", "Wall lamp": None, "Wardrobe": None}
-    assert {entry.name: entry.family for entry in entries(catalogues / "Some.sh3f")} == expected
+    assert {entry.name: entry.category for entry in entries(catalogues / "Some.sh3f")} == expected
 
 
 def test_a_model_has_the_size_that_its_catalogue_tells_with_z_up(catalogues: Path, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Protocol
 
@@ -17,6 +17,8 @@ from pydrake.systems.framework import Context
 
 from plant.scene import Scene
 from plant.snapshot.values import State
+from skills.files.errors import InputError
+from skills.files.plugins import PluginDefect, distribution_of, run_plugin
 from skills.robot import Capabilities, Pose2D, Robot
 
 GROUP = "errand.robots"
@@ -118,11 +120,18 @@ class RobotKind:
 
 
 @cache
-def robot_kinds() -> Mapping[str, RobotKind]:
+def robot_kinds() -> Mapping[str, EntryPoint]:
     """The kinds that are installed, by name. The modules of each are loaded when it is first used."""
-    return {entry.name: entry.load() for entry in sorted(entry_points(group=GROUP))}
+    return {entry.name: entry for entry in sorted(entry_points(group=GROUP))}
 
 
+@cache
 def robot_kind(name: str) -> RobotKind:
-    """A kind by its name. Raises KeyError: it is not installed."""
-    return robot_kinds()[name]
+    """A kind by its name. Raises KeyError: it is not installed. Raises InputError: its plug-in is broken."""
+    entry = robot_kinds()[name]
+    try:
+        kind: RobotKind = run_plugin(entry, entry.load)
+    except PluginDefect as defect:
+        what = f"robot kind '{name}' of distribution {distribution_of(entry)}: cannot load {entry.value} ({defect})"
+        raise InputError(what, hint="repair or uninstall that distribution") from defect
+    return kind

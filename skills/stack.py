@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, get_type_hints
 
 import numpy as np
 
+from skills.files.plugins import OURS, PluginDefect, distribution_of, run_plugin
 from skills.files.schema_errors import first_error, nearest_of
 from skills.quantities import shown
 from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Pose2D
@@ -61,7 +61,6 @@ SLOTS: Final[Mapping[str, str]] = {
 """The slots of a stack file, and the entry-point group of each."""
 SKILLS: Final = "skills"
 SKILL_GROUP: Final = "errand.skills"
-DISTRIBUTION: Final = "spot-errand"
 USE: Final = "use"
 DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")
 
@@ -226,8 +225,9 @@ def stack_of(data: Any) -> RobotStack:
     chosen = {slot: data.get(slot, {}) for slot in SLOTS}
     parts = {slot: _component(slot, given) for slot, given in chosen.items()}
     skills = data.get(SKILLS) or {}
-    _known((SKILLS,), skills, sorted(skill_options()))
-    options = {name: _typed((SKILLS, name), skill_options()[name], given or {}) for name, given in skills.items()}
+    if not isinstance(skills, Mapping):
+        _known((SKILLS,), skills, sorted(skill_options()))
+    options = {name: _options(name, given) for name, given in skills.items()}
     return RobotStack(
         **{slot: part for slot, (_, part) in parts.items()},
         names={slot: name for slot, (name, _) in parts.items()},
@@ -270,9 +270,10 @@ def _names(slot: str) -> list[str]:
 def _loaded(slot: str, name: str, group: str) -> type:
     entry = max(_installed(group).select(name=name), key=_is_ours)
     try:
-        component: type = entry.load()
-    except (Exception, SystemExit) as defect:
-        raise StackError((slot,), f"cannot load {entry.value} ({defect})", "uninstall that distribution") from defect
+        component: type = run_plugin(entry, entry.load)
+    except PluginDefect as defect:
+        what = f"cannot load {entry.value} of distribution {distribution_of(entry)} ({defect})"
+        raise StackError((slot,), what, "repair or uninstall that distribution") from defect
     if not (dataclasses.is_dataclass(component) and component.__dataclass_params__.frozen):  # type: ignore[attr-defined]
         raise StackError((slot,), f"{entry.value} is no frozen dataclass", "put @dataclass(frozen=True) above it")
     return component
@@ -280,19 +281,36 @@ def _loaded(slot: str, name: str, group: str) -> type:
 
 def _is_ours(entry: EntryPoint) -> bool:
     """Whether it is the project's own, whose name nobody else takes."""
-    return entry.dist is not None and entry.dist.name == DISTRIBUTION
+    return distribution_of(entry) == OURS
+
+
+def skill_options() -> Mapping[str, type]:
+    """The options class of each installed skill that has one and can be loaded."""
+    found = {name: _options_of(name) for name in sorted({entry.name for entry in _installed(SKILL_GROUP)})}
+    return MappingProxyType({name: kind for name, kind in found.items() if kind is not None})
 
 
 @cache
-def skill_options() -> Mapping[str, type]:
-    """The options class of each installed skill that has one and can be loaded."""
-    skills = {}
-    for entry in sorted(_installed(SKILL_GROUP), key=_is_ours):
-        with suppress(Exception, SystemExit):
-            skills[entry.name] = entry.load()
-    found = {name: getattr(skill, "Options", None) for name, skill in sorted(skills.items())}
-    kinds = {name: kind for name, kind in found.items() if isinstance(kind, type) and dataclasses.is_dataclass(kind)}
-    return MappingProxyType({name: kind for name, kind in kinds.items() if dataclasses.fields(kind)})
+def _options_of(name: str) -> type | None:
+    """The options class of an installed skill; None where it has none or cannot be loaded."""
+    entry = max(_installed(SKILL_GROUP).select(name=name), key=_is_ours)
+    try:
+        kind = getattr(run_plugin(entry, entry.load), "Options", None)
+    except PluginDefect:
+        return None
+    if not (isinstance(kind, type) and dataclasses.is_dataclass(kind)):
+        return None
+    return kind if dataclasses.fields(kind) else None
+
+
+def _options(name: str, given: Any) -> Any:
+    """The options that a stack gives to a skill. Raises StackError: there are none, or it cannot be loaded."""
+    entries = _installed(SKILL_GROUP).select(name=name)
+    kind = _options_of(name) if entries else None
+    if kind is None:
+        _known((SKILLS,), {name: given}, sorted(skill_options()))
+    assert kind is not None
+    return _typed((SKILLS, name), kind, given or {})
 
 
 def _typed(path: tuple[str | int, ...], kind: type, given: Any) -> Any:

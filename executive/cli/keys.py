@@ -16,13 +16,14 @@ from typing import Final, Protocol
 
 from executive.run.control import Control, ControlState, Mode
 from executive.run.questions import OpenQuestion
+from skills.files.texts import LONGEST_ANSWER
 
 HELP: Final = "space pause/go on · s step · x stop button · c cancel"
 SAY_HELP: Final = f"{HELP} · : say something"
 _SAY_KEYS: Final = frozenset(":\r\n")
 _LEAVE: Final = "\x1b"
 _ENTER: Final = frozenset("\r\n")
-_LONGEST: Final = 400
+_LONGEST: Final = LONGEST_ANSWER
 _ERASE: Final = frozenset("\x7f\b")
 
 

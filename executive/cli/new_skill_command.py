@@ -9,7 +9,7 @@ import typer
 
 from executive.cli.new_skill.render import render_skill
 from executive.cli.output import refusals
-from executive.cli.plugins import usable_skills
+from executive.tree.registry import installed_skills
 
 __all__ = ["new_skill"]
 
@@ -20,7 +20,7 @@ def new_skill(
 ) -> None:
     """Write an installable package with one skill, its tests and its registration."""
     with refusals():
-        written = render_skill(name, folder, taken=frozenset(usable_skills()))
+        written = render_skill(name, folder, taken=frozenset(installed_skills().names))
     for path in written:
         typer.echo(str(path))
     typer.echo(f"\nNext:\n  pip install --no-build-isolation --editable {folder}\n  pytest {folder}")

@@ -1,23 +1,116 @@
-"""The installed skills as commands use them: what cannot be used is reported once, and harms nothing else."""
+"""`errand plugins`: what other distributions register, and what of it is broken."""
 
 from __future__ import annotations
 
-from functools import cache
+import subprocess
+import sys
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from importlib.metadata import EntryPoint, entry_points
+from typing import Annotated, Final
 
 import typer
 
-from executive.tree.registry import SkillRegistry, installed_skills
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
+from executive.store import trigger_source
+from executive.tree import registry
+from plant import kinds
+from skills.files.errors import InputError
+from skills.files.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
+from skills.stack import SLOTS
+
+__all__ = ["groups", "plugins"]
+
+_WORKERS: Final = 4
+_MORE_S: Final = 30.0
+"""A process that loads a plug-in needs some time for itself."""
 
 
-def usable_skills() -> SkillRegistry:
-    """The installed skills. Raises InputError as `installed_skills` does."""
-    skills = installed_skills()
-    for error in skills.broken.values():
-        _report(str(error))
-    return skills
+@dataclass(frozen=True)
+class Plugin:
+    """An entry point of another distribution, and why it cannot be used (None: it can)."""
+
+    group: str
+    name: str
+    distribution: str
+    value: str
+    broken: str | None = None
 
 
-@cache
-def _report(warning: str) -> None:
-    """One line on standard error, once in a process."""
-    typer.echo(f"errand: warning: {warning}", err=True)
+def plugins(
+    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
+    limit: Annotated[float, typer.Option(min=0.1, metavar="SECONDS", help="So long may each take to load.")] = LIMIT_S,
+    load: Annotated[str | None, typer.Option(hidden=True)] = None,
+) -> None:
+    """List what other distributions add, each loaded in a process of its own, and why some cannot be used."""
+    if load is not None:
+        with refusals():
+            _load(load, limit)
+        return
+    entries = _of_others()
+    with ThreadPoolExecutor(_WORKERS) as pool:
+        found = list(pool.map(lambda entry: _checked(entry, limit), entries))
+    console = console_for(as_json)
+    if not found:
+        console.print(f"No other distribution registers anything in: {', '.join(groups())}.", markup=False)
+    else:
+        rows = [(each.group, each.name, each.distribution, each.value, each.broken or "can be used") for each in found]
+        show_table(console, ("group", "name", "distribution", "value", ""), rows)
+    if as_json:
+        print_json({"plugins": [asdict(each) for each in found]})
+    if any(each.broken for each in found):
+        raise typer.Exit(NOT_ACHIEVED)
+
+
+def groups() -> Sequence[str]:
+    """The entry-point groups that errand reads."""
+    return (registry.GROUP, *SLOTS.values(), kinds.GROUP, trigger_source.GROUP)
+
+
+def _of_others() -> Sequence[EntryPoint]:
+    found = (entry for group in groups() for entry in entry_points(group=group))
+    return sorted((each for each in found if distribution_of(each) != OURS), key=_key)
+
+
+def _key(entry: EntryPoint) -> str:
+    return f"{entry.group}:{entry.name}:{distribution_of(entry)}"
+
+
+def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
+    """What becomes of a plug-in that is loaded in a process of its own."""
+    plugin = Plugin(entry.group, entry.name, distribution_of(entry), entry.value)
+    clash = next((each for each in _of_name(entry) if _key(each) != _key(entry)), None)
+    if clash is not None:
+        return Plugin(*_facts(plugin), f"{distribution_of(clash)} registers the same name")
+    command = [sys.executable, "-m", "executive.cli", "plugins", "--load", _key(entry), "--limit", str(limit_s)]
+    try:
+        ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=limit_s + _MORE_S)
+    except subprocess.TimeoutExpired:
+        return Plugin(*_facts(plugin), f"it is not loaded within {limit_s:g} s")
+    if ended.returncode == 0:
+        return plugin
+    last = ended.stderr.strip().rpartition("\n")[2].removeprefix("errand: ")
+    return Plugin(*_facts(plugin), last or f"its process ended with status {ended.returncode}")
+
+
+def _facts(plugin: Plugin) -> tuple[str, str, str, str]:
+    return plugin.group, plugin.name, plugin.distribution, plugin.value
+
+
+def _of_name(entry: EntryPoint) -> Iterable[EntryPoint]:
+    return entry_points(group=entry.group, name=entry.name)
+
+
+def _load(key: str, limit_s: float) -> None:
+    """Load one plug-in in this process. Raises InputError: it cannot be used."""
+    entry = {_key(each): each for each in _of_others()}.get(key)
+    if entry is None:
+        raise InputError(f"there is no plug-in {key}")
+    if entry.group == registry.GROUP:
+        registry.skills_of([entry], limit_s=limit_s)
+        return
+    try:
+        run_plugin(entry, entry.load, limit_s=limit_s)
+    except PluginDefect as defect:
+        raise InputError(f"cannot load {entry.value} ({defect})") from defect

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from executive.cli.answers import answerer, ask_at_terminal
 from executive.cli.missions_command import mission_file
-from executive.cli.plugins import usable_skills
 from executive.cli.starts import DEFAULT_KIND, PlacedRobot
 from executive.cli.worlds import knowledge_of, open_world, refuse_blocked, with_map
 from executive.language import Understanding, load_parser
@@ -25,6 +24,7 @@ from executive.mission.mission import lines_of, mission_from_lines, mission_from
 from executive.mission.request import Request
 from executive.mission.robots import RobotSetup, display_name, robots_in
 from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.registry import installed_skills
 from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
 from skills.files.errors import InputError, Problems
 from skills.files.yaml_source import read_yaml
@@ -241,7 +241,7 @@ def prepared_for(
         from executive.cli.variations import with_people
 
         world = with_people(world, request)
-    tree = compile_mission(mission, knowledge=knowledge, registry=usable_skills())
+    tree = compile_mission(mission, knowledge=knowledge, registry=installed_skills())
     compiled = _of_tree(replace(request, world_name=world.name, robot=mission.robot_name), tree)
     return Prepared(compiled, mission, world, knowledge, tree, meant)
 

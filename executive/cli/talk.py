@@ -9,7 +9,6 @@ from dataclasses import replace
 from functools import partial
 
 from executive.cli.feasibility import refuse_impossible
-from executive.cli.plugins import usable_skills
 from executive.cli.requests import Prepared
 from executive.conversation import Conversation, Reply, ReplyKind, Speech
 from executive.conversation.parts import Waiting
@@ -24,6 +23,7 @@ from executive.mission.mission import mission_from_steps
 from executive.run.control import Control
 from executive.run.runner import Progress
 from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.registry import installed_skills
 
 __all__ = ["Talk", "conversation_of", "load_ahead"]
 
@@ -117,6 +117,6 @@ def _compiled(steps: Sequence[MissionStep], taken: frozenset[str], prepared: Pre
     mission = mission_from_steps(steps, world=prepared.world.name, robot_name=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)
-    tree = compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=usable_skills())
+    tree = compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=installed_skills())
     refuse_impossible(replace(prepared, tree=tree))
     return tree

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from threading import Condition
 
 from skills.api import Question
+from skills.files.errors import InputError
+from skills.files.texts import LONGEST_ANSWER, plain_text
 from skills.robot import Clock
 
 
@@ -52,10 +54,14 @@ class QuestionManager:
         return pending
 
     def answer(self, question_id: str, text: str) -> None:
-        """Answer one. Raises ValueError when it is not open or `text` is none of its options."""
+        """Answer one. Raises ValueError: it is not open, or `text` is none of its options or no plain text."""
         pending = self._open.get(question_id)
         if pending is None:
-            raise ValueError(f"the question '{question_id}' is not open (any more)")
+            raise ValueError(f"the question '{question_id[:80]}' is not open (any more)")
+        try:
+            text = plain_text(text, what="the answer", longest=LONGEST_ANSWER)
+        except InputError as error:
+            raise ValueError(str(error)) from error
         options = pending.open.options
         text = next((option for option in options if option.lower() == text.strip().lower()), text)
         if options and text not in options:

@@ -28,6 +28,8 @@ class VerbHung(BaseException):
     Like KeyboardInterrupt, no skill may swallow it.
     """
 
+    stops_run: Final = True
+
 
 class Watchdog:
     """Raises `VerbHung` in the main thread when a verb or a tick takes too long there; a context manager.

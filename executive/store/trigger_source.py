@@ -11,6 +11,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final, Protocol
 
 from skills.files.errors import InputError, listing
+from skills.files.plugins import PluginDefect, run_plugin
 
 __all__ = ["GROUP", "Fire", "TriggerSource", "refuse_missing_source", "trigger_source"]
 
@@ -43,8 +44,8 @@ def trigger_source(kind: str) -> TriggerSource:
     """A new source of a kind. Raises InputError: there is none, or it cannot be made."""
     entry = _entry(kind)
     try:
-        source: Any = entry.load()()
-    except (Exception, SystemExit) as defect:
+        source: Any = run_plugin(entry, lambda: entry.load()())
+    except PluginDefect as defect:
         raise _broken(entry, defect) from defect
     lacking = [name for name in ("start", "stop") if not callable(getattr(source, name, None))]
     if lacking:
@@ -66,6 +67,6 @@ def _entry(kind: str) -> EntryPoint:
     return next(iter(found.values()))
 
 
-def _broken(entry: EntryPoint, defect: BaseException) -> InputError:
-    what = f"trigger source '{entry.name}' ({entry.value}) cannot be made ({type(defect).__name__}: {defect})"
+def _broken(entry: EntryPoint, defect: PluginDefect) -> InputError:
+    what = f"trigger source '{entry.name}' ({entry.value}) cannot be made ({defect})"
     return InputError(what, hint="repair or uninstall that package")

@@ -10,43 +10,79 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final
 
 from executive.tree.types import describe_type, field_types
 from skills.api import Cause, Skill
 from skills.files.errors import InputError, suggestion
+from skills.files.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
 
 GROUP: Final = "errand.skills"
-DISTRIBUTION: Final = "spot-errand"
 
 SkillClass = type[Skill[Any]]
 
 
-@dataclass(frozen=True)
 class SkillRegistry(Mapping[str, SkillClass]):
-    """The skills that can be used, by name. `broken` says why others cannot, naming the distribution."""
+    """The skills that can be used, by name. Those of other distributions are loaded when they are used.
 
-    usable: Mapping[str, SkillClass]
-    broken: Mapping[str, InputError]
+    To iterate loads all; `names` are known without.
+    """
+
+    def __init__(self, ours: Mapping[str, SkillClass], others: Mapping[str, tuple[EntryPoint, ...]]) -> None:
+        """`others` are the entry points of other distributions by name; several of one name are refused."""
+        self._ours, self._others = ours, others
+        self._loaded: dict[str, SkillClass | InputError] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names, those of broken skills included."""
+        return tuple(sorted({*self._ours, *self._others}))
+
+    @property
+    def broken(self) -> Mapping[str, InputError]:
+        """Why others' skills cannot be used, naming the distribution; all are loaded for it."""
+        found = {name: self.why_broken(name) for name in self._others}
+        return {name: error for name, error in found.items() if error is not None}
+
+    def why_broken(self, name: str) -> InputError | None:
+        """Why a skill of another distribution cannot be used; None where it can, or there is none."""
+        found = self._of_others(name)
+        return found if isinstance(found, InputError) else None
 
     def __getitem__(self, name: str) -> SkillClass:
-        return self.usable[name]
+        found = self._ours.get(name) or self._of_others(name)
+        if found is None or isinstance(found, InputError):
+            raise KeyError(name)
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and (name in self._ours or isinstance(self._of_others(name), type))
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.usable)
+        return (name for name in self.names if name in self)
 
     def __len__(self) -> int:
-        return len(self.usable)
+        return sum(1 for _ in self)
+
+    def _of_others(self, name: str) -> SkillClass | InputError | None:
+        """The skill of another distribution, loaded once, or why there is none."""
+        if name not in self._loaded and name in self._others:
+            try:
+                self._loaded[name] = _only(self._others[name], self._ours)
+            except InputError as error:
+                self._loaded[name] = error
+        return self._loaded.get(name)
 
 
 def missing(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, str]:
     """Why a registry has no skill of this name, and the hint."""
-    if isinstance(registry, SkillRegistry) and name in registry.broken:
-        return registry.broken[name].message, registry.broken[name].hint
-    return f"there is no skill '{name}'", suggestion(name, registry)
+    broken = registry.why_broken(name) if isinstance(registry, SkillRegistry) else None
+    if broken is not None:
+        return broken.message, broken.hint
+    known = registry.names if isinstance(registry, SkillRegistry) else registry
+    return f"there is no skill '{name}'", suggestion(name, known)
 
 
 def installed_skills() -> SkillRegistry:
@@ -56,61 +92,52 @@ def installed_skills() -> SkillRegistry:
     harm the others, and never takes the place of ours. Raises InputError: ours are not registered, or one is broken.
     """
     found = tuple(entry_points(group=GROUP))
-    if not any(_distribution(entry) == DISTRIBUTION for entry in found):
+    if not any(distribution_of(entry) == OURS for entry in found):
         hint = "install the project that these sources belong to: pip install --editable ."
-        raise InputError(f"no skill of {DISTRIBUTION} is registered under '{GROUP}'", hint=hint)
-    ours = skills_of(entry for entry in found if _distribution(entry) == DISTRIBUTION)
-    others = _registry_of(found)
-    usable = {name: others[name] for name in others if name not in ours} | ours
-    return SkillRegistry(dict(sorted(usable.items())), others.broken)
+        raise InputError(f"no skill of {OURS} is registered under '{GROUP}'", hint=hint)
+    ours = skills_of(entry for entry in found if distribution_of(entry) == OURS)
+    others: dict[str, tuple[EntryPoint, ...]] = {}
+    for entry in sorted(found, key=distribution_of):
+        if distribution_of(entry) != OURS:
+            others[entry.name] = (*others.get(entry.name, ()), entry)
+    return SkillRegistry(ours, others)
 
 
 def built_in_skills() -> dict[str, SkillClass]:
     """The skills that come with the project, by name. Raises InputError as `installed_skills` does."""
-    return skills_of(entry for entry in entry_points(group=GROUP) if _distribution(entry) == DISTRIBUTION)
+    return skills_of(entry for entry in entry_points(group=GROUP) if distribution_of(entry) == OURS)
 
 
-def skills_of(entries: Iterable[EntryPoint]) -> dict[str, SkillClass]:
-    """The skills of these entry points by name, each checked. Raises InputError."""
-    registry = _registry_of(entries)
-    for error in registry.broken.values():
-        raise error
-    return dict(registry)
+def skills_of(entries: Iterable[EntryPoint], *, limit_s: float = LIMIT_S) -> dict[str, SkillClass]:
+    """The skills of these entry points by name, each checked, and loaded within a time limit. Raises InputError."""
+    named: dict[str, tuple[EntryPoint, ...]] = {}
+    for entry in sorted(entries, key=lambda entry: (entry.name, distribution_of(entry))):
+        named[entry.name] = (*named.get(entry.name, ()), entry)
+    return {name: _only(same, {}, limit_s) for name, same in named.items()}
 
 
-def _registry_of(entries: Iterable[EntryPoint]) -> SkillRegistry:
-    """The skills of these entry points, those apart that cannot be used."""
-    owners: dict[str, EntryPoint] = {}
-    usable: dict[str, SkillClass] = {}
-    broken: dict[str, InputError] = {}
-    for entry in sorted(entries, key=lambda entry: (entry.name, _distribution(entry))):
-        try:
-            _refuse_second(entry, owners.setdefault(entry.name, entry))
-            usable[entry.name] = _checked(entry)
-        except InputError as error:
-            broken[entry.name] = error
-    return SkillRegistry({name: skill for name, skill in usable.items() if name not in broken}, broken)
+def _only(entries: Sequence[EntryPoint], ours: Mapping[str, SkillClass], limit_s: float = LIMIT_S) -> SkillClass:
+    """The one skill of a name, checked. Raises InputError: it is broken, or has the name of another."""
+    first, *others = entries
+    owners = [OURS] if first.name in ours else []
+    owners += [distribution_of(each) for each in (first, *(other for other in others if other.value != first.value))]
+    if len(owners) > 1:
+        both = f"{owners[0]} and {owners[1]}"
+        raise InputError(f"{both} both register a skill '{first.name}'", hint="uninstall one, or rename its skill")
+    return _checked(first, limit_s)
 
 
-def _refuse_second(entry: EntryPoint, owner: EntryPoint) -> None:
-    if owner.value != entry.value:
-        both = f"{_distribution(owner)} and {_distribution(entry)}"
-        raise InputError(f"{both} both register a skill '{entry.name}'", hint="uninstall one, or rename its skill")
-
-
-def _checked(entry: EntryPoint) -> SkillClass:
-    skill = _loaded(entry)
-    for message, hint in faults_of(skill, registered_as=entry.name):
+def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:
+    try:
+        skill = run_plugin(entry, entry.load, limit_s=limit_s)
+        faults = run_plugin(entry, lambda: list(faults_of(skill, registered_as=entry.name)))
+    except PluginDefect as defect:
+        raise _error(
+            entry, f"cannot load {entry.value} ({defect})", "repair or uninstall that distribution"
+        ) from defect
+    for message, hint in faults:
         raise _error(entry, message, hint)
     return skill  # type: ignore[no-any-return]
-
-
-def _loaded(entry: EntryPoint) -> Any:
-    try:
-        return entry.load()
-    except (Exception, SystemExit) as defect:
-        what = f"cannot load {entry.value} ({type(defect).__name__}: {defect})"
-        raise _error(entry, what, "repair or uninstall that distribution") from defect
 
 
 def faults_of(skill: Any, *, registered_as: str) -> Iterator[tuple[str, str]]:
@@ -167,9 +194,5 @@ def _cause_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
             yield f"its cause {cause.value} is not explained", "say in one sentence when it fails so"
 
 
-def _distribution(entry: EntryPoint) -> str:
-    return "an unknown distribution" if entry.dist is None else entry.dist.name
-
-
 def _error(entry: EntryPoint, message: str, hint: str) -> InputError:
-    return InputError(f"skill '{entry.name}' of distribution {_distribution(entry)}: {message}", hint=hint)
+    return InputError(f"skill '{entry.name}' of distribution {distribution_of(entry)}: {message}", hint=hint)

@@ -8,6 +8,8 @@ from typing import Any, Final
 
 from executive.conversation.parts import Waiting
 from executive.run.control import Control, ControlState
+from skills.files.errors import InputError
+from skills.files.texts import plain_text
 
 Action = Callable[[Mapping[str, Any]], str]
 
@@ -36,11 +38,14 @@ def control_actions(control: Control) -> Mapping[str, Action]:
 
 
 def text_of(values: Mapping[str, Any], key: str) -> str:
-    """A text among an action's values. Raises RefusedError when it is missing or empty."""
+    """A text among an action's values. Raises RefusedError when it is missing, empty, too long or no plain text."""
     text = values.get(key)
     if not isinstance(text, str) or not text.strip():
         raise RefusedError(f"the action needs a text under '{key}'")
-    return text.strip()
+    try:
+        return plain_text(text, what="the text")
+    except InputError as error:
+        raise RefusedError(str(error)) from error
 
 
 def robot_of(values: Mapping[str, Any]) -> str | None:

@@ -26,6 +26,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from executive.view.actions import Action, RefusedError
 from executive.view.feed import Feed
 from executive.view.serving import MAX_BODY, ServingThread, body_of
+from skills.files.errors import InputError
+from skills.files.texts import json_object
 
 HOST: Final = "127.0.0.1"
 PAGE_FOLDER: Final = Path(__file__).parent / "page"
@@ -200,10 +202,9 @@ class PageServer:
 
 def _values(body: bytes | None) -> Mapping[str, Any]:
     """An action's values. Raises RefusedError for what is no JSON object."""
+    if body is None:
+        raise RefusedError(f"the action's values are larger than {MAX_BODY} bytes")
     try:
-        values = None if body is None else json.loads(body or b"{}")
-    except ValueError:
-        values = None
-    if not isinstance(values, dict):
-        raise RefusedError("the action's values are no JSON object")
-    return values
+        return json_object(body, what="the action's values", hint="send an object")
+    except InputError as error:
+        raise RefusedError(str(error)) from error

@@ -448,6 +448,8 @@ def resumed(seed: int, folder: Path) -> Ran | None:
 class KilledError(BaseException):
     """The process is gone."""
 
+    stops_run = True
+
 
 class KillingJournal:
     """Passes notes on, and kills after some of them."""

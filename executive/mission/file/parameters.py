@@ -8,7 +8,6 @@ within a longer text the parameter's text is put in.
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -20,6 +19,7 @@ import yaml
 from executive.mission.expression import Value
 from executive.mission.file.model import KeyPath
 from skills.files.errors import InputError, did_you_mean, listing, suggestion
+from skills.files.texts import json_object, plain_text
 from skills.files.yaml_source import YamlSource
 
 __all__ = ["Given", "given_values", "part_source", "round_source", "values_in_json", "with_parameters"]
@@ -47,9 +47,10 @@ def given_values(settings: Iterable[str]) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for setting in settings:
         name, equals, text = setting.partition("=")
+        plain_text(setting, what="--set")
         try:
             value = yaml.safe_load(text)
-        except yaml.YAMLError:
+        except (yaml.YAMLError, ValueError, RecursionError):
             value = None
         if not equals or not _can_be_given(name, value):
             hint = "give a name, =, and a text, a number, true or false"
@@ -60,17 +61,18 @@ def given_values(settings: Iterable[str]) -> dict[str, Any]:
 
 def values_in_json(text: bytes) -> dict[str, Any]:
     """Values in a JSON object, each as `given_values` takes them; none in an empty text. Raises InputError."""
-    try:
-        values = json.loads(text) if text.strip() else {}
-    except (ValueError, RecursionError):
-        values = None
-    if not isinstance(values, dict):
-        raise InputError("the values are no JSON object", hint='give one such as {"room": "kitchen"}, or nothing')
+    hint = 'give one such as {"room": "kitchen"}, or nothing'
+    values = json_object(text, what="the values", hint=hint)
     wrong = next((name for name, value in values.items() if not _can_be_given(name, value)), None)
     if wrong is not None:
         hint = "give each name a text, a number, true or false"
         raise InputError(f"'{wrong[:60]}' is not a name with a value", hint=hint)
-    return values
+    return {name: _guarded(name, value) for name, value in values.items()}
+
+
+def _guarded(name: str, value: Any) -> Any:
+    """The value, a text guarded as all texts from outside. Raises InputError."""
+    return plain_text(value, what=f"the value of '{name}'") if isinstance(value, str) else value
 
 
 def _can_be_given(name: str, value: Any) -> bool:

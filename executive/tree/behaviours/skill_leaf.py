@@ -174,11 +174,18 @@ class SkillLeaf(ExplainedLeaf):
         """The call's result, or Failed(ERROR) with the traceback in the log when it raised."""
         try:
             return call()
-        except Exception as defect:
+        except BaseException as defect:
+            if _stops_run(defect):
+                raise
             trace = traceback.format_exc()
             self.context.publish(ERROR_TOPIC, {"node": self.path_id, "traceback": trace})
             text = str(defect.args[0]) if isinstance(defect, KeyError) and defect.args else str(defect)
             return Failed(Cause.ERROR, f"{self.name} raised {type(defect).__name__}: {text}")
+
+
+def _stops_run(defect: BaseException) -> bool:
+    """Whether it ends the whole run, and is no defect of a skill: Ctrl-C, or a robot or a tick that hangs."""
+    return type(defect) is KeyboardInterrupt or bool(getattr(defect, "stops_run", False))
 
 
 def refuse_stale(skill: type[Skill[Any]], success: Succeeded, context: RunContext) -> Succeeded | Failed:

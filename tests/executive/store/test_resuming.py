@@ -40,6 +40,8 @@ REQUEST = Request("fetch me a drink", seed=3, name="fetch drink", world_name="fl
 class KilledError(BaseException):
     """The process is gone."""
 
+    stops_run = True
+
 
 class World:
     """What outlives the process: what the gripper holds, where the thing is and what is in the way of it."""

@@ -26,6 +26,8 @@ REQUEST = Request("blocks", seed=3, name="m", world_name="flat", robot="Alice", 
 class KilledError(BaseException):
     """The process is gone."""
 
+    stops_run = True
+
 
 @dataclasses.dataclass(frozen=True)
 class Nothing:

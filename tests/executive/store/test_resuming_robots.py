@@ -28,6 +28,8 @@ REQUEST = Request("tidy", name="tidy", world_name="flat", robot="Alice", fingerp
 class KilledError(BaseException):
     """The process is gone."""
 
+    stops_run = True
+
 
 class World:
     """What outlives the process: who has the drink, who put it down last, and how often each did what."""

@@ -131,7 +131,26 @@ def test_another_distribution_cannot_take_the_name_of_one_of_ours(others):
     assert "both register a skill 'navigate'" in str(found.broken["navigate"])
 
 
-@pytest.mark.parametrize("source", ["raise SystemExit(3)", "1 / 0", GOOD.replace("def step", "def leap")])
+def test_a_skill_of_another_distribution_is_not_loaded_before_it_is_used(others):
+    others("import sys\nsys.modules['was_loaded'] = sys\n" + GOOD)
+    found = installed_skills()
+    assert "navigate" in found and "wave" in found.names
+    assert "was_loaded" not in sys.modules
+    assert found["wave"].name == "wave"
+    assert sys.modules.pop("was_loaded")
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "raise SystemExit(3)",
+        "1 / 0",
+        "raise BaseException",
+        "raise type('Gone', (KeyboardInterrupt,), {})",
+        "raise GeneratorExit",
+        GOOD.replace("def step", "def leap"),
+    ],
+)
 def test_a_broken_skill_harms_no_other_and_a_file_that_uses_it_is_told_why(others, source):
     others(source)
     others(GOOD.replace('"wave"', '"wink"'), name="winkers", entry="wink = {module}:Wave", module="winkers_skill")

@@ -3,6 +3,7 @@
 import http.client
 import json
 import threading
+from contextlib import suppress
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
@@ -18,6 +19,7 @@ from executive.view.feed import Feed
 from executive.view.server import PageContent, PageServer
 from executive.view.watch import ControlWatch, progress_word
 from skills.api import Question
+from tests.hostile_values import DATA
 
 
 @pytest.fixture
@@ -206,6 +208,31 @@ def test_what_cannot_be_done_is_refused_with_a_reason(server, name, values, stat
 def test_garbage_as_values_is_refused(server):
     status, body = ask(server, "POST", "/action/pause", b"{nonsense", X_Errand_Token=token_of(server))
     assert (status, b"no JSON object" in body) == (409, True)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [b"[" * 15_000, b'{"text": ' * 15_000, b'{"text": "\\ud800"}', b'{"robot": "\\udfff"}', b"9" * 5000, b"x" * 30_000],
+)
+def test_values_that_no_text_can_hold_are_refused_in_one_line(server, body):
+    own = {"X_Errand_Token": token_of(server), "Origin": f"http://127.0.0.1:{server.port}"}
+    status, answer = ask(server, "POST", "/action/say", body, **own)
+    assert (status, "the action's values are" in json.loads(answer)["error"]) == (409, True)
+
+
+def test_any_value_of_any_action_is_done_or_refused(control):
+    for action in control_actions(control).values():
+        for value in DATA:
+            with suppress(RefusedError):
+                action({"text": value, "id": value, "node": value, "name": value, "robot": value})
+
+
+@pytest.mark.parametrize("text", ["a" * 301, "\ud800", "\x1b[31m"])
+def test_an_answer_that_cannot_be_said_again_is_refused_and_the_question_stays(control, clock, text):
+    control.ask(Question("alice/q", "Which?", (), "", 60.0), clock)
+    with pytest.raises(RefusedError):
+        control_actions(control)["answer"]({"id": "alice/q", "text": text})
+    assert [each.id for each in control.state.questions] == ["alice/q"]
 
 
 def test_every_state_of_the_control_is_told(feed, control):

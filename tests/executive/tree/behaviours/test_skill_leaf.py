@@ -192,3 +192,12 @@ def test_keyboard_interrupt_is_not_swallowed(context, clock):
     assert leaf.active
     leaf.abandon()
     assert not leaf.active
+
+
+@pytest.mark.parametrize(
+    "defect", [SystemExit(3), BaseException("gone"), type("Ends", (KeyboardInterrupt,), {})("now")]
+)
+def test_a_skill_that_raises_what_is_no_exception_fails_with_its_name(context, clock, defect):
+    leaf, _ = leaf_of(context, [defect])
+    assert tick(leaf, clock) == [Status.FAILURE]
+    assert (leaf.cause, leaf.message) == (Cause.ERROR, f"listed raised {type(defect).__name__}: {defect}")

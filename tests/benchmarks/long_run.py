@@ -1,0 +1,179 @@
+"""What a long run writes and remembers: a robot that waits, drives and looks for simulated hours; prints JSON lines.
+
+    python -m tests.benchmarks.long_run [--minutes 120] [--every 10] [--no-record] [--world flat] [--top 10]
+
+One line for each ten minutes of the robot's clock: what the process has written since the last one, its memory, and how
+much faster than real time it was. The last line has the slope of the memory over the second half, the bytes written per
+minute at the beginning and at the end, and the size of the recording. `--top` adds the lines of code that hold what was
+allocated since the first report (tracemalloc; slow).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+import tracemalloc
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from executive.cli.durable import STORE, new_run
+from executive.cli.requests import prepare
+from executive.cli.simulated import run_simulated
+from executive.mission.request import Request
+from executive.run.runner import Progress
+from executive.store.missions import MissionStore
+
+MISSION = """name: long round
+world: {world}
+steps:
+  - repeat: {{while: elapsed < {seconds}}}
+    steps:
+      - to: kitchen
+      - wait: {{seconds: {wait}}}
+      - to: living room
+      - if: {{object: coke, at: coffee table}}
+        then: [{{speak: There it is.}}]
+        else: [{{speak: It is not here.}}]
+      - wait: {{seconds: {wait}}}
+"""
+PAGE_BYTES, MB = 4096, 1e6
+
+
+@dataclass(frozen=True)
+class Report:
+    """One stretch of the run: until when (min on the robot's clock), memory, bytes written in it, and its speed."""
+
+    until_min: float
+    memory_mb: float
+    written_kb_per_min: float
+    real_time_factor: float
+
+
+class Watch:
+    """Reports the process every so many seconds of the robot's clock; an observer for the runner."""
+
+    def __init__(self, period_s: float, *, top: int = 0) -> None:
+        self.reports: list[Report] = []
+        self._period_s, self._top = period_s, top
+        self._at_s, self._wall_s, self._written = 0.0, time.monotonic(), written_bytes()
+        self._first: tracemalloc.Snapshot | None = None
+
+    def __call__(self, progress: Progress) -> None:
+        """Report when it is time again."""
+        if progress.now_s - self._at_s >= self._period_s:
+            self._report(progress.now_s)
+
+    def _report(self, now_s: float) -> None:
+        written, wall_s, took_s = written_bytes(), time.monotonic(), now_s - self._at_s
+        per_minute = (written - self._written) / 1e3 / (took_s / 60.0)
+        report = Report(now_s / 60.0, memory_mb(), per_minute, took_s / (wall_s - self._wall_s))
+        self.reports.append(report)
+        show({key: round(value, 2) for key, value in asdict(report).items()})
+        if self._top:
+            self._show_growth()
+        self._at_s, self._wall_s, self._written = now_s, time.monotonic(), written_bytes()
+
+    def _show_growth(self) -> None:
+        now = tracemalloc.take_snapshot()
+        self._first = self._first or now
+        for each in now.compare_to(self._first, "lineno")[: self._top]:
+            frame = each.traceback[0]
+            show(
+                {
+                    "grown_kb": round(each.size_diff / 1e3),
+                    "count": each.count_diff,
+                    "at": f"{frame.filename}:{frame.lineno}",
+                }
+            )
+
+
+def written_bytes() -> int:
+    """What this process has written to files so far."""
+    told = dict(line.split(": ") for line in Path("/proc/self/io").read_text().splitlines())
+    return int(told["wchar"])
+
+
+def memory_mb() -> float:
+    """What this process has in memory."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE_BYTES / MB
+
+
+def run(
+    minutes: float,
+    out: Path,
+    *,
+    world: str = "flat",
+    record: bool = True,
+    every_s: float = 600.0,
+    wait_s: float = 60.0,
+    top: int = 0,
+) -> dict[str, Any]:
+    """Run the mission; the summary."""
+    file = out / "long.yaml"
+    file.write_text(MISSION.format(world=world, seconds=60.0 * minutes, wait=wait_s), encoding="utf-8")
+    asked = Request(file=file, out=out, record=record, time_limit_s=2.0 * 60.0 * minutes + 600.0)
+    prepared, watch = prepare(asked, ask=None), Watch(every_s, top=top)
+    with MissionStore(out / STORE) as store:
+        mission = store.add(prepared.request.from_anywhere(), queued=False)
+        store.begin(mission.id)
+        finished = run_simulated(prepared, observer=watch, durable=new_run(store, mission, prepared))
+    return summary(watch.reports, finished.report.outcome, out)
+
+
+def summary(reports: list[Report], outcome: str, out: Path) -> dict[str, Any]:
+    """What the reports say together."""
+    later = reports[len(reports) // 2 :]
+    times = [each.until_min for each in later]
+    slope = float(np.polyfit(times, [each.memory_mb for each in later], 1)[0]) if len(later) > 1 else 0.0
+    recording, log = out / "recording.html", out / "log.mcap"
+    return {
+        "outcome": outcome,
+        "minutes": round(reports[-1].until_min, 1),
+        "memory_mb_per_hour": round(60.0 * slope, 2),
+        "written_kb_per_min_first": round(reports[0].written_kb_per_min),
+        "written_kb_per_min_last": round(reports[-1].written_kb_per_min),
+        "log_mb": round(log.stat().st_size / MB, 1),
+        "recording_mb": round(recording.stat().st_size / MB, 1) if recording.exists() else None,
+    }
+
+
+def show(line: dict[str, Any]) -> None:
+    """One line of JSON."""
+    sys.stdout.write(json.dumps(line) + "\n")
+    sys.stdout.flush()
+
+
+def main() -> None:
+    """Run it, and print the reports."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--minutes", type=float, default=120.0)
+    parser.add_argument("--every", type=float, default=10.0, help="minutes between two reports")
+    parser.add_argument("--wait", type=float, default=60.0, help="how long it waits at each place (s)")
+    parser.add_argument("--world", default="flat")
+    parser.add_argument("--no-record", action="store_true")
+    parser.add_argument("--top", type=int, default=0)
+    options = parser.parse_args()
+    if options.top:
+        tracemalloc.start()
+    with tempfile.TemporaryDirectory(prefix="errand-long-") as folder:
+        every_s, record = 60.0 * options.every, not options.no_record
+        told = run(
+            options.minutes,
+            Path(folder),
+            world=options.world,
+            record=record,
+            every_s=every_s,
+            wait_s=options.wait,
+            top=options.top,
+        )
+        show(told)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,26 @@
+"""The benchmark of long runs: its figures, and its smallest case."""
+
+import pytest
+
+from tests.benchmarks.long_run import Report, memory_mb, run, summary, written_bytes
+
+
+def test_the_slope_of_the_memory_is_that_of_the_second_half(tmp_path):
+    (tmp_path / "log.mcap").write_bytes(b"x" * 200_000)
+    memory = (500.0, 700.0, 800.0, 801.0, 802.0)
+    told = summary([Report(10.0 * n, mb, 900.0, 2.0) for n, mb in enumerate(memory, 1)], "success", tmp_path)
+    assert (told["memory_mb_per_hour"], told["log_mb"], told["recording_mb"]) == (6.0, 0.2, None)
+
+
+def test_what_this_process_writes_and_holds_is_measured(tmp_path):
+    before = written_bytes()
+    (tmp_path / "file").write_bytes(b"x" * 100_000)
+    assert written_bytes() - before >= 100_000
+    assert memory_mb() > 10.0
+
+
+@pytest.mark.mission
+def test_a_short_run_is_reported(tmp_path):
+    told = run(0.2, tmp_path, every_s=6.0, wait_s=1.0, record=False)
+    assert told["outcome"] == "success"
+    assert told["written_kb_per_min_last"] > 0

@@ -1,0 +1,55 @@
+"""`errand plugins`: what other distributions register, which of it is broken, and that none keeps a command waiting."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+ENTRY_POINTS = """
+[errand.skills]
+exits = wavers_exits:Wave
+hangs = wavers_hangs:Wave
+[errand.triggers]
+bell = wavers_bell:Bell
+"""
+
+
+@pytest.fixture
+def errand(tmp_path):
+    info = tmp_path / "wavers-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: wavers\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    (tmp_path / "wavers_exits.py").write_text("raise SystemExit(0)\n")
+    (tmp_path / "wavers_hangs.py").write_text("import time\ntime.sleep(300)\n")
+    (tmp_path / "wavers_bell.py").write_text("class Bell: pass\n")
+    where = os.pathsep.join([str(tmp_path), str(ROOT)])
+
+    def run(*arguments):
+        command = [sys.executable, "-m", "executive.cli", *arguments]
+        environment = {**os.environ, "PYTHONPATH": where}
+        return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    return run
+
+
+def test_each_plug_in_is_listed_with_what_is_wrong_with_it(errand):
+    ended = errand("plugins", "--limit", "2", "--json")
+    told = json.loads(ended.stdout.splitlines()[-1])["plugins"]
+    assert [(each["name"], each["distribution"]) for each in told] == [
+        ("exits", "wavers"),
+        ("hangs", "wavers"),
+        ("bell", "wavers"),
+    ]
+    assert "cannot load wavers_exits:Wave (SystemExit: 0)" in told[0]["broken"]
+    assert "is not loaded within 2 s" in told[1]["broken"]
+    assert (told[2]["broken"], ended.returncode) == (None, 1)
+
+
+def test_a_plug_in_that_hangs_keeps_no_command_waiting_that_does_not_use_it(errand, tmp_path):
+    (tmp_path / "go.yaml").write_text("name: go\nsteps: [{to: kitchen}]\n")
+    assert errand("check", "go.yaml").returncode == 0

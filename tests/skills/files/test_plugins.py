@@ -1,0 +1,66 @@
+"""Plug-ins: whatever their code raises is one error, and one that hangs ends the process with its name."""
+
+import subprocess
+import sys
+import time
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from skills.files.plugins import PluginDefect, run_plugin
+
+ENTRY = EntryPoint("wave", "wavers:Wave", "errand.skills")
+HANGS = """
+from importlib.metadata import EntryPoint
+from skills.files.plugins import run_plugin
+import time
+run_plugin(EntryPoint("wave", "wavers:Wave", "errand.skills"), lambda: time.sleep(60), limit_s=0.2)
+"""
+
+
+class Odd(Exception):  # noqa: N818
+    """Its text is none."""
+
+    def __str__(self):
+        raise ValueError
+
+
+def raising(defect):
+    def call():
+        raise defect
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("defect", "words"),
+    [
+        (SystemExit(3), "SystemExit: 3"),
+        (BaseException("gone"), "BaseException: gone"),
+        (type("Ends", (KeyboardInterrupt,), {})("now"), "Ends: now"),
+        (Odd(), "Odd: without a text"),
+        (ValueError("x" * 10_000), "ValueError: x{300}$"),
+    ],
+)
+def test_whatever_a_plug_in_raises_is_one_error(defect, words):
+    with pytest.raises(PluginDefect, match=words):
+        run_plugin(ENTRY, raising(defect))
+
+
+def test_ctrl_c_during_an_import_is_the_users():
+    with pytest.raises(KeyboardInterrupt):
+        run_plugin(ENTRY, raising(KeyboardInterrupt()))
+
+
+def test_an_import_that_hangs_ends_the_process_with_one_line():
+    begun = time.monotonic()
+    ended = subprocess.run([sys.executable, "-c", HANGS], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    what = "errand.skills 'wave' (wavers:Wave) of distribution an unknown distribution is not loaded within 0.2 s"
+    assert ended.stderr == f"errand: {what}; repair or uninstall that distribution\n"
+    assert time.monotonic() - begun < 40.0
+
+
+def test_a_call_that_is_over_in_time_harms_nobody_later():
+    assert run_plugin(ENTRY, lambda: 3, limit_s=0.05) == 3
+    time.sleep(0.2)

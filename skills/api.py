@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
+from skills.perception.doorway import Doorway
 from skills.quantities import Angle, Coordinate, Delay, Height, Margin, Share
 from skills.robot import Clock, Image, Lease, Pose2D, Robot, Scan
 from skills.stack import RobotStack, default_stack
@@ -75,12 +76,14 @@ class Succeeded:
 class Failed:
     """Failure: the cause and one plain sentence.
 
-    `outputs` may fill some of the skill's output ports, for the next attempt.
+    `outputs` may fill some of the skill's output ports, for the next attempt. A failure is `final` where another
+    attempt from here would only end the same way: then the tree tries no recovery and no pose nearby.
     """
 
     cause: Cause
     message: str
     outputs: Mapping[str, Any] = field(default_factory=dict)
+    final: bool = False
 
 
 Step = Running | Succeeded | Failed
@@ -191,8 +194,11 @@ class Costmap(Protocol):
 class ForgettingCostmap(Protocol):
     """A costmap whose layer of seen objects can be cleared; what the survey knows stays."""
 
-    def forget_seen(self) -> int:
-        """Forget all that was seen and not surveyed; the number of cells that were blocked by it."""
+    def forget_seen(self, within_W: NDArray[np.float64] | None = None) -> int:
+        """Forget what was seen and not surveyed; the number of cells that were blocked by it.
+
+        With discs, rows of x, y and radius (m, world), only what lies within them.
+        """
 
 
 @runtime_checkable
@@ -351,7 +357,10 @@ class SeenSolid:
 
 @dataclass(frozen=True)
 class SkillContext:
-    """All that a skill may use. `seed` derives from the run's seed and the leaf's path id."""
+    """All that a skill may use. `seed` derives from the run's seed and the leaf's path id.
+
+    `doors` are those on the robot's map.
+    """
 
     robot: Robot
     lease: Lease
@@ -368,6 +377,7 @@ class SkillContext:
     payload: Payload = field(default_factory=Payload)
     solid: SeenSolid = field(default_factory=SeenSolid)
     traffic: Traffic = NO_TRAFFIC
+    doors: tuple[Doorway, ...] = ()
 
     def X_WB(self) -> RigidTransform:
         """The body's pose in the world, as estimated."""

@@ -119,6 +119,7 @@ class Opening:
             detector=entry.detector,
             work=self.work,
             stack=entry.stack,
+            doors=entry.tree.doors,
             traffic=NO_TRAFFIC if self.traffic is None else self.traffic.view_of(entry.robot.name),
         )
 

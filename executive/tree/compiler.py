@@ -13,19 +13,21 @@ from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decisions import buttons_of
 from executive.tree.compiling.assembly import StepPart, assemble, step_name
 from executive.tree.compiling.builder import PlanBuilder, Registry, start_key
+from executive.tree.compiling.doors import doorway
 from executive.tree.compiling.interrupts import watched
 from executive.tree.compiling.wiring import check_wiring
 from executive.tree.kinds import build
 from executive.tree.node import NodeSpec
 from skills.files.errors import InputError
+from skills.perception.doorway import Doorway
 
 __all__ = ["CompiledTree", "StepPart", "compile_mission", "step_name"]
 
 
 @dataclass(frozen=True)
 class CompiledTree:
-    """A mission's tree for one robot, as data; `parts` are its steps with their goal conditions, in order, and
-    `steps` what it was compiled from.
+    """A mission's tree for one robot, as data; `parts` are its steps with their goal conditions, in order,
+    `steps` what it was compiled from, and `doors` those of the world's knowledge.
 
     Its root watches over the mission itself: see `executive.tree.compiling.interrupts`.
     """
@@ -36,6 +38,7 @@ class CompiledTree:
     root: NodeSpec
     parts: tuple[StepPart, ...] = ()
     steps: tuple[MissionStep, ...] = ()
+    doors: tuple[Doorway, ...] = ()
 
     @property
     def mission(self) -> NodeSpec:
@@ -74,4 +77,5 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
     start = start_key(mission.robot_name, mission.name)
     root = watched(PlanBuilder(knowledge, registry, body.path_id, start, Command(), mission.source), body)
     check_wiring(root)
-    return CompiledTree(mission.robot_name, mission.name, mission.commands, root, parts, mission.steps)
+    doors = tuple(doorway(knowledge, door) for door in knowledge.doors)
+    return CompiledTree(mission.robot_name, mission.name, mission.commands, root, parts, mission.steps, doors)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from skills.api import Cause, Part, Running, Succeeded
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
-from skills.check_door.doorway import Doorway, Opening, opening
+from skills.perception.doorway import Doorway, Opening, opening
 from skills.quantities import Angle, Coordinate, Count, Delay, Length, Margin, Turn
 from skills.robot import Scan
 

@@ -88,13 +88,17 @@ class LayeredCostmap:
         """The last scan's stamp and those of its returns (N, 3) that the surveyed grid does not explain."""
         return self._scan_stamp_s, self._returns_W
 
-    def forget_seen(self) -> int:
-        """Forget all that was seen and not surveyed; the number of cells that were blocked by it."""
-        forgotten = len(self._active())
-        self._until_s.fill(-math.inf)
-        self._candidate_s.fill(-math.inf)
+    def forget_seen(self, within_W: FloatArray | None = None) -> int:
+        """Forget what was seen and not surveyed, perhaps only within discs; how many cells were blocked by it."""
+        cells = self._active()
+        if within_W is None:
+            self._candidate_s.fill(-math.inf)
+        else:
+            cells = cells[~outside_discs(self._layer.centres(cells), within_W)]
+        self._until_s[cells[:, 0], cells[:, 1]] = -math.inf
+        self._candidate_s[cells[:, 0], cells[:, 1]] = -math.inf
         self._note_change()
-        return forgotten
+        return len(cells)
 
     def leave_out(self, discs_W: FloatArray) -> None:
         """From now on take in nothing that is seen within these discs, rows of x, y and radius (m, world).

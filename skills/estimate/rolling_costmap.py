@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skills.api import LocalisationEstimate
 from skills.estimate.compiled import bilinear, compiled
 from skills.estimate.grid_map import GridMap
-from skills.estimate.scan_points import placed_points, scan_points, sensor_pose
+from skills.estimate.scan_points import outside_discs, placed_points, scan_points, sensor_pose
 from skills.estimate.self_filter import ArmShape, SelfFilter, in_body_axes
 from skills.geometry import compose
 from skills.quantities import Count, Factor, Height, Length, Margin
@@ -80,11 +80,17 @@ class RollingCostmap:
         """The last scan's stamp and those of its returns (N, 3) that lie away from all that was seen before."""
         return self._stamp_s, self._returns_W
 
-    def forget_seen(self) -> int:
-        """Forget all; the number of cells that were blocked."""
-        blocked = int(np.count_nonzero(self._odds > 0.0))
-        self._odds.fill(0.0)
-        self._known.fill(False)
+    def forget_seen(self, within_W: FloatArray | None = None) -> int:
+        """Forget all, or what lies within discs; the number of cells that were blocked."""
+        forgotten = np.ones(self._odds.shape, dtype=np.bool_)
+        if within_W is not None:
+            rows, columns = np.indices(self._odds.shape).reshape(2, -1)
+            cell_m = np.float64(self._options.cell_m)
+            centres = (np.column_stack([columns, rows]) + 0.5) * cell_m + np.array(self._corner_m or (0.0, 0.0))
+            forgotten = ~outside_discs(centres, within_W).reshape(self._odds.shape)
+        blocked = int(np.count_nonzero(self._odds[forgotten] > 0.0))
+        self._odds[forgotten] = 0.0
+        self._known[forgotten] = False
         self._changed()
         return blocked
 

@@ -23,19 +23,21 @@ from skills.api import (
     Step,
     Succeeded,
 )
-from skills.geometry import relative
+from skills.geometry import compose, relative
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
+from skills.navigate.cut_off import DoorOptions, DoorWatch, closed_sentence
 from skills.navigate.footprint import Footprint, footprint_clearance_m
 from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
 from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
 from skills.navigate.scan_health import ScanHealth, ScanHealthOptions
+from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_watch import PeopleOptions, PeopleWatch
-from skills.quantities import Delay, Duration, Length, Margin, Speed, Tries, Turn, TurnRate
+from skills.quantities import Coordinate, Delay, Duration, Length, Margin, Speed, Tries, Turn, TurnRate
 from skills.robot import Pose2D
 from skills.stack import LocalController
 
@@ -46,12 +48,16 @@ _OUTLINE_PERIOD_S = 0.5
 
 @dataclass(frozen=True)
 class NavigateInputs:
-    """The goal (the body's pose in the world), tolerances and the maximum speed."""
+    """The goal (the body's pose in the world), tolerances and the maximum speed.
+
+    Poses at `nearby_m`, forward and left of the goal, will do as well: a failure is final only if none can be reached.
+    """
 
     goal: Pose2D
     position_tolerance_m: Length = 0.10
     yaw_tolerance_rad: Turn = 0.10
     max_speed_m_s: Speed = 0.8
+    nearby_m: tuple[tuple[Coordinate, Coordinate], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,7 @@ class NavigateOptions:
     guard: GuardOptions = field(default_factory=GuardOptions)
     scans: ScanHealthOptions = field(default_factory=ScanHealthOptions)
     giving_way: GivingWayOptions = field(default_factory=GivingWayOptions)
+    doors: DoorOptions = field(default_factory=DoorOptions)
 
 
 class Navigate(Skill[NavigateInputs]):
@@ -95,7 +102,7 @@ class Navigate(Skill[NavigateInputs]):
     outputs: ClassVar[Mapping[str, type]] = {}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "localisation is lost, the LiDAR does not work, or the robot refuses to drive",
-        Cause.PLANNING: "the goal is blocked or there is no path, even after waiting for obstacles to move",
+        Cause.PLANNING: "the goal is blocked, or there is no path, even after waiting for what stands there to move",
         Cause.EXECUTION: "the robot makes no progress, loses localisation or its LiDAR, or refuses to drive on",
         Cause.POSTCONDITION: "it stands still, but not at the goal",
     }
@@ -125,6 +132,9 @@ class Navigate(Skill[NavigateInputs]):
         self._people = PeopleWatch(self.context, self.options.people)
         self._pace = PaceManager(self._footprint, self.options.space)
         self._scans = ScanHealth(self.context, self.options.scans)
+        self._doors = DoorWatch(self.context, self.options.doors)
+        self._shut_since_s: float | None = None
+        self._seen_anew = False
         self._blind_since_s: float | None = None
         self._guard = CollisionGuard(self.context, self._footprint, self.options.guard)
         self._room_m = self.options.space.room_m
@@ -210,6 +220,7 @@ class Navigate(Skill[NavigateInputs]):
         about, only to see whether there is a way."""
         if not self._persons():
             self._room_m = self.options.space.room_m
+        self._doors.look()
         self._footprint = self._pace.footprint = self._guard.footprint = self._outline.now()
         self._outline_due_s = self._now() + _OUTLINE_PERIOD_S
         speed = max(0.1, self._inputs.max_speed_m_s)
@@ -233,7 +244,7 @@ class Navigate(Skill[NavigateInputs]):
     def _costmap(self, here: Pose2D, avoided: Avoided = Avoided.BODIES) -> Costmap:
         """What is in the way, with room about people as far as `here` and the goal leave it."""
         fixed = (here, self._goal)
-        costmap = self._giving.costmap(self.context.costmap, avoided)
+        costmap = self._giving.costmap(self._doors.costmap(self.context.costmap), avoided)
         return spaced(costmap, self._footprint, fixed, self._persons(), self._room_m)
 
     def _look_out(self) -> None:
@@ -285,16 +296,64 @@ class Navigate(Skill[NavigateInputs]):
             self._phase = self._planning
             return None
         neighbour = self._neighbour_may_go()
-        self._replans += not (neighbour or self._people_may_go())
+        may_go = neighbour or self._people_may_go()
+        shut = () if neighbour else self._shut_doors()
+        if shut:
+            return self._wait_for_doors(shut)
+        self._replans += not may_go
+        if self._replans < self.options.replans and self._doors.forget_distant(self.context.pose()):
+            self._phase = self._planning
+            self._ask_for_plan()
+            return None
+        if not may_go and self._see_anew():
+            return None
         if self._obstacle is None or self._replans >= self.options.replans:
             who = self._giving.name_at(self._obstacle) or "something seen"
             seen = f" The way is blocked by {who} at {_xy(self._obstacle)}." if self._obstacle else ""
-            return Failed(Cause.PLANNING, why + seen)
+            return Failed(Cause.PLANNING, why + seen, final=not may_go and self._cut_off())
         self._wait_until_s = self._now() + self.options.replan_pause_s
         self._phase = self._planning
         if neighbour and not self._map_leads and isinstance(self.context.costmap, ForgettingCostmap):
             self._ask_for_plan(map_alone=True)
         return None
+
+    @property
+    def _goals(self) -> tuple[Pose2D, ...]:
+        """The goal, and the poses nearby that will do as well."""
+        goal = self._inputs.goal
+        return (goal, *(compose(goal, Pose2D(*offset, 0.0)) for offset in self._inputs.nearby_m))
+
+    def _shut_doors(self) -> tuple[Doorway, ...]:
+        """The doors that were seen closed and leave no path to any of the goals."""
+        people_W = [one.place_W for one in self._persons()]
+        return self._doors.in_the_way(self._footprint, self.context.pose(), self._goals, people_W)
+
+    def _cut_off(self) -> bool:
+        """Whether surely none of the goals can be reached."""
+        return self._doors.regions(self._footprint, self.context.pose(), self._goals).cut_off
+
+    def _wait_for_doors(self, doors: Sequence[Doorway]) -> Step | None:
+        """Stand while closed doors leave no path; give up when patience is over."""
+        now_s, options = self._now(), self.options.doors
+        self._shut_since_s = now_s if self._shut_since_s is None else self._shut_since_s
+        if now_s - self._shut_since_s >= options.patience_s:
+            return Failed(Cause.PLANNING, closed_sentence(doors, self._inputs.goal), final=True)
+        self._obstacle = doors[0].middle_W
+        self._wait_until_s = now_s + options.look_s
+        self._phase = self._planning
+        return None
+
+    def _see_anew(self) -> bool:
+        """Forget once what was seen and look again, before the goal is taken for cut off by it."""
+        costmap = self.context.costmap
+        if self._seen_anew or not isinstance(costmap, ForgettingCostmap) or not self._cut_off():
+            return False
+        self._seen_anew = True
+        if not costmap.forget_seen():
+            return False
+        self._wait_until_s = self._now() + self.options.doors.look_s
+        self._phase = self._planning
+        return True
 
     def _people_may_go(self) -> bool:
         """Whether a failure may be due to people who are near or were a moment ago, and patience lasts."""

@@ -67,6 +67,6 @@ class BlockCostmap:
     def add_points(self, points_W: NDArray[np.float64], stamp_s: float) -> None:
         """Nothing changes."""
 
-    def forget_seen(self) -> int:
+    def forget_seen(self, within_W: NDArray[np.float64] | None = None) -> int:
         """Nothing was seen that is not there."""
         return 0

@@ -10,7 +10,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
-from executive.tree.behaviours.explained import ExplainedNode, cause_of, message_of
+from executive.tree.behaviours.explained import ExplainedNode, cause_of, failed_for_good, message_of
 from executive.tree.node import NodeKind
 from skills.api import Cause
 
@@ -105,14 +105,18 @@ class MemorySelector(MemoryComposite):
     Child that does not apply (`Conditional`): passed over, it stays idle. Child RUNNING: RUNNING. Child SUCCESS:
     SUCCESS. Child FAILURE: on to the next in the same tick; after the last: FAILURE with the sentences of all that
     could begin, the decisive ones first. Its cause is ERROR when one child had that, else the first that is neither
-    PRECONDITION nor POSTCONDITION, else `exhausted_cause` where given, else the last child's.
+    PRECONDITION nor POSTCONDITION, else `exhausted_cause` where given, else the last child's. With `one_goal` the
+    children lead to the same goal: after a failure that is final for one, the others are passed over.
     """
 
     goes_on_after = frozenset({Status.FAILURE})
     exhausted_cause: Cause | None = None
     exhausted_message: str = ""
+    one_goal: bool = False
 
     def _passes_over(self, child: Behaviour) -> bool:
+        if self.one_goal and child.status != Status.RUNNING and any(map(failed_for_good, self.children)):
+            return True
         return child.status != Status.RUNNING and isinstance(child, Conditional) and not child.applies()
 
     def _explanation(self, child: Behaviour) -> tuple[Cause, str]:

@@ -14,6 +14,7 @@ class Explained:
     """Mixin for behaviours, which have the `status`.
 
     `cause` is None unless the node failed or was cancelled; `message` is one sentence, `progress` from 0 to 1 or None.
+    A failure is `final` where another attempt would end the same way.
     """
 
     path_id: str
@@ -21,10 +22,11 @@ class Explained:
     message: str
     status: Status
     progress: float | None = None
+    final: bool = False
 
     def clear_explanation(self) -> None:
         """Forget cause and message."""
-        self.cause, self.message = None, ""
+        self.cause, self.message, self.final = None, "", False
 
     def explain_cancelled(self) -> None:
         """Say that the node was stopped from outside, and while doing what."""
@@ -54,6 +56,11 @@ def cause_of(node: Behaviour) -> Cause:
     """The node's cause; EXECUTION for a foreign node that carries none."""
     cause = node.cause if isinstance(node, Explained) else None
     return cause or Cause.EXECUTION
+
+
+def failed_for_good(node: Behaviour) -> bool:
+    """Whether the node, or one below it, failed and another attempt would end the same way."""
+    return any(isinstance(one, Explained) and one.status == Status.FAILURE and one.final for one in node.iterate())
 
 
 def message_of(node: Behaviour) -> str:

@@ -25,7 +25,8 @@ from skills.robot import Robot
 class Trigger:
     """A kind of failure: of the node `node` (None: of the attempt as a whole), with one of `causes`.
 
-    With `own`, only where the failure is the node's own and not one that a node below it handed up: a guard's.
+    With `own`, only where the failure is the node's own and not one that a node below it handed up: a guard's. A
+    failure of a node that is final fits no trigger for that node.
     """
 
     causes: frozenset[Cause]
@@ -38,6 +39,8 @@ class Trigger:
 
     def _is_it(self, node: Behaviour, attempt: Behaviour) -> bool:
         if node.status != Status.FAILURE or cause_of(node) not in self.causes:
+            return False
+        if isinstance(node, Explained) and node.final:
             return False
         if self.own and any(child.status == Status.FAILURE for child in node.children):
             return False

@@ -88,6 +88,7 @@ class SkillLeaf(ExplainedLeaf):
         step = self._ended() or self._written(step)
         self.message = self.feedback_message = step.message
         self.cause = step.cause if isinstance(step, Failed) else None
+        self.final = isinstance(step, Failed) and step.final
         return Status.FAILURE if isinstance(step, Failed) else Status.SUCCESS
 
     def suspend(self) -> None:

@@ -125,12 +125,21 @@ class PlanBuilder:
         """A leaf that waits on the robot's clock."""
         return self.node("pause", name, part=part, duration_s=duration_s)
 
-    def navigate(self, pose: Pose2D | FromBoard, to: str, *, exactly: bool = False) -> NodeSpec:
+    def navigate(
+        self,
+        pose: Pose2D | FromBoard,
+        to: str,
+        *,
+        exactly: bool = False,
+        nearby_m: tuple[tuple[float, float], ...] = (),
+    ) -> NodeSpec:
         """Drive to a pose, called `to`; where the path is blocked, see anew what stands there, then back off a little.
 
-        With `exactly`, within 8 cm.
+        With `exactly`, within 8 cm. Poses at `nearby_m` from it, forward and left, are tried afterwards.
         """
-        ports = {"goal": pose, "position_tolerance_m": 0.08} if exactly else {"goal": pose}
+        ports: dict[str, object] = {"goal": pose, **({"position_tolerance_m": 0.08} if exactly else {})}
+        if nearby_m and self.has_ports("navigate", ("nearby_m",)):
+            ports["nearby_m"] = nearby_m
         drive, below = self.skill("navigate", ports), self.at("way")
         blocked = Recovery((after(Cause.PLANNING, Cause.EXECUTION, of=drive),))
         recoveries = ((below.skill("clear_costmap"), blocked), (below.skill("back_off"), blocked))

@@ -15,6 +15,7 @@ from executive.mission.knowledge import Door, Knowledge
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.node import NodeSpec
 from skills.files.errors import InputError
+from skills.perception.doorway import Doorway
 from skills.robot import Pose2D
 
 CHECK_DOOR: Final = "check_door"
@@ -73,6 +74,11 @@ def _before(door: Door, into_rad: float) -> Iterator[Pose2D]:
             x, y = _from(door.at, bearing_rad, before_m)
             yaw_rad = math.remainder(bearing_rad + math.pi + turned_rad, math.tau)
             yield Pose2D(round(x, 3), round(y, 3), round(yaw_rad, 4))
+
+
+def doorway(knowledge: Knowledge, door: Door) -> Doorway:
+    """A door of the knowledge file as the skills take it."""
+    return Doorway(door.at, door.width, _through_rad(knowledge, door), door.between)
 
 
 def _through_rad(knowledge: Knowledge, door: Door) -> float:

@@ -38,21 +38,28 @@ _NOT_PLANNING: Final = (Cause.PRECONDITION, Cause.EXECUTION, Cause.POSTCONDITION
 
 def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> NodeSpec:
     """Drive to a pose, called `to`, or, when there is no path to it, to one nearby in the same room."""
-    direct = builder.navigate(pose, to)
-    nearby = enumerate(_nearby(builder, pose), start=1)
-    others = [builder.at(f"nearby-{n}").navigate(other, f"a place near {to}") for n, other in nearby]
-    return builder.node("selector", f"go to {to}, or near it", direct, *others, part="or-near") if others else direct
+    nearby = _nearby(builder, pose)
+    direct = builder.navigate(pose, to, nearby_m=tuple(nearby))
+    others = [
+        builder.at(f"nearby-{n}").navigate(other, f"a place near {to}")
+        for n, other in enumerate(nearby.values(), start=1)
+    ]
+    if not others:
+        return direct
+    return builder.node("selector", f"go to {to}, or near it", direct, *others, part="or-near", one_goal=True)
 
 
-def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> list[Pose2D | FromBoard]:
-    """Poses beside a goal; those of a known pose lie in the same room."""
+def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float, float], Pose2D | FromBoard]:
+    """Poses beside a goal, by how far they lie beside it; those of a known pose lie in the same room."""
     if isinstance(pose, FromBoard):
-        return [BesideBoard(pose.key, *offset) for offset in NEARBY_M]
+        return {offset: BesideBoard(pose.key, *offset) for offset in NEARBY_M}
     rooms = [
         place.polygon for place in builder.knowledge.places.values() if inside(place.polygon, (pose.x_m, pose.y_m))
     ]
-    poses = (beside(pose, *offset) for offset in NEARBY_M)
-    return [other for other in poses if any(inside(room, (other.x_m, other.y_m)) for room in rooms)]
+    poses = {offset: beside(pose, *offset) for offset in NEARBY_M}
+    return {
+        offset: other for offset, other in poses.items() if any(inside(room, (other.x_m, other.y_m)) for room in rooms)
+    }
 
 
 def pick_up_plan(

@@ -83,6 +83,13 @@ def test_going_is_given_up_after_all_poses_nearby(compiled, run_tree, script, fa
     assert script.begun.count("clear_costmap") == script.begun.count("back_off") == 4
 
 
+def test_where_all_poses_are_out_of_reach_nothing_else_is_tried(compiled, run_tree, script):
+    script.ends["navigate"] = lambda skill: Failed(Cause.PLANNING, "the door is closed", final=True)
+    worst = run_tree(compiled(GO)).worst
+    assert (worst.cause, worst.message) == (Cause.PLANNING, "the door is closed")
+    assert script.begun == ["navigate"]
+
+
 def test_what_is_put_down_is_brought_beside_the_goal_where_there_is_no_way_to_it(compiled, run_tree, fails, robot):
     robot.holding = True
     navigate = fails("navigate", *[Cause.PLANNING] * 3)

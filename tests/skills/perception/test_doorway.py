@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from skills.check_door.doorway import Doorway, opening
+from skills.perception.doorway import Doorway, opening
 from skills.robot import Pose2D
 from skills.testing.blocks import Block
 from skills.testing.sensing import sweep

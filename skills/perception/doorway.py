@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform
 
-from skills.robot import Scan, unit_rays
+from skills.robot import FloatArray, Scan, unit_rays
+
+if TYPE_CHECKING:
+    from pydrake.math import RigidTransform
 
 _STRIP_M = 0.05
 _HEIGHTS_M = (0.1, 1.9)
@@ -28,16 +31,23 @@ Counts = NDArray[np.int64]
 class Doorway:
     """A doorway: its middle (x, y) in the world (m), its clear width (m), and the direction through it (rad).
 
-    From which side the direction leads through does not matter.
+    From which side the direction leads through does not matter. It leads from one room to the other of `between`.
     """
 
     middle_W: tuple[float, float]
     width_m: float
     through_rad: float
+    between: tuple[str, str] = ("", "")
 
     def distance_m(self, place_W: tuple[float, float]) -> float:
         """How far its middle is from a place."""
         return math.dist(self.middle_W, place_W)
+
+    def axis(self, far_m: float, every_m: float) -> FloatArray:
+        """Points (N, 2) on the line through it, so far to both sides."""
+        steps = np.arange(-far_m, far_m + every_m, every_m)
+        through = np.array([math.cos(self.through_rad), math.sin(self.through_rad)])
+        return np.asarray(np.array(self.middle_W) + steps[:, None] * through)
 
     def view_angle_rad(self, place_W: tuple[float, float]) -> float:
         """How flat it is seen from a place: 0 from straight before it, pi/2 from within its wall."""

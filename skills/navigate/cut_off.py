@@ -1,0 +1,234 @@
+"""What cuts the robot off from a goal: doors that it saw closed, or anything else that leaves no gap."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.api import Costmap, ForgettingCostmap, LocalisationEstimate, SkillContext
+from skills.navigate.footprint import Footprint
+from skills.perception.doorway import Doorway, opening
+from skills.quantities import Delay, Length, Margin, Turn
+from skills.robot import FloatArray, Pose2D, Robot
+
+__all__ = ["DoorOptions", "DoorWatch", "Regions", "closed_sentence"]
+
+_CELL_M = 0.05
+_AROUND_M = 8.0
+_NEAR_M = 0.3
+_BESIDE_M = (0.4, 0.55, 0.7, 0.9)
+_FEW_RAYS = 50
+_PANEL_M = 0.05
+_JUDGED_M = 1.5
+_JAMB_M = 0.3
+_THROUGH_M = 0.6
+_PERSON_M = np.stack(np.meshgrid(*2 * [np.arange(-0.5, 0.51, _CELL_M)]), axis=-1).reshape(-1, 2)
+
+
+@dataclass(frozen=True)
+class DoorOptions:
+    """How the robot judges the doors on its map while it drives.
+
+    A scan shows a door from `reach_m` at most, and from `flattest_rad` at most off the direct view. The door is closed
+    while all its gaps are narrower than `closed_m`. Where closed doors leave no path, the robot looks again every
+    `look_s`, for `patience_s`.
+    """
+
+    reach_m: Length = 4.0
+    flattest_rad: Turn = 1.1
+    closed_m: Margin = 0.1
+    patience_s: Delay = 3.0
+    look_s: Delay = 1.0
+
+
+class DoorWatch:
+    """Remembers which doors of the map the robot saw closed, until it sees them open."""
+
+    def __init__(self, context: SkillContext, options: DoorOptions | None = None) -> None:
+        self._context = context
+        self._options = options or DoorOptions()
+        self._closed: dict[Doorway, None] = {}
+
+    @property
+    def closed(self) -> tuple[Doorway, ...]:
+        """The doors that were closed when they were last seen."""
+        return tuple(self._closed)
+
+    def look(self) -> None:
+        """Judge the doors in view by the newest scan."""
+        scan, estimate = self._context.robot.scan(), self._context.localiser.estimate()
+        if not self._context.doors or scan is None or not estimate.localised:
+            return
+        X_WL, options = estimate.X_WO @ scan.X_OB @ scan.X_BL, self._options
+        place = float(X_WL.translation()[0]), float(X_WL.translation()[1])
+        for door in self._context.doors:
+            if door.distance_m(place) > options.reach_m or door.view_angle_rad(place) > options.flattest_rad:
+                continue
+            seen = opening(door, [(scan, X_WL)])
+            if seen.rays >= _FEW_RAYS and seen.most_m <= options.closed_m:
+                self._closed[door] = None
+            elif seen.least_m > options.closed_m:
+                self._closed.pop(door, None)
+
+    def costmap(self, costmap: Costmap) -> Costmap:
+        """The costmap, with the closed doors in it as long as they are not seen open."""
+        return WithDoors(costmap, self.closed) if self._closed else costmap
+
+    def forget_distant(self, here: Pose2D) -> bool:
+        """Forget what was seen in doorways too far away to be judged, once another door is closed; whether it did.
+
+        A door that is seen in part, through another door, may leave a gap that looks too narrow.
+        """
+        costmap, place = self._context.costmap, (here.x_m, here.y_m)
+        far = [door for door in self._context.doors if door.distance_m(place) > _JUDGED_M]
+        far = [door for door in far if door not in self._closed]
+        if not self._closed or not far or not isinstance(costmap, ForgettingCostmap):
+            return False
+        return bool(costmap.forget_seen(np.array([[*door.middle_W, 0.5 * door.width_m + _JAMB_M] for door in far])))
+
+    def regions(
+        self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()
+    ) -> Regions:
+        """Where a disc as wide as the robot can move, all doors open but those that were seen closed, and no people."""
+        axes = [door.axis(_THROUGH_M, 0.5 * _CELL_M) for door in self._context.doors if door not in self._closed]
+        discs = [np.array(place) + _PERSON_M for place in people_W]
+        return Regions(
+            self.costmap(self._context.costmap),
+            footprint,
+            here,
+            goals,
+            np.concatenate([np.empty((0, 2)), *axes, *discs]),
+        )
+
+    def in_the_way(
+        self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()
+    ) -> tuple[Doorway, ...]:
+        """The closed doors without which there would be a path to one of the goals; none where one is reachable."""
+        if not self._closed:
+            return ()
+        regions = self.regions(footprint, here, goals, people_W)
+        return regions.doors_between(self.closed) if regions.cut_off else ()
+
+
+@dataclass(frozen=True)
+class WithDoors:
+    """A costmap in which closed doors are obstacles, whether or not they were seen of late."""
+
+    costmap: Costmap
+    doors: tuple[Doorway, ...]
+
+    def clearance_m(self, points_W: FloatArray) -> FloatArray:
+        """Distance from each (x, y) row to the nearest obstacle or closed door."""
+        points = np.asarray(points_W, dtype=np.float64)[:, :2]
+        clearance = np.array(self.costmap.clearance_m(points_W))
+        for door in self.doors:
+            middle = np.array(door.middle_W)
+            across = np.array([-np.sin(door.through_rad), np.cos(door.through_rad)])
+            along_m = np.clip((points - middle) @ across, -0.5 * door.width_m, 0.5 * door.width_m)
+            nearest = middle + along_m[:, None] * across
+            clearance = np.minimum(clearance, np.linalg.norm(points - nearest, axis=1) - _PANEL_M)
+        return np.asarray(clearance)
+
+    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
+        """As the costmap does."""
+        self.costmap.update(robot, localisation)
+
+    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
+        """As the costmap does."""
+        self.costmap.add_points(points_W, stamp_s)
+
+
+class Regions:
+    """The connected regions of the ground in which a disc as wide as the robot can move.
+
+    A goal outside the robot's region is certainly out of reach; one inside may still be, since the robot is longer. The
+    places `free_W` (N, 2) count as free, whatever the costmap says.
+    """
+
+    def __init__(
+        self,
+        costmap: Costmap,
+        footprint: Footprint,
+        here: Pose2D,
+        goals: Sequence[Pose2D],
+        free_W: FloatArray,
+    ) -> None:
+        self._here, self._goals = here, goals
+        places = np.array([[pose.x_m, pose.y_m] for pose in (here, *goals)])
+        self._corner = places.min(axis=0) - _AROUND_M
+        columns, rows = np.ceil((places.max(axis=0) + _AROUND_M - self._corner) / _CELL_M).astype(int).tolist()
+        xs, ys = (self._corner[axis] + _CELL_M * np.arange(n) for axis, n in ((0, columns), (1, rows)))
+        points = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
+        free = costmap.clearance_m(points).reshape(rows, columns) > footprint.inscribed_m - _CELL_M
+        cells = self._cell(free_W)
+        free[tuple(cells[np.all((cells >= 0) & (cells < free.shape), axis=1)].T)] = True
+        labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=8)[1]
+        self._labels: NDArray[np.int64] = labels.astype(np.int64)
+
+    @property
+    def cut_off(self) -> bool:
+        """Whether the robot's region is known, and none of the goals lies in it."""
+        here = self._near((self._here.x_m, self._here.y_m))
+        return bool(here) and not any(here & self._at((goal.x_m, goal.y_m)) for goal in self._goals)
+
+    def doors_between(self, doors: Sequence[Doorway]) -> tuple[Doorway, ...]:
+        """The closed doors on a path that leads to a goal through such doors; none where there is no such path."""
+        begin = self._near((self._here.x_m, self._here.y_m))
+        ends = set[int]().union(*(self._at((goal.x_m, goal.y_m)) for goal in self._goals))
+        joins = {door: sides for door in doors if len(sides := self._sides(door)) == 2}
+        reached, grown = set(begin), True
+        while grown:
+            more = {side for sides in joins.values() if sides & reached for side in sides} - reached
+            reached, grown = reached | more, bool(more)
+        if not reached & ends:
+            return ()
+        return tuple(_on_a_path(joins, begin | (ends & reached)))
+
+    def _sides(self, door: Doorway) -> frozenset[int]:
+        """The regions on the two sides of a door."""
+        through = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
+        found: list[int] = []
+        for sign in (1.0, -1.0):
+            beside = (self._at(tuple(door.middle_W + sign * far_m * through)) for far_m in _BESIDE_M)
+            found += next((list(labels) for labels in beside if labels), [])
+        return frozenset(found)
+
+    def _at(self, place_W: tuple[float, float], off_m: float = 0.0) -> set[int]:
+        """The regions at a place, or within a distance of it."""
+        ((y, x),) = self._cell(np.array([place_W])).tolist()
+        far = round(off_m / _CELL_M)
+        near = self._labels[max(0, y - far) : max(0, y + far + 1), max(0, x - far) : max(0, x + far + 1)]
+        return set(np.unique(near).tolist()) - {0}
+
+    def _cell(self, places_W: FloatArray) -> NDArray[np.int64]:
+        """The (row, column) of each place."""
+        return np.asarray(np.round((places_W - self._corner) / _CELL_M)[:, ::-1].astype(np.int64))
+
+    def _near(self, place_W: tuple[float, float]) -> set[int]:
+        return self._at(place_W) or self._at(place_W, _NEAR_M)
+
+
+def _on_a_path(joins: dict[Doorway, frozenset[int]], ends: set[int]) -> dict[Doorway, frozenset[int]]:
+    """The doors that are left once those that lead to dead ends are taken away."""
+    left = dict(joins)
+    while True:
+        sides = [side for each in left.values() for side in each]
+        dead = {side for side in sides if sides.count(side) == 1} - ends
+        kept = {door: each for door, each in left.items() if not each & dead}
+        if len(kept) == len(left):
+            return kept
+        left = kept
+
+
+def closed_sentence(doors: Sequence[Doorway], goal: Pose2D) -> str:
+    """ "The doors between the hall and the kitchen, and between the kitchen and the study, are closed ..."."""
+    between = [f"between the {one} and the {other}" for one, other in (door.between for door in doors)]
+    no_path = f"so no path leads to ({goal.x_m:.2f}, {goal.y_m:.2f})"
+    if len(between) == 1:
+        return f"The door {between[0]} is closed, {no_path}."
+    return f"The doors {', '.join(between[:-1])}, and {between[-1]}, are closed, {no_path}."

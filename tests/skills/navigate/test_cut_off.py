@@ -1,0 +1,127 @@
+"""Closed doors: seen as such, told by name, and given up before; a person in a doorway is no closed door."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from planar_robot import Bench, Box
+
+from skills.api import Cause, Failed, Running, Succeeded
+from skills.navigate.cut_off import DoorWatch, closed_sentence
+from skills.navigate.footprint import Footprint
+from skills.navigate.skill import Navigate, NavigateInputs
+from skills.perception.doorway import Doorway
+from skills.robot import Pose2D
+
+LEFT = Doorway((2.45, 4.05), 0.9, math.pi / 2, ("study", "corridor"))
+RIGHT = Doorway((7.45, 4.05), 0.9, math.pi / 2, ("corridor", "kitchen"))
+LEFT_PANEL = Box(2.0, 4.03, 2.9, 4.07, 0.0, 2.0)
+RIGHT_PANEL = Box(7.0, 4.03, 7.9, 4.07, 0.0, 2.0)
+BEFORE_LEFT, BEFORE_RIGHT, KITCHEN = Pose2D(2.3, 5.4, 0.0), Pose2D(6.8, 5.4, 0.0), Pose2D(8.5, 2.0, -1.57)
+
+
+def context_of(bench, doors=(LEFT, RIGHT)):
+    return dataclasses.replace(bench.context(), doors=doors)
+
+
+def go(bench, goal, *, limit_s=40.0, nearby_m=(), each=lambda: None):
+    """Run the skill as its leaf would; the last step."""
+    skill = Navigate(context_of(bench))
+    skill.begin(NavigateInputs(goal, nearby_m=nearby_m))
+    begun_s = bench.clock.now()
+    while isinstance(step := skill.step(), Running) and bench.clock.now() < begun_s + limit_s:
+        bench.tick()
+        each()
+    skill.end()
+    return step
+
+
+def watch(*unmapped, start=BEFORE_RIGHT):
+    bench = Bench(start, unmapped=unmapped)
+    for _ in range(10):
+        bench.tick()
+    doors = DoorWatch(context_of(bench))
+    doors.look()
+    return bench, doors
+
+
+def test_a_door_is_closed_when_its_panel_is_seen_over_its_whole_width():
+    assert watch(RIGHT_PANEL)[1].closed == (RIGHT,)
+    assert watch()[1].closed == ()
+
+
+@pytest.mark.parametrize("aside_m", [-0.25, 0.0, 0.25])
+def test_a_person_in_a_doorway_is_no_closed_door(aside_m):
+    x = 7.45 + aside_m
+    assert watch(Box(x - 0.22, 3.85, x + 0.22, 4.25, 0.0, 1.7))[1].closed == ()
+
+
+def test_a_door_that_opens_is_no_longer_closed():
+    bench, doors = watch(RIGHT_PANEL)
+    bench.robot.boxes.remove(RIGHT_PANEL)
+    for _ in range(10):
+        bench.tick()
+    doors.look()
+    assert doors.closed == ()
+
+
+def test_only_the_doors_that_bar_every_path_are_in_the_way():
+    bench, doors = watch(LEFT_PANEL, RIGHT_PANEL, start=Pose2D(5.0, 5.7, 0.0))
+    assert set(doors.closed) == {LEFT, RIGHT}
+    footprint = Footprint.of(bench.robot.capabilities())
+    assert doors.in_the_way(footprint, bench.robot.pose, (KITCHEN,)) == (RIGHT,)
+    assert doors.in_the_way(footprint, bench.robot.pose, (Pose2D(9.0, 5.5, 0.0),)) == ()
+    assert doors.in_the_way(footprint, bench.robot.pose, (KITCHEN, Pose2D(9.0, 5.5, 0.0))) == ()
+
+
+def test_behind_a_closed_door_it_gives_up_soon_for_good_and_names_the_door():
+    bench = Bench(BEFORE_RIGHT, unmapped=[RIGHT_PANEL])
+    step = go(bench, KITCHEN)
+    assert isinstance(step, Failed)
+    assert (step.cause, step.final) == (Cause.PLANNING, True)
+    assert step.message.startswith("The door between the corridor and the kitchen is closed, so no path leads to")
+    assert bench.clock.now() < 15.0
+
+
+def test_a_door_that_opens_while_it_waits_is_gone_through():
+    bench = Bench(BEFORE_RIGHT, unmapped=[RIGHT_PANEL])
+
+    def opens():
+        if bench.clock.now() > 3.0 and RIGHT_PANEL in bench.robot.boxes:
+            bench.robot.boxes.remove(RIGHT_PANEL)
+
+    assert isinstance(go(bench, KITCHEN, each=opens), Succeeded)
+
+
+def test_a_goal_that_something_fences_in_is_given_up_for_good_with_all_poses_nearby():
+    fence = [Box(8.0, 4.1, 8.1, 7.0, 0.0, 1.7)]
+    bench = Bench(Pose2D(5.5, 5.4, 0.0), unmapped=fence)
+    step = go(bench, Pose2D(9.2, 5.5, 0.0), nearby_m=((-0.5, 0.0),))
+    assert isinstance(step, Failed)
+    assert (step.cause, step.final) == (Cause.PLANNING, True)
+
+
+def test_a_pose_nearby_that_can_be_reached_keeps_the_failure_from_being_final():
+    bench = Bench(Pose2D(5.5, 5.4, 0.0), unmapped=[Box(8.9, 5.2, 9.5, 5.8, 0.0, 1.7)])
+    at_goal = Pose2D(9.2, 5.5, 0.0)
+    assert go(bench, at_goal).final is True
+    assert go(bench, at_goal, nearby_m=((-1.2, 0.0),)).final is False
+
+
+def test_all_closed_doors_are_told_in_one_sentence():
+    told = closed_sentence((LEFT, RIGHT), KITCHEN)
+    assert told == (
+        "The doors between the study and the corridor, and between the corridor and the kitchen, are closed, "
+        "so no path leads to (8.50, 2.00)."
+    )
+
+
+def test_forgetting_within_discs_keeps_what_lies_elsewhere():
+    bench, _ = watch(RIGHT_PANEL, Box(5.2, 5.2, 5.6, 5.6, 0.0, 1.7))
+    before = len(bench.costmap.seen_m())
+    forgotten = bench.costmap.forget_seen(np.array([[7.45, 4.05, 0.8]]))
+    assert 0 < forgotten < before
+    assert len(bench.costmap.seen_m()) == before - forgotten

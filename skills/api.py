@@ -334,14 +334,15 @@ class Publish(Protocol):
 
 @dataclass
 class Payload:
-    """How large the thing in the gripper is, noted by the skill that took it: corners (N, 3) in the hand frame (m).
+    """What is in the gripper, noted by the skill that took it: its size as corners (N, 3) in the hand frame (m).
 
-    `R_BH` is how the hand was turned as it took the thing, which stood or lay level then. None while nobody knows, as
-    after a restart. It counts only while the gripper holds something.
+    `R_BH` is how the hand was turned as it took the thing, which stood or lay level then; `thing` is what it was taken
+    for. None while nobody knows, as after a restart. It counts only while the gripper holds something.
     """
 
     corners_H: NDArray[np.float64] | None = None
     R_BH: RotationMatrix | None = None
+    thing: Thing | None = None
 
 
 @dataclass

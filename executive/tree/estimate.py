@@ -287,7 +287,15 @@ _VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
     "together": _together,
     "repeat": _rounds,
 }
+
+
+def _begun_with_empty_hand(node: NodeSpec) -> tuple[NodeSpec, ...]:
+    """The branches of a selector, but those for what a broken grasp has left in the gripper."""
+    return tuple(child for child in node.children if child.options.get("known_as") is None)
+
+
 _EXPECTED: Final[Mapping[str, Callable[[NodeSpec], tuple[NodeSpec, ...]]]] = {
+    "selector": _begun_with_empty_hand,
     "recover": lambda node: node.children[:1],
     "go back": lambda node: node.children[:1],
     "afterwards": lambda node: node.children[:1] if node.options["only_after_failure"] else node.children,

@@ -20,9 +20,12 @@ WITH_HAND_M_S = 0.2
 REST_S = 0.2
 FLICKER_S = 0.15
 SETTLE_S = 1.0
+SET_DOWN_S = 0.3
+"""What stood on the floor so shortly before the gripper left it was set down."""
 _PLAIN = (
     *("events", "dropped_s", "touches", "speed_m_s", "_grip_s", "_grip_robot", "_grip_z_m", "_supported_s"),
     *("_still_since_s", "_carried", "_left_z_m", "_dropped", "_tray_s", "_tray_of", "_by_others"),
+    "_set_down_s",
 )
 
 
@@ -84,6 +87,7 @@ class ObjectHistory:
     _grip_robot: str | None = None
     _grip_z_m: float = 0.0
     _supported_s: float = float("-inf")
+    _set_down_s: float = float("-inf")
     _still_since_s: float | None = None
     _carried: bool = False
     _left_z_m: float | None = None
@@ -200,6 +204,8 @@ class ObjectHistory:
         if sample.gripper is not None:
             self.touches += self._last is None or sample.time_s - self._grip_s > 0.5
             self._grip_s, self._grip_robot = sample.time_s, sample.gripper
+            if sample.on_floor:
+                self._set_down_s = sample.time_s
         if sample.supported:
             self._supported_s = sample.time_s
         if sample.tray_of is not None:
@@ -282,10 +288,11 @@ class ObjectHistory:
             self._left_z_m = float(sample.p_WO[2])
 
     def _note_fall(self, sample: ObjectSample) -> None:
-        """Count a drop once it is clear that it falls, or lies on the floor."""
+        """Count a drop once it is clear that it falls, or lies on the floor without having been set down there."""
         if self._left_z_m is None or self._dropped:
             return
-        if self._left_z_m - sample.p_WO[2] > FALL_M or sample.on_floor:
+        set_down = self._grip_s - self._set_down_s <= SET_DOWN_S
+        if self._left_z_m - sample.p_WO[2] > FALL_M or (sample.on_floor and not set_down):
             self._dropped = True
             self.dropped_s.append(sample.time_s)
             self.events.append(f"{self._grip_robot} dropped the {self.name} at {sample.time_s:.2f} s.")

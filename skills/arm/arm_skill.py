@@ -21,6 +21,7 @@ from skills.arm.poses import UP_B, look_configuration, towards_shoulder
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.arm.solid_cells import solid_boxes, with_picture, with_view
 from skills.estimate.self_filter import segment_distance
+from skills.perception.at_rest import APART_S, at_rest
 from skills.robot import (
     ArmCapabilities,
     ArmTrajectory,
@@ -493,6 +494,23 @@ class ArmSkill(RoutineSkill[InputsT]):
             with_view(solid.views, image, X_WO),
         )
         return image
+
+    def at_rest_since(self, image: Image, p_W: FloatArray, within_m: float, message: str) -> Routine[bool]:
+        """Whether more depth pictures, each a moment after the one before, show the same as `image` about p_W.
+
+        Their intervals differ: what rolls to and fro may be back at one time, and not at the next.
+        """
+        robot, source, before = self.context.robot, self.object_camera.source, image
+        X_WO = self.context.localiser.estimate().X_WO
+        for apart_s in APART_S:
+            yield from self.pause(before.stamp_s + apart_s - self.context.clock.now(), message)
+            later = yield from self.sense(
+                lambda: robot.image(source, visual=False), latency_s=PICTURE_LATENCY_S, name="again", message=message
+            )
+            if not at_rest(before, later, X_WO, p_W, within_m):
+                return False
+            before = later
+        return True
 
     def try_stow(self) -> Routine[None]:
         """Stow where a way is found; used on the way out of failures."""

@@ -387,6 +387,7 @@ class Grasp(ArmSkill[GraspInputs]):
         relax_m = _RELAX_M if view.target.height_m > THIN_M else _RELAX_THIN_M
         yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {thing}")
         X_BH = self.model.X_BH(self.q_rad())
+        self.context.payload.thing = seen.thing
         force_n = self.options.force_n + _PER_LEVER_N_M * plan.candidate.lever_m
         most_n = _MOST_OF_FORCE * self.gripper.max_force_n
         yield from self.move_gripper(0.0, min(force_n + _PER_KG_N * least_kg, most_n), f"closing on the {thing}")

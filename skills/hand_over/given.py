@@ -10,22 +10,36 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
+from skills.api import Surface
 from skills.perception.class_forms import PERSON
 from skills.perception.detection_3d import Detection3D
 from skills.perception.point_cloud import cloud_from_image
+from skills.perception.surface_segmentation import view_surface
 from skills.robot import FloatArray, Image
 
 _TALL_M, _UPPER_PART, _ABOVE_TOP_M = 0.05, 0.5, 0.06
 _BESIDE_M, _LEAST_POINTS = 0.12, 12
 _TAKEN_WITHIN_M, _LOWER_M, _FLOOR_M, _FELL_WITHIN_M = 0.35, 0.35, 0.3, 1.0
+_PLATE_M = 0.2
+"""Half the side of the square about the object in which what bears it is looked for."""
 
 
 class Seen(enum.Enum):
-    """What a picture shows of an object that was let go of."""
+    """What became of an object that was let go of."""
 
     GIVEN = "given"  # it is where it was let go of, or a little lower: somebody bears it
     FELL = "fell"  # it lies near the floor
     NOT_SEEN = "not seen"  # neither
+    MOVES = "moves"  # somebody bears it, and it does not come to rest
+    IN_GRIPPER = "in the gripper"  # the closing gripper feels it
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a picture shows, and about which point (3,) of the world (m)."""
+
+    seen: Seen
+    p_W: FloatArray
 
 
 @dataclass(frozen=True)
@@ -57,23 +71,40 @@ def release_of(X_WH: RigidTransform, p_HT: FloatArray, corners_H: FloatArray | N
 
 def seen_given(
     image: Image, X_WO: RigidTransform, found: Iterable[Detection3D], names: Sequence[str], release: Release
-) -> Seen:
+) -> Sight:
     """What a picture without the robot's arm and the objects detected in it show of what was let go of.
 
-    An object counts as given when one of its class is near where it was let go of, or when something reaches as high
-    there as the upper half of it did; what is flat is known by its class only. Where `names` is empty, any class but
-    that of people is its own.
+    An object counts as given when one of its class is near where it was let go of, when something reaches as high
+    there as the upper half of it did, or when something lies there on a level plate. Where `names` is empty, any class
+    but that of people is its own.
     """
     own = [each for each in found if (each.class_name in names if names else each.class_name != PERSON)]
-    off_m = [float(np.hypot(each.position_W[0] - release.x_m, each.position_W[1] - release.y_m)) for each in own]
-    heights_m = [float(each.position_W[2]) for each in own]
-    near = zip(off_m, heights_m, strict=True)
-    if any(off < _TAKEN_WITHIN_M and height > max(release.low_m - _LOWER_M, _FLOOR_M) for off, height in near):
-        return Seen.GIVEN
-    if stands_at(image, X_WO, release):
-        return Seen.GIVEN
-    low = zip(off_m, heights_m, strict=True)
-    return Seen.FELL if any(off < _FELL_WITHIN_M and height <= _FLOOR_M for off, height in low) else Seen.NOT_SEEN
+    own.sort(key=lambda each: _off_m(each, release))
+    lowest_m = max(release.low_m - _LOWER_M, _FLOOR_M)
+    for each in own:
+        if _off_m(each, release) < _TAKEN_WITHIN_M and each.position_W[2] > lowest_m:
+            return Sight(Seen.GIVEN, each.position_W)
+    if stands_at(image, X_WO, release) or lies_at(image, X_WO, release):
+        return Sight(Seen.GIVEN, release.p_W)
+    for each in own:
+        if _off_m(each, release) < _FELL_WITHIN_M and each.position_W[2] <= _FLOOR_M:
+            return Sight(Seen.FELL, each.position_W)
+    return Sight(Seen.NOT_SEEN, release.p_W)
+
+
+def _off_m(found: Detection3D, release: Release) -> float:
+    return float(np.hypot(found.position_W[0] - release.x_m, found.position_W[1] - release.y_m))
+
+
+def lies_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
+    """Whether a picture shows something on a level plate at about the height at which an object was let go of."""
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    square = tuple((release.x_m + _PLATE_M * x, release.y_m + _PLATE_M * y) for x, y in corners)
+    view = view_surface(image, X_WO, Surface("plate", square, release.low_m))
+    if view is None:
+        return False
+    middles = [np.median(cluster.points.p_W[:, :2], axis=0) for cluster in view.clusters]
+    return any(np.hypot(x - release.x_m, y - release.y_m) < _BESIDE_M for x, y in middles)
 
 
 def stands_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:

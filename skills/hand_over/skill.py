@@ -13,18 +13,16 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Question, Running, Succeeded
 from skills.approach.standing import go_to_one
-from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
+from skills.arm.arm_skill import GRIPPER_FORCE_N
 from skills.arm.collision import ArmScene, Box
-from skills.arm.poses import carry_configuration
 from skills.arm.pull import PullWatch
 from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
-from skills.hand_over.given import Release, Seen, names_in, release_from, release_of, seen_given
+from skills.hand_over.given import Seen, release_from, release_of
+from skills.hand_over.verification import HandOverVerification
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
 from skills.navigate.skill import NavigateInputs
-from skills.perception.detection_3d import detections_3d
-from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
 from skills.perception.people import SeenPerson, people_in_scan
 from skills.quantities import Duration, Force, Height, Length
 from skills.robot import FloatArray, Pose2D
@@ -37,13 +35,8 @@ _STILL_S = 0.5
 _FREE_S = 2.0
 _LETS_GO, _KEEPS = "let go", "hold on"
 _POINTS_DOWN = 0.8
-_LOOKS = 3
-_BORNE_M, _DEEP_M, _OVER_M = 0.42, 0.12, 0.005
-"""How far hands or a tray that bear what was let go of may reach: wide, below its lowest point and over that (m)."""
-_FLOOR_FROM_M, _FLOOR_M = 0.07, (1.2, 2.4, 0.1)
-"""The floor, for an arm that goes round: from how far before the body on, and how large (m)."""
-_OWN_M, _OVER_TOP_M = 0.14, 0.03
-"""The object's own space, as it may have turned: wide, and over its highest point (m)."""
+_TRIES = 2
+_WIDE, _SHAKE_RAD, _SHAKE_RAD_S = 0.75, (0.35, -0.35, 0.35, -0.35), 3.0
 
 
 @dataclass(frozen=True)
@@ -72,8 +65,8 @@ class HandOverOptions:
     wait_s: Duration = 20.0
 
 
-class HandOver(ArmSkill[HandOverInputs]):
-    """Finds a person by LiDAR, goes there, holds the object out to them and lets go when they take it."""
+class HandOver(HandOverVerification[HandOverInputs]):
+    """Finds a person by LiDAR, goes there, holds the object out, lets go when they take it, and looks who has it."""
 
     name = "hand_over"
     Inputs = HandOverInputs
@@ -83,10 +76,10 @@ class HandOver(ArmSkill[HandOverInputs]):
         Cause.PRECONDITION: "nothing is held, or nobody is seen near",
         Cause.PLANNING: "no free place before the person, or no free path for the arm",
         Cause.EXECUTION: "the robot or its arm did not reach its goal",
-        Cause.POSTCONDITION: "the object was lost, is still in the gripper, or is not seen with the person",
+        Cause.POSTCONDITION: "the object was lost, is still in the gripper, or is not seen at rest with the person",
         Cause.TIMEOUT: "the person did not take the object",
     }
-    default_timeout_s = 120.0
+    default_timeout_s = 180.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
     changes_world = True
     gripper_before = True
@@ -107,9 +100,18 @@ class HandOver(ArmSkill[HandOverInputs]):
         return self.lost("the object was lost while it was held out")
 
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
-        """Find, go, hold out, wait, let go."""
+        """Find, go, hold out, wait, let go; what the closing gripper feels again is held out once more."""
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to hand over")
+        for _ in range(_TRIES):
+            seen = yield from self._give(inputs)
+            if seen is not Seen.IN_GRIPPER:
+                break
+            self.checkpoint = {}
+        return self._given(inputs, seen)
+
+    def _give(self, inputs: HandOverInputs) -> Routine[Seen]:
+        """Hold the object out and let go of it; what became of it."""
         person = yield from self._find(inputs.person)
         if not _well_placed(self._ahead(person), self.options.stand_off_range_m):
             yield from self._go_before(person, inputs.person)
@@ -118,26 +120,42 @@ class HandOver(ArmSkill[HandOverInputs]):
         yield from self._hold_out(person, inputs.person)
         self._check(person, inputs.person)
         self._watch = self.hold_watch()
+        yield from self.pause(_STILL_S, f"holding the {inputs.thing} out to {inputs.person}")
+        held_kg = yield from self.weigh(self.p_HT, f"weighing the {inputs.thing}")
         if not (yield from self._taken(inputs)):
             yield from self.move_to(lambda scene, q: q_carrying_rad, f"drawing the {inputs.thing} in")
             why = f"{inputs.person} did not take the {inputs.thing} within {self.options.wait_s:g} s"
             raise SkillFailure(Cause.TIMEOUT, why)
         self._watch = None
-        yield from self._let_go(inputs)
-        return Succeeded(f"gave the {inputs.thing} to {inputs.person}")
+        return (yield from self._let_go(inputs, held_kg))
 
     def run_again(self, inputs: HandOverInputs) -> Routine[Succeeded]:
-        """Go on from an attempt that was broken off; what was let go of is given."""
+        """Go on from an attempt that was broken off; what was let go of is looked for with the person."""
         self._watch = None
         if not self.checkpoint.get("lets_go"):
             return (yield from self.run(inputs))
-        yield from self._let_go(inputs)
-        return Succeeded(f"gave the {inputs.thing} to {inputs.person}")
+        seen = yield from self._let_go(inputs, None)
+        if seen is not Seen.IN_GRIPPER:
+            return self._given(inputs, seen)
+        self.checkpoint = {}
+        return (yield from self.run(inputs))
+
+    def _given(self, inputs: HandOverInputs, seen: Seen) -> Succeeded:
+        """Success where the person has the object, at rest. Raises SkillFailure with cause POSTCONDITION otherwise."""
+        thing, person = inputs.thing, inputs.person
+        why = {
+            Seen.IN_GRIPPER: f"the {thing} is still in the gripper",
+            Seen.FELL: f"the {thing} fell to the floor before {person}",
+            Seen.NOT_SEEN: f"the {thing} is not seen where it was let go of before {person}",
+            Seen.MOVES: f"the {thing} still moves where it was let go of before {person}",
+        }
+        if seen in why:
+            raise SkillFailure(Cause.POSTCONDITION, why[seen])
+        return Succeeded(f"gave the {thing} to {person}")
 
     def _taken(self, inputs: HandOverInputs) -> Routine[bool]:
         """Wait for a pull at the object, or for the operator's word; False when the time is over."""
         message, robot = f"holding the {inputs.thing} out to {inputs.person}", self.context.robot
-        yield from self.pause(_STILL_S, message)
         watch = PullWatch(self.model, self.p_HT, self.options.pull_n)
         text = f"{robot.name} holds the {inputs.thing} out to {inputs.person}. Let go?"
         question = Question(f"hand-over/{robot.name}", text, (_LETS_GO, _KEEPS), _KEEPS, self.options.wait_s)
@@ -154,87 +172,44 @@ class HandOver(ArmSkill[HandOverInputs]):
         finally:
             asked.withdraw()
 
-    def _let_go(self, inputs: HandOverInputs) -> Routine[None]:
-        """Open, wait until the gripper feels nothing, leave the object without dragging it, and look who has it.
-
-        A robot whose camera is on its hand does not look: there it would be before the person's face.
-        """
-        message, gripper = f"giving the {inputs.thing} to {inputs.person}", self.context.robot.gripper
+    def _let_go(self, inputs: HandOverInputs, held_kg: float | None) -> Routine[Seen]:
+        """Open, wait until the gripper feels nothing, leave the object without dragging it, and see who has it."""
+        thing, message = (
+            inputs.thing,
+            f"giving the {inputs.thing} to {inputs.person}",
+        )
         if not self.checkpoint.get("lets_go"):
             corners_H = self.context.payload.corners_H
             release = release_of(self.X_WB() @ self.model.X_BH(self.q_rad()), self.p_HT, corners_H)
             self.checkpoint = {"lets_go": True, "release": release.state()}
         yield from self.move_gripper(self.release_rad(), GRIPPER_FORCE_N, message)
-        end_s = self.context.clock.now() + _FREE_S
-        while gripper().holding:
-            if self.context.clock.now() > end_s:
-                raise SkillFailure(Cause.POSTCONDITION, f"the {inputs.thing} is still in the open gripper")
-            yield Running(message)
+        free = yield from self._feels_nothing(message)
         yield from self.pause(_STILL_S, message)
-        camera = self.context.robot.capabilities().object_camera
-        if camera is None or camera.on_hand:
-            yield from self.leave_object()
-            yield from self.try_stow()
-            return
-        release = release_from(self.checkpoint["release"])
+        if not free or (yield from self.hangs_on_hand(held_kg, message)):
+            yield from self._shake(f"shaking the {thing} off the fingers")
+            if not (yield from self._feels_nothing(message)):
+                raise SkillFailure(Cause.POSTCONDITION, f"the {thing} is still in the open gripper")
         yield from self.leave_object()
-        yield from self._stow_beside(release, message)
-        yield from self._check_given(inputs, release)
+        return (yield from self.verify(thing, inputs.person, release_from(self.checkpoint["release"])))
 
-    def _stow_beside(self, release: Release, message: str) -> Routine[None]:
-        """Stow the arm around the hands, or the tray, that bear the object now; where there is no such way, by any.
+    def _feels_nothing(self, message: str) -> Routine[bool]:
+        """Wait until the gripper feels nothing; False when it still does after a while."""
+        end_s = self.context.clock.now() + _FREE_S
+        while self.context.robot.gripper().holding:
+            if self.context.clock.now() > end_s:
+                return False
+            yield Running(message)
+        return True
 
-        First the hand comes near the body: a long way round would swing it through what no camera has seen.
-        """
-        boxes, X_BW = self.boxes, self.X_WB().inverse()
-        borne = (_BORNE_M, release.low_m - _DEEP_M, release.low_m + _OVER_M)
-        for side_m, low_m, high_m in (borne, (_OWN_M, release.low_m, release.top_m + _OVER_TOP_M)):
-            X_WG = RigidTransform([release.x_m, release.y_m, 0.5 * (low_m + high_m)])
-            self.boxes = [*self.boxes, Box(X_BW @ X_WG, (side_m, side_m, high_m - low_m))]
-        front_m = max(x for x, _ in self.context.robot.capabilities().footprint_m) + _FLOOR_FROM_M
-        X_BG = RigidTransform([front_m + 0.5 * _FLOOR_M[0], 0.0, -self._height_m() - 0.5 * _FLOOR_M[2]])
-        self.boxes = [*self.boxes, Box(X_BG, _FLOOR_M)]
-        arm, R_BH = self.arm, self.model.X_BH(self.q_rad()).rotation()
-        try:
-            yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q), message)
-            yield from self.stow(message)
-        except SkillFailure:
-            self.boxes = boxes
-            yield from self.try_stow()
-        self.boxes = boxes
-
-    def _check_given(self, inputs: HandOverInputs, release: Release) -> Routine[None]:
-        """Raise SkillFailure with cause POSTCONDITION unless the object is seen with the person."""
-        thing, message = inputs.thing, f"looking whether {inputs.person} has the {inputs.thing}"
-        for level_m in (*[release.low_m] * _LOOKS, 0.0):
-            if self.context.robot.gripper().holding:
-                raise SkillFailure(Cause.POSTCONDITION, f"the {thing} is still in the gripper")
-            seen = yield from self._look(release, level_m, thing, message)
-            if seen is Seen.GIVEN:
-                return
-            if seen is Seen.FELL:
-                raise SkillFailure(Cause.POSTCONDITION, f"the {thing} fell to the floor before {inputs.person}")
-        why = f"the {thing} is not seen where it was let go of before {inputs.person}"
-        raise SkillFailure(Cause.POSTCONDITION, why)
-
-    def _look(self, release: Release, level_m: float, thing: str, message: str) -> Routine[Seen]:
-        """What a picture of where the object was let go of shows, at a height over the floor (m)."""
-        context = self.context
-        p_BT = self.X_WB().inverse() @ np.array([release.x_m, release.y_m, level_m])
-        try:
-            yield from self.look_at(p_BT, (), message)
-            image = yield from self.picture(message)
-        except SkillFailure as failure:
-            raise SkillFailure(
-                Cause.POSTCONDITION, f"the {thing} is let go of, but not seen: {failure.message}"
-            ) from failure
-        place, names = context.localiser.estimate(), names_in(thing, context.detector.class_names)
-
-        def look() -> Seen:
-            found = detections_3d(image, place, detections_in(context.detector, image), ())
-            return seen_given(image, place.X_WO, found, names, release)
-
-        return (yield from self.compute(look, latency_s=DETECTION_LATENCY_S, name="look who has it", message=message))
+    def _shake(self, message: str) -> Routine[None]:
+        """Open wide, and turn the hand to and fro: what sticks to a finger comes off."""
+        yield from self.move_gripper(_WIDE * self.widest, GRIPPER_FORCE_N, message)
+        q, wrist = self.q_rad(), np.eye(len(self.model.names))[-1]
+        turns = [q + turn_rad * wrist for turn_rad in _SHAKE_RAD]
+        inside = [each for each in turns if np.all((each > self.model.lower_rad) & (each < self.model.upper_rad))]
+        path = np.array([q, *inside, q])
+        yield from self.follow(self.context.stack.arm_planner.timed(path, speed_rad_s=_SHAKE_RAD_S), message)
+        yield from self.pause(_STILL_S, message)
 
     def _find(self, name: str) -> Routine[SeenPerson]:
         """The nearest person that is seen in several scans, ahead rather than behind."""
@@ -279,20 +254,17 @@ class HandOver(ArmSkill[HandOverInputs]):
         yield from self.move_to(goal, f"holding the object out to {name}", speed_rad_s=0.8)
 
     def _check(self, person: SeenPerson, name: str) -> None:
-        """Raise SkillFailure with cause POSTCONDITION unless the object is held out near the person."""
+        """Raise SkillFailure unless the object is held out near the person."""
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the object was lost while it was held out to {name}")
         p_BT = self.model.X_BH(self.q_rad()) @ self.p_HT
         off = float(np.linalg.norm(p_BT[:2] - self._ahead(person)))
         if off > self.options.furthest_m:
-            raise SkillFailure(Cause.POSTCONDITION, f"the object is held {off:.2f} m from {name}, which is too far")
+            raise SkillFailure(Cause.EXECUTION, f"the object is held {off:.2f} m from {name}, which is too far")
 
     def _ahead(self, person: SeenPerson) -> FloatArray:
         """The person's axis (x, y) in the body frame."""
         return np.asarray((self.X_WB().inverse() @ np.array([*person.place_W, 0.0]))[:2])
-
-    def _height_m(self) -> float:
-        return float(self.context.robot.odometry().X_OB.translation()[2])
 
 
 def facing_poses(point_W: tuple[float, float], here: Pose2D, stand_off_m: float, count: int = 24) -> list[Pose2D]:

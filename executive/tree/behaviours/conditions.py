@@ -9,13 +9,15 @@ from __future__ import annotations
 import copy
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
 from executive.mission.file.model import StaleData
 from executive.tree.behaviours.context import RunContext
-from skills.api import Cause, Failed
+from skills.api import Cause, Failed, Thing
 from skills.arm.hold import Grip, HoldWatch, grip_again, hold_watch
+from skills.perception.class_forms import THING
 from skills.robot import Pose2D
 
 CONTROL_TOPIC = "control"
@@ -73,6 +75,10 @@ class Condition(ABC):
     def called(self) -> None:  # noqa: B027 - most conditions need not know
         """What is done about it has begun."""
 
+    def violated_at_end(self, context: RunContext) -> Failed | None:
+        """What speaks against a success of the subtree, None when nothing does."""
+        return None
+
     def violated(self, context: RunContext) -> Verdict:
         """What speaks against going on, None when nothing does. Called before each tick of the subtree."""
         now_s, fresh, policy = context.clock.now(), self.freshness, self.stale or self.freshness.policy
@@ -88,19 +94,33 @@ class Condition(ABC):
         return Failed(Cause.PRECONDITION, said)
 
 
+def is_known_as(thing: Thing | None, classes: Sequence[str], attributes: Sequence[str] = ()) -> bool:
+    """Whether an object was taken for one of these classes, or any (`THING`), with at least these attributes."""
+    if thing is None:
+        return False
+    return (THING in classes or thing.name in classes) and set(attributes) <= set(thing.attributes)
+
+
 @dataclass
 class Holds(Condition):
     """The gripper holds `thing`, which is brought `to` somewhere ("to the kitchen").
 
+    PRECONDITION at the start when what it holds was taken for something else than one of the classes `known_as` with
+    all `attributes`; of what nobody knows, as after a restart, it is believed.
+
     PRECONDITION when nothing is held at the start, EXECUTION when it is lost on the way, within 0.3 s. What begins to
     slip is gripped again more firmly, once; EXECUTION when it slips on. With `until_put_down` the gripper may open to
-    let go, what slips on is left to the skill that puts it down, and so is an empty gripper at the start.
+    let go, what slips on is left to the skill that puts it down, and so is an empty gripper at the start. Without it,
+    the gripper holds it at the end, too.
     """
 
     reading = "the gripper"
     thing: str
     to: str = ""
     until_put_down: bool = False
+    known_as: tuple[str, ...] = ()
+    attributes: tuple[str, ...] = ()
+    _begins: bool = field(default=True, init=False, repr=False, compare=False)
     _watch: HoldWatch = field(default_factory=HoldWatch, init=False, repr=False, compare=False)
 
     def stamp_s(self, context: RunContext) -> float:
@@ -116,11 +136,15 @@ class Holds(Condition):
     def begin(self, context: RunContext) -> None:
         """The subtree starts anew: nothing has been held yet."""
         super().begin(context)
-        self._watch = hold_watch(context.robot.capabilities())
+        self._watch, self._begins = hold_watch(context.robot.capabilities()), True
 
     def judged(self, context: RunContext) -> Verdict:
-        """A failure when it is lost or slips on; grips again what slips."""
-        watch = self._watch
+        """A failure when it is lost or slips on, or is another object; grips again what slips."""
+        watch, held = self._watch, context.payload.thing
+        begins, self._begins = self._begins, False
+        another = held is not None and self.known_as and not is_known_as(held, self.known_as, self.attributes)
+        if begins and another and context.robot.gripper().holding:
+            return Failed(Cause.PRECONDITION, f"the gripper holds the {held}, not the {self.thing}")
         grip = watch.judge(context.robot.gripper(), context.clock.now())
         if grip is Grip.SLIPPING:
             grip_again(context.robot, watch.force_n, clock=context.clock, lease=context.lease)
@@ -134,6 +158,12 @@ class Holds(Condition):
         if grip is Grip.SLIPS_ON and not self.until_put_down:
             return Failed(Cause.EXECUTION, f"the {self.thing} slips out of the gripper on the way{self._to}")
         return None
+
+    def violated_at_end(self, context: RunContext) -> Failed | None:
+        """A failure when the gripper feels nothing any more."""
+        if self.until_put_down or context.robot.gripper().holding:
+            return None
+        return Failed(Cause.EXECUTION, f"the {self.thing} was lost on the way{self._to}")
 
     @property
     def _to(self) -> str:

@@ -6,11 +6,12 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 
 from executive.tree.behaviours.board import Board
-from skills.api import LeavesOthersOut, SkillContext
+from skills.api import LeavesOthersOut, Part, Skill, SkillContext
 from skills.robot import Pose2D
 
 
@@ -65,6 +66,18 @@ class Endings:
         return left
 
 
+@dataclass
+class ArmOrder:
+    """Whether the arm may be anywhere: its last skill was halted or suspended, failed, or leaves it out."""
+
+    anywhere: bool = False
+
+    def ended(self, skill: type[Skill[Any]], *, succeeded: bool) -> None:
+        """A skill has ended. One for the arm alone leaves it as it is to be, when it succeeds."""
+        if Part.ARM in skill.uses:
+            self.anywhere = not succeeded or Part.BASE in skill.uses
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunContext(SkillContext):
     """What the run lends to all nodes of a robot's tree: what skills may touch, the blackboard, the stop button.
@@ -79,6 +92,7 @@ class RunContext(SkillContext):
     presses: Callable[[], Mapping[str, int]] = no_presses
     day_began_s: float = 0.0
     endings: Endings = field(default_factory=Endings)
+    arm_order: ArmOrder = field(default_factory=ArmOrder)
 
     @cached_property
     def leave_others_out(self) -> tuple[LeavesOthersOut, ...]:

@@ -112,11 +112,12 @@ class Guard(ExplainedDecorator):
     """A condition above actions, looked at before every tick.
 
     Condition violated: child halted, FAILURE with the condition's cause. Condition waiting: child suspended, RUNNING.
-    Else as the child.
+    Child SUCCESS that the condition contradicts (`violated_at_end`): FAILURE with its cause. Else as the child.
     """
 
     condition: Condition
     context: RunContext
+    _looked: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -126,6 +127,7 @@ class Guard(ExplainedDecorator):
         """Look at the condition, then tick the child."""
         if self.status != Status.RUNNING:
             self.condition.begin(self.context)
+        self._looked = True
         verdict = self.condition.violated(self.context)
         if verdict is None:
             yield from super().tick()
@@ -138,8 +140,11 @@ class Guard(ExplainedDecorator):
         yield self
 
     def update(self) -> Status:
-        """As the child."""
-        return self.pass_on()
+        """As the child, unless the condition contradicts its success."""
+        status = self.pass_on()
+        done, self._looked = self._looked and status == Status.SUCCESS, False
+        contradicts = self.condition.violated_at_end(self.context) if done else None
+        return status if contradicts is None else self.fail(contradicts)
 
 
 KINDS: Final[Mapping[str, NodeKind]] = {

@@ -14,11 +14,12 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.composites import MemoryComposite
+from executive.tree.behaviours.composites import Conditional, MemoryComposite
+from executive.tree.behaviours.conditions import is_known_as
+from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import Explained, cause_of, message_of
 from executive.tree.node import NodeKind
 from skills.api import Cause, ObjectObservation
-from skills.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -52,13 +53,14 @@ class Recovery:
     """When a recovery is due: after failures that fit one of the triggers, `uses` times at most.
 
     With `given`, only while the blackboard holds something under that key. After one that is `final` and failed there
-    is no other.
+    is no other. One that `completes` brings about what the attempt was for: after its success all is done.
     """
 
     triggers: tuple[Trigger, ...]
     uses: int = 1
     given: str | None = None
     final: bool = False
+    completes: bool = False
 
     def fits(self, attempt: Behaviour, board: Board) -> bool:
         """Whether it is for the failure of an attempt."""
@@ -86,8 +88,9 @@ class Recover(MemoryComposite):
     """An attempt (the first child), with recoveries (the others, each with its `Recovery`) before the next attempt.
 
     Attempt RUNNING or SUCCESS: the same. Attempt FAILURE: the first recovery that fits and is not used up is run from
-    the next tick on; none: FAILURE. Recovery RUNNING: RUNNING. Recovery SUCCESS: RUNNING, and at the next tick the
-    attempt starts anew. Recovery FAILURE: the next that fits; none: FAILURE. No attempts left: FAILURE.
+    the next tick on; none: FAILURE. A recovery that does not apply (`Conditional`) does not fit. Recovery RUNNING:
+    RUNNING. Recovery SUCCESS: RUNNING, and at the next tick the attempt starts anew; SUCCESS after one that completes.
+    Recovery FAILURE: the next that fits; none: FAILURE. No attempts left: FAILURE, but one that completes is tried.
     A failure has the cause and the sentence of the attempt that came farthest, the last of those: when a grasp slips
     and the object is then not seen any more, the slip is decisive. An attempt comes as far as children of it succeeded.
     After it stand the last attempt's sentence and a failed recovery's (its cause counts when it is ERROR).
@@ -131,11 +134,17 @@ class Recover(MemoryComposite):
         failure = _AttemptFailure.of(attempt)
         if self._farthest is None or failure.steps >= self._farthest.steps:
             self._farthest = failure
-        fitting = [i for i, r in enumerate(self.recoveries) if self._uses[i] < r.uses and r.fits(attempt, self.board)]
-        self._due = fitting if self.attempt < self.attempts else []
+        more = self.attempt < self.attempts
+        self._due = [i for i, each in enumerate(self.recoveries) if (more or each.completes) and self._fits(i)]
         if not self._next_recovery():
             tried = f" (after {self.attempt} attempts)" if self.attempt > 1 else ""
             self._fail(tried)
+
+    def _fits(self, number: int) -> bool:
+        """Whether a recovery is for the failure of the attempt, applies and is not used up."""
+        recovery, node = self.recoveries[number], self.children[number + 1]
+        applies = not isinstance(node, Conditional) or node.applies()
+        return applies and self._uses[number] < recovery.uses and recovery.fits(self.children[0], self.board)
 
     def _next_recovery(self) -> bool:
         """Turn to the next recovery that is due; False when there is none."""
@@ -149,12 +158,15 @@ class Recover(MemoryComposite):
         return True
 
     def _recovery_ended(self, recovery: Behaviour) -> None:
-        if recovery.status == Status.SUCCESS:
+        rule = self.recoveries[self._index - 1]
+        if recovery.status == Status.SUCCESS and rule.completes:
+            self._end(Status.SUCCESS, None, message_of(recovery))
+        elif recovery.status == Status.SUCCESS:
             self.attempt += 1
             self._index = 0
             said = f"attempt {self.attempt}, since {message_of(self.children[0])}"
             self.status, self.cause, self.message = Status.RUNNING, None, said
-        elif self.recoveries[self._index - 1].final or not self._next_recovery():
+        elif rule.final or not self._next_recovery():
             error = Cause.ERROR if cause_of(recovery) is Cause.ERROR else None
             self._fail(f"; {recovery.name}: {message_of(recovery)}", error)
 
@@ -222,13 +234,20 @@ class OnlyIfKnown(MemoryComposite):
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class OnlyIfHolding(MemoryComposite):
-    """As its only child, for selectors that pass it over while the gripper holds nothing."""
+    """As its only child, for selectors that pass it over while the gripper holds nothing.
 
-    robot: Robot
+    With `known_as`, what is held must have been taken for an object of one of those classes, with all `attributes`.
+    """
+
+    context: RunContext
+    known_as: tuple[str, ...] | None = None
+    attributes: tuple[str, ...] = ()
 
     def applies(self) -> bool:
-        """Whether something is held."""
-        return self.robot.gripper().holding
+        """Whether something is held, or that object."""
+        if not self.context.robot.gripper().holding:
+            return False
+        return self.known_as is None or is_known_as(self.context.payload.thing, self.known_as, self.attributes)
 
 
 KINDS: Final[Mapping[str, NodeKind]] = {
@@ -237,5 +256,5 @@ KINDS: Final[Mapping[str, NodeKind]] = {
     "only if known": NodeKind(
         OnlyIfKnown, ("children", "board"), writes=lambda options: {options["key"]: ObjectObservation}
     ),
-    "only if holding": NodeKind(OnlyIfHolding, ("children", "robot")),
+    "only if holding": NodeKind(OnlyIfHolding, ("children", "context")),
 }

@@ -36,6 +36,8 @@ class SkillLeaf(ExplainedLeaf):
     or returned no `Step`. INVALID with CANCELLED when stopped from outside. `end` is called on every way out.
     Each attempt gets a new skill object, so that nothing leaks from one attempt to the next. A suspended leaf stays
     RUNNING; its skill goes on at the next tick (`Skill.resume`), and the time between does not count.
+    `first` is the skill that brings the arm in. It runs before the skill where the arm may be anywhere; a robot whose
+    arm cannot be brought in does without.
     """
 
     skill: type[Skill[Any]]
@@ -43,6 +45,8 @@ class SkillLeaf(ExplainedLeaf):
     context: RunContext
     inputs: Mapping[str, Binding] = field(default_factory=dict)
     outputs: Mapping[str, str] = field(default_factory=dict)
+    first: type[Skill[Any]] | None = None
+    _first: Skill[Any] | None = field(default=None, init=False)
     _skill: Skill[Any] | None = field(default=None, init=False)
     _values: Any = field(default=None, init=False)
     _false_start: Failed | None = field(default=None, init=False)
@@ -86,6 +90,7 @@ class SkillLeaf(ExplainedLeaf):
             self.message, self.progress = step.message, step.progress
             return Status.RUNNING
         step = self._ended() or self._written(step)
+        self.context.arm_order.ended(self.skill, succeeded=isinstance(step, Succeeded))
         self.message = self.feedback_message = step.message
         self.cause = step.cause if isinstance(step, Failed) else None
         self.final = isinstance(step, Failed) and step.final
@@ -95,9 +100,11 @@ class SkillLeaf(ExplainedLeaf):
         """Let the skill stop its motion and keep its place; does nothing on an idle or suspended leaf."""
         if not self.active or self.suspended:
             return
-        assert self._skill is not None
+        active = self._first or self._skill
+        assert active is not None
         self._time.stop()
-        self._false_start = self._guarded(self._skill.suspend) or self._false_start
+        self.context.arm_order.ended(self.skill, succeeded=False)
+        self._false_start = self._guarded(active.suspend) or self._false_start
 
     def terminate(self, new_status: Status) -> None:
         """Stopped from outside: end the skill if it is still active, else merely forget an old result."""
@@ -113,6 +120,7 @@ class SkillLeaf(ExplainedLeaf):
         if not self.active:
             return
         defect = self._ended()
+        self.context.arm_order.ended(self.skill, succeeded=False)
         self.explain_cancelled()
         if defect is not None:
             self.cause, self.message = defect.cause, defect.message
@@ -123,21 +131,43 @@ class SkillLeaf(ExplainedLeaf):
         values = {port: binding.read(board) for port, binding in self.inputs.items()}
         self._skill = self.skill(self.context.for_skill(self.path_id))
         self._values = self.skill.Inputs(**values)
-        self._skill.begin(self._values)
+        if self.first is not None and self.context.arm_order.anywhere and self._has_arm():
+            self._first = self.first(self.context.for_skill(f"{self.path_id}/first"))
+            self._first.begin(self.first.Inputs())
+        else:
+            self._skill.begin(self._values)
+
+    def _has_arm(self) -> bool:
+        return self.context.robot.capabilities().arm is not None
 
     def _go_on(self) -> None:
         """The first tick after a suspension; a defect is kept, as in `initialise`."""
         assert self._skill is not None
-        skill = self._skill
+        first, skill = self._first, self._skill
         self._time.go_on()
-        self._false_start = self._false_start or self._guarded(lambda: skill.resume(self._values))
+        resume = (lambda: skill.resume(self._values)) if first is None else lambda: first.resume(first.Inputs())
+        self._false_start = self._false_start or self._guarded(resume)
 
     def _step(self) -> Step:
         assert self._skill is not None
+        if self._first is not None:
+            return self._bring_in(self._first, self._skill)
         step = self._skill.step()
         if not isinstance(step, Running | Succeeded | Failed):
             return Failed(Cause.ERROR, f"{self.name} gave back {step!r} instead of a step")
         return step
+
+    def _bring_in(self, first: Skill[Any], skill: Skill[Any]) -> Running:
+        """One step of bringing the arm in; once that is over the skill begins, and its time."""
+        step = first.step()
+        if isinstance(step, Running) and self._time.elapsed_s() <= first.default_timeout_s:
+            return step
+        self._first = None
+        first.end()
+        self.context.arm_order.ended(type(first), succeeded=isinstance(step, Succeeded))
+        self._time = StoppableTime(self.context.clock)
+        skill.begin(self._values)
+        return Running("the arm is brought in" if isinstance(step, Succeeded) else f"goes on: {step.message}")
 
     def _judged(self, step: Step) -> Step:
         """Time over turns going on, and a success that comes too late, into a failure."""
@@ -151,8 +181,8 @@ class SkillLeaf(ExplainedLeaf):
 
     def _ended(self) -> Failed | None:
         """Call `end` once; a Failed when it raised."""
-        skill, self._skill = self._skill, None
-        return None if skill is None else self._guarded(skill.end)
+        active, self._first, self._skill = self._first or self._skill, None, None
+        return None if active is None else self._guarded(active.end)
 
     def _written(self, step: Succeeded | Failed) -> Succeeded | Failed:
         """Put the outputs on the blackboard; a missing or wrongly typed output is a defect of the skill.

@@ -16,13 +16,14 @@ from executive.tree.behaviours.board import Binding, Constant, FromBoard
 from executive.tree.behaviours.recovery import Recovery, Trigger
 from executive.tree.node import NodeSpec
 from executive.tree.registry import missing
-from skills.api import Cause, Skill, Surface
+from skills.api import Cause, Part, Skill, Surface
 from skills.files.errors import InputError, SourceLine, suggestion
 from skills.perception.class_forms import THING
 from skills.robot import Pose2D
 
 Registry = Mapping[str, type[Skill[Any]]]
 LONGEST_SLUG: Final = 80
+STOW: Final = "stow"
 PICK_UPS: Final = 2
 """How often what falls on the way is picked up again, unless a mission says otherwise."""
 
@@ -105,7 +106,8 @@ class PlanBuilder:
         if name not in self.registry:
             raise self.error(*missing(name, self.registry))
         bound = {port: _binding(value) for port, value in (inputs or {}).items()}
-        return skill_spec(self.registry[name], name, f"{self.path_id}/{slug(name)}", self.source, bound, outputs or {})
+        path_id = f"{self.path_id}/{slug(name)}"
+        return skill_spec(self.registry, name, path_id, self.source, bound, outputs or {})
 
     def recover(
         self,
@@ -187,16 +189,22 @@ class PlanBuilder:
 
 
 def skill_spec(
-    skill: type[Skill[Any]],
+    registry: Registry,
     name: str,
     path_id: str,
     source: SourceLine | None,
     inputs: Mapping[str, Binding],
     outputs: Mapping[str, str],
 ) -> NodeSpec:
-    """A leaf that runs a skill with its ports bound; `outputs` maps output ports to blackboard keys."""
+    """A leaf that runs a registered skill with its ports bound; `outputs` maps output ports to blackboard keys.
+
+    Before a skill that moves the base, and leaves the arm to others, the arm is brought in where it may be anywhere.
+    """
+    skill = registry[name]
+    drives = Part.BASE in skill.uses and Part.ARM not in skill.uses
+    first = {"first": registry[STOW]} if drives and STOW in registry else {}
     ports = {"inputs": MappingProxyType(dict(inputs)), "outputs": MappingProxyType(dict(outputs))}
-    options = MappingProxyType({"skill": skill, **ports, "limit_s": skill.default_timeout_s})
+    options = MappingProxyType({"skill": skill, **ports, "limit_s": skill.default_timeout_s, **first})
     return NodeSpec("skill", path_id, name, options, source=source)
 
 

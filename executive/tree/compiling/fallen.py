@@ -5,6 +5,7 @@
 | it slips | the gripper closes about it, or its force falls | it is gripped again more firmly, and carried on |
 | it slips on | the same once more | it is set down, gripped anew, and carried on |
 | it fell | the gripper is empty and has not opened | look where it fell, pick it up, carry it on |
+| it is not where it was put or handed over | the camera, the gripper | the same |
 """
 
 from __future__ import annotations
@@ -31,15 +32,23 @@ ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
 
 
 def unless_fallen(
-    builder: PlanBuilder, item: Thing, to: str, carry: NodeSpec, guards: tuple[NodeSpec, ...]
+    builder: PlanBuilder,
+    item: Thing,
+    to: str,
+    carry: NodeSpec,
+    guards: tuple[NodeSpec, ...],
+    hands_on: tuple[NodeSpec, ...] = (),
 ) -> NodeSpec:
     """Carrying `to` somewhere; what is lost on the way (one of the guards breaks) is picked up again where it fell.
 
-    That is done as often as the builder's `pick_ups` says; then the carrying begins anew.
+    The same is done when a skill in `hands_on` has let go of the object and finds that it is not where it is to be. It
+    is done as often as the builder's `pick_ups` says; then the carrying begins anew.
     """
     if not builder.pick_ups:
         return carry
-    lost = Recovery(tuple(after(Cause.EXECUTION, of=guard, own=True) for guard in guards), uses=builder.pick_ups)
+    broken = (after(Cause.EXECUTION, of=guard, own=True) for guard in guards)
+    missed = (after(Cause.POSTCONDITION, of=skill) for skill in hands_on)
+    lost = Recovery((*broken, *missed), uses=builder.pick_ups)
     recovery = _pick_up_again_plan(builder.at("again"), item, to)
     return builder.recover(f"carry {item}", carry, (recovery, lost), attempts=builder.pick_ups + 1)
 

@@ -10,6 +10,7 @@
 | grasping | PLANNING | look again; back off and stand anew |
 | grasping | PLANNING, behind another object | move that one aside, where the mission allows it (`aside`) |
 | grasping | PRECONDITION, EXECUTION | look again |
+| grasping | any, with the object in the gripper | draw it in: it is had |
 | tucking the arm in | the object was lost | look again, on the floor as well |
 | carrying | the object was lost | see `executive.tree.compiling.fallen` |
 """
@@ -33,6 +34,7 @@ ATTEMPTS: Final = 4
 LOOK_AGAIN_S: Final = 0.5
 NEARBY_M: Final = ((-0.5, 0.0), (0.0, 0.6), (0.0, -0.6))
 """Poses near a goal that will do as well, forward and left of it (m)."""
+_ANY: Final = tuple(cause for cause in Cause if cause is not Cause.ERROR)
 _NOT_PLANNING: Final = (Cause.PRECONDITION, Cause.EXECUTION, Cause.POSTCONDITION)
 
 
@@ -84,6 +86,7 @@ def pick_up_plan(
     steps = (approach, grasp, tuck) if seen else (search, approach, grasp, tuck)
     attempt = builder.at("pick-up").sequence(f"pick up {thing}", *steps)
     around = builder.at("around")
+    closed_on_it = Recovery((after(*_ANY, of=grasp),), uses=ATTEMPTS, completes=True)
     unplanned, untaken = after(Cause.PLANNING, of=approach), after(Cause.PLANNING, of=grasp)
     lost = after(Cause.PRECONDITION, Cause.EXECUTION, of=tuck, own=True)
     missed = (after(*_NOT_PLANNING, of=grasp), after(*_NOT_PLANNING, of=approach), lost)
@@ -97,6 +100,7 @@ def pick_up_plan(
     attempts = builder.recover(
         f"up to {most} attempts",
         attempt,
+        (known_held_plan(builder.at("in-hand"), thing), closed_on_it),
         *(((move_aside_plan(beside, thing, near, blocking, surfaces, tuck_plan(beside)), clear),) if aside else ()),
         *(((search, Recovery((*missed, untaken), uses=3)),) if seen else look_again),
         (around.skill("clear_costmap"), Recovery((unplanned,))),
@@ -134,6 +138,12 @@ def held_plan(builder: PlanBuilder, thing: Thing) -> NodeSpec:
     return below.node(
         "only if holding", f"the {thing} is in the gripper", below.pause("settle", "hold it", LOOK_AGAIN_S)
     )
+
+
+def known_held_plan(builder: PlanBuilder, thing: Thing) -> NodeSpec:
+    """Draw in what a grasp that failed or was broken off took hold of; only if that is the object."""
+    known = {"known_as": builder.sought(thing.name), "attributes": thing.attributes}
+    return builder.node("only if holding", f"it took hold of the {thing}", tuck_plan(builder), part="only-if", **known)
 
 
 def tidied(builder: PlanBuilder, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:

@@ -40,7 +40,7 @@ def skill_plan(
         port: gives_to(call.gives[port], f"{path_id}/{slug(port)}", skill.outputs[port])
         for port in _given_ports(call, skill)
     }
-    return skill_spec(skill, call.skill, path_id, source, inputs, outputs)
+    return skill_spec(registry, call.skill, path_id, source, inputs, outputs)
 
 
 def _registered(call: SkillCall, registry: Registry) -> type[Skill[Any]]:

@@ -14,7 +14,7 @@ from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import Holds
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.compiling.fallen import unless_fallen
-from executive.tree.compiling.handling import go_near_plan, held_plan, pick_up_plan, tidied
+from executive.tree.compiling.handling import go_near_plan, held_plan, known_held_plan, pick_up_plan, tidied
 from executive.tree.compiling.interrupts import dock_plan
 from executive.tree.compiling.search import (
     look_plans,
@@ -45,7 +45,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
 
     When standing or taking fails, what fits the failure is done and the robot looks again and tries anew; when nothing
     is to be found that is final. With `anywhere`, it is looked for elsewhere, too, when it is not in its place. What an
-    earlier step grasped is not looked for, unless the gripper is empty.
+    earlier step grasped, be it that this step failed, is not looked for, unless the gripper is empty.
     """
     thing = _required(builder, builder.command.object)
     if builder.command.item is not None:
@@ -60,7 +60,9 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     search = search_plan(builder.at("find"), thing, place, key, anywhere=anywhere)
     get = pick_up_plan(builder, thing, search, key, around)
     if not builder.in_gripper:
-        return builder.sequence(f"get {thing} {where(builder.knowledge, place)}", get)
+        held = known_held_plan(builder.at("have"), thing)
+        have = builder.node("selector", f"have {thing}, or get it", held, get, part="have")
+        return builder.sequence(f"get {thing} {where(builder.knowledge, place)}", have)
     return builder.node(
         "selector", f"have {thing}", held_plan(builder, thing), builder.at("get").sequence("get it", get)
     )
@@ -220,15 +222,17 @@ def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard,
     """Carry it there and hold it out; the gripper opens when the person takes it."""
     ports = {"person": person, **({"thing": str(item)} if builder.has_ports("hand_over", ("thing",)) else {})}
     way = _holding(builder, item, f"to {to}", go_near_plan(builder, pose, to))
-    give = _holding(builder.at("give"), item, f"to {to}", builder.skill("hand_over", ports), until_put_down=True)
+    hand_over = builder.skill("hand_over", ports)
+    give = _holding(builder.at("give"), item, f"to {to}", hand_over, until_put_down=True)
     bring = builder.at("bring").sequence(f"bring it to {person}", way, give)
-    return unless_fallen(builder.at("carry-on"), item, f"to {to}", bring, (way, give))
+    return unless_fallen(builder.at("carry-on"), item, f"to {to}", bring, (way, give), (hand_over,))
 
 
 def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:
     """Put down in a place; what is dropped on the way is picked up again."""
     put, guards = put_down_plan(builder, item, place)
-    return unless_fallen(builder.at("carry-on"), item, f"to the {place}", put, guards)
+    skills = tuple(guard.children[0] for guard in guards if guard.children[0].kind == "skill")
+    return unless_fallen(builder.at("carry-on"), item, f"to the {place}", put, guards, skills)
 
 
 def put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> tuple[NodeSpec, tuple[NodeSpec, ...]]:
@@ -260,7 +264,7 @@ def _put_on_plan(builder: PlanBuilder, item: Thing, surface: str, to: str) -> No
 
 def _holding(builder: PlanBuilder, item: Thing, to: str, below: NodeSpec, *, until_put_down: bool = False) -> NodeSpec:
     """A guard: what is carried stays in the gripper, perhaps until it is put down."""
-    condition = Holds(str(item), to, until_put_down)
+    condition = Holds(str(item), to, until_put_down, builder.sought(item.name), item.attributes)
     return builder.node("guard", f"holding {item}", below, condition=condition)
 
 

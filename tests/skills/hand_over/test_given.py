@@ -14,7 +14,7 @@ from table_scene import BLUE, GREY, RED, Can, scene
 from skills.api import Cause, Succeeded
 from skills.arm.pull import levers_m
 from skills.detection import Detection
-from skills.hand_over.given import Release, Seen, names_in, release_from, release_of, seen_given, stands_at
+from skills.hand_over.given import Release, Seen, lies_at, names_in, release_from, release_of, seen_given, stands_at
 from skills.hand_over.skill import HandOver, HandOverInputs
 from skills.perception.detection_3d import Detection3D
 from skills.robot import Gripper, Scan
@@ -108,7 +108,25 @@ def test_what_the_closing_gripper_feels_again_is_still_in_it():
         return Gripper(robot.now_s, robot.opening, 5.0, not opened or robot.opening < 0.03)
 
     robot.gripper = feels
-    failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "the coke is still in the gripper")
+    context = replace(context_of(robot), ask=_LetsGo)
+    failed(HandOver(context), COKE, Cause.POSTCONDITION, "the coke is still in the gripper")
+    assert len(opened) > 1
+
+
+class _LetsGo:
+    """The operator says at once that it lets go."""
+
+    def __init__(self, question):
+        self.question = question
+
+    def done(self):
+        return True
+
+    def result(self):
+        return "let go"
+
+    def withdraw(self):
+        pass
 
 
 def test_a_head_that_does_not_turn_is_told_in_one_sentence():
@@ -152,7 +170,7 @@ def _seen(thing, p_W):
 )
 def test_a_flat_object_is_known_by_its_class_and_place(thing, p_W, seen):
     image, found = _seen(thing, p_W)
-    assert seen_given(image, RigidTransform(), [found], ("wrench",), RELEASE) is seen
+    assert seen_given(image, RigidTransform(), [found], ("wrench",), RELEASE).seen is seen
 
 
 @pytest.mark.parametrize(
@@ -166,6 +184,16 @@ def test_a_flat_object_is_known_by_its_class_and_place(thing, p_W, seen):
 )
 def test_depth_shows_a_tall_object_whatever_its_class(things, stands):
     assert stands_at(scene(things), RigidTransform(), RELEASE) is stands
+
+
+# What is on a plate 2 cm below where a flat object was let go of -> whether something lies there
+@pytest.mark.parametrize(
+    ("things", "lies"),
+    [((Can(1.05, 0.0, 0.04, 0.025, GREY, base=0.93),), True), ((), False)],
+)
+def test_depth_shows_a_flat_object_on_a_level_plate(things, lies):
+    plate = Can(1.05, 0.0, 0.18, 0.01, GREY, base=0.92)
+    assert lies_at(scene((plate, *things)), RigidTransform(), Release(1.05, 0.0, 0.95, 0.97)) is lies
 
 
 def test_depth_does_not_tell_a_flat_object_from_what_bears_it():

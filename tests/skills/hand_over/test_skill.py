@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from analytic_scan import scan_of
 from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
+from table_scene import BLUE, GREY, Can
 
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.arm.pull import levers_m
+from skills.hand_over.given import Release
 from skills.hand_over.skill import HandOver, HandOverInputs, facing_poses
 from skills.robot import CommandState, Gripper, Pose2D, Scan
 
@@ -41,8 +43,12 @@ def _holding(**scripted):
     return _Person(q=CARRYING.copy(), holding=True, opening=0.3, **scripted)
 
 
-def _before_robin(**how):
-    robot = _holding(scan_now=scan_of([(1.4, 0.0, 0.2)]))
+ON_TRAY = (Can(0.85, 0.0, 0.033, 0.115, BLUE, base=0.94), Can(0.85, 0.0, 0.17, 0.01, GREY, base=0.93))
+"""A beer on a tray, where Robin takes it."""
+
+
+def _before_robin(things=ON_TRAY, **how):
+    robot = _holding(scan_now=scan_of([(1.4, 0.0, 0.2)]), things=things)
     for name, value in how.items():
         setattr(robot, name, value)
     return robot
@@ -96,6 +102,60 @@ def test_a_pull_opens_the_gripper_and_the_hand_is_drawn_in():
     assert outcome(HandOver(context_of(robot)), BEER) == Succeeded("gave the beer to Robin")
     assert not robot.holding
     assert robot.q == pytest.approx(MODEL.stowed_rad, abs=0.06)
+
+
+class _Rolling(_Person):
+    """The beer rolls on the tray until a time."""
+
+    rests_s = math.inf
+
+    def image(self, source, *, visual=True, depth=True):
+        off_m = 0.03 * math.sin(7.0 * min(self.now_s, self.rests_s))
+        self.things = (replace(ON_TRAY[0], y=off_m), ON_TRAY[1])
+        return super().image(source, visual=visual, depth=depth)
+
+
+@pytest.mark.parametrize("rests_s", [15.0, math.inf])
+def test_nothing_is_given_as_long_as_it_moves(rests_s):
+    robot = _Rolling(q=CARRYING.copy(), holding=True, opening=0.3, scan_now=scan_of([(1.4, 0.0, 0.2)]))
+    robot.rests_s = rests_s
+    step = outcome(HandOver(context_of(robot)), BEER)
+    if math.isfinite(rests_s):
+        assert step == Succeeded("gave the beer to Robin")
+        assert robot.now_s > rests_s
+    else:
+        assert (step.cause, step.message) == (
+            Cause.POSTCONDITION,
+            "the beer still moves where it was let go of before Robin",
+        )
+
+
+@pytest.mark.parametrize(
+    ("things", "why"),
+    [
+        ((), "the beer is not seen where it was let go of before Robin"),
+        ((Can(0.75, 0.0, 0.033, 0.115, BLUE, base=0.0),), "the beer fell to the floor before Robin"),
+    ],
+)
+def test_the_hand_camera_looks_whether_the_person_has_it(things, why):
+    robot = _before_robin(things=things)
+    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, why)
+    assert robot.q == pytest.approx(MODEL.stowed_rad, abs=0.06)
+
+
+def test_the_hand_camera_stays_below_the_face_of_a_person():
+    robot, cameras_m = _before_robin(), []
+    image = robot.image
+
+    def taken(source, **what):
+        picture = image(source, **what)
+        cameras_m.append(picture.frames.pose("hand_camera").translation())
+        return picture
+
+    robot.image = taken
+    assert isinstance(outcome(HandOver(context_of(robot)), BEER), Succeeded)
+    assert max(z for _, _, z in cameras_m) < 1.4
+    assert max(x for x, _, _ in cameras_m) < 1.4 - 0.7
 
 
 @pytest.mark.parametrize("pull_n", [0.0, 4.0])
@@ -172,7 +232,7 @@ def test_paused_at_any_tick_it_goes_on_and_gives_it():
 def test_after_a_restart_what_was_let_go_is_given():
     robot = _before_robin(holding=False)
     skill = HandOver(context_of(robot))
-    skill.checkpoint = {"lets_go": True}
+    skill.checkpoint = {"lets_go": True, "release": Release(0.85, 0.0, 0.94, 1.05).state()}
     skill.resume(BEER)
     while isinstance(step := skill.step(), Running):
         robot.advance(0.1)

@@ -8,7 +8,7 @@ from executive.tree.behaviours.composites import MemorySequence
 from executive.tree.behaviours.conditions import Holds
 from executive.tree.behaviours.decorators import Guard, Retry, Timeout
 from executive.tree.behaviours.explained import Explained
-from skills.api import Cause, Failed
+from skills.api import Cause, Failed, Thing
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
 
@@ -183,3 +183,27 @@ def test_holding_nothing_at_the_start_is_a_precondition(context, robot):
     failure = condition.violated(context)
     assert failure is not None
     assert failure.cause is Cause.PRECONDITION
+
+
+@pytest.mark.parametrize(("until_put_down", "status"), [(False, F), (True, S)])
+def test_a_guard_contradicts_a_success_when_the_gripper_is_empty_then(context, clock, robot, until_put_down, status):
+    robot.holding = True
+    child = Queue(R, S)
+    root = Guard(path_id="a/g", name="g", child=child, condition=Holds("coke", "home", until_put_down), context=context)
+    assert ticked(root, clock, 1) == [R]
+    child.update = lambda: (setattr(robot, "holding", False), S)[1]  # it falls in the tick in which the drive ends
+    assert ticked(root, clock, 1) == [status]
+    assert root.cause is (None if until_put_down else Cause.EXECUTION)
+
+
+def test_a_guard_takes_another_object_in_the_gripper_for_what_it_is(context, clock, robot):
+    robot.holding, context.payload.thing = True, Thing("hammer")
+    root = Guard(
+        path_id="a/g",
+        name="g",
+        child=Queue(S),
+        condition=Holds("beer", "to Robin", known_as=("beer",)),
+        context=context,
+    )
+    assert ticked(root, clock, 1) == [F]
+    assert (root.cause, root.message) == (Cause.PRECONDITION, "the gripper holds the hammer, not the beer")

@@ -8,7 +8,7 @@ from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.composites import MemorySelector, MemorySequence
 from executive.tree.behaviours.explained import Explained
 from executive.tree.behaviours.recovery import Afterwards, OnlyIfHolding, OnlyIfKnown, Recover, Recovery, Trigger
-from skills.api import Cause
+from skills.api import Cause, Thing
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
 PLANNING, EXECUTION, POST = Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION
@@ -42,8 +42,8 @@ def recover(attempt, *recoveries, attempts=5, forgets=(), board=None):
     )  # fmt: skip
 
 
-def recovery(leaf, *causes, node=None, own=False, uses=1, given=None, final=False):
-    return leaf, Recovery((Trigger(frozenset(causes), node, own),), uses, given, final)
+def recovery(leaf, *causes, node=None, own=False, uses=1, given=None, final=False, completes=False):
+    return leaf, Recovery((Trigger(frozenset(causes), node, own),), uses, given, final, completes)
 
 
 def table(root, ticks):
@@ -226,10 +226,40 @@ def test_a_selector_of_which_nothing_applies_fails():
     assert (root.cause, root.message) == (Cause.PRECONDITION, "nothing of it applies")
 
 
+def test_a_recovery_that_completes_ends_it_without_another_attempt():
+    attempt, use_it = Leaf("grasp", EXECUTION), Leaf("use it", S)
+    root = recover(attempt, recovery(use_it, EXECUTION, completes=True), attempts=1)
+    assert table(root, 2)[-1] == (S, F, S)
+    assert (attempt.begun, root.message) == (1, "use it 1")
+
+
+@pytest.mark.parametrize(
+    ("taken_for", "asked", "status"),
+    [
+        (Thing("coke"), ("coke", "beer"), S),
+        (Thing("hammer"), ("coke", "beer"), F),
+        (Thing("hammer"), ("thing",), S),  # any object will do
+        (None, ("coke",), F),  # nobody knows what it is
+    ],
+)
+def test_a_way_may_apply_only_while_a_certain_object_is_held(context, robot, taken_for, asked, status):
+    robot.holding, context.payload.thing = True, taken_for
+    held = OnlyIfHolding(path_id="alice/h", name="h", children=[Leaf("stow", S)], context=context, known_as=asked)
+    root = MemorySelector(path_id="alice/f", name="f", children=[held, Leaf("search", PLANNING)])
+    root.tick_once()
+    assert root.status == status
+
+
+def test_a_recovery_for_what_is_held_is_passed_over_while_nothing_is(context, robot):
+    held = OnlyIfHolding(path_id="alice/h", name="h", children=[Leaf("stow", S)], context=context)
+    root = recover(Leaf("grasp", EXECUTION), recovery(held, EXECUTION, completes=True))
+    assert table(root, 1) == [(F, F, N)]
+
+
 @pytest.mark.parametrize(("holding", "status"), [(True, S), (False, F)])
-def test_a_way_may_apply_only_while_something_is_held(robot, holding, status):
+def test_a_way_may_apply_only_while_something_is_held(context, robot, holding, status):
     robot.holding = holding
-    anyway = OnlyIfHolding(path_id="alice/h", name="h", children=[Leaf("stow", S)], robot=robot)
+    anyway = OnlyIfHolding(path_id="alice/h", name="h", children=[Leaf("stow", S)], context=context)
     root = MemorySelector(path_id="alice/f", name="f", children=[Leaf("grasp", PLANNING), anyway])
     root.tick_once()
     assert (root.status, root.cause) == (status, None if holding else PLANNING)

@@ -225,7 +225,7 @@ def test_a_round_may_begin_with_what_the_one_before_has_taken(compiled_steps, ti
     tree = compiled_steps(block(Repeat((go(TAKE),), times=times, until=None if times else HOLDING)))
     (part,) = tree.parts
     assert (part.held is not None and not part.held.sure) is unsure
-    assert any(node.kind == "only if holding" and "coke" in node.name for node in tree.root.walk()) is unsure
+    assert any(node.name == "the coke is in the gripper" for node in tree.root.walk()) is unsure
 
 
 def test_what_is_taken_before_a_block_is_held_in_its_branches(compiled_steps):

@@ -35,6 +35,8 @@ def test_the_leaves_of_a_fetch_have_these_path_ids(compiled, make):
         f"{base}/{rest}"
         for rest in (
             "remember-start",
+            "1-kitchen/have/stow",
+            "1-kitchen/have/carry-as-it-is/settle",
             "1-kitchen/find/again/detect",
             *looked("1-kitchen/find/counter-1"),
             *looked("1-kitchen/find/counter-2"),
@@ -68,7 +70,8 @@ def gone(place):
 
 def taken(step):
     last = ("stow", "carry-as-it-is/settle")
-    recoveries = ("look-again", "plan-again", "around/clear-costmap", "around/back-off", "tidy/stow")
+    in_hand = ("in-hand/stow", "in-hand/carry-as-it-is/settle")
+    recoveries = (*in_hand, "look-again", "plan-again", "around/clear-costmap", "around/back-off", "tidy/stow")
     return tuple(f"{step}/{rest}" for rest in ("approach", "grasp", *last, *recoveries))
 
 

@@ -34,7 +34,7 @@ class Wired(Skill[Inputs]):
 
 def plan(inputs: dict[str, Any], outputs: dict[str, str] | None = None, path_id: str = "a/wired") -> NodeSpec:
     bound = {k: v if isinstance(v, FromBoard) else Constant(v) for k, v in inputs.items()}
-    return skill_spec(Wired, "wired", path_id, None, bound, outputs or {})
+    return skill_spec({"wired": Wired}, "wired", path_id, None, bound, outputs or {})
 
 
 def check(*nodes: NodeSpec) -> None:

@@ -24,7 +24,7 @@ from skills.robot import ArmCapabilities, FloatArray, Image
 LOOKS = 3
 SETTLES_WITHIN_S = 8.0
 """What still moves so long after it was let go of does not come to rest."""
-_MOVES_ABOUT_M, _BACK_OFF_M = 0.25, 0.3
+_MOVES_ABOUT_M, _BACK_OFF_M, _FLOOR_AHEAD_M = 0.25, 0.3, 1.2
 _BORNE_M, _DEEP_M, _OVER_M = 0.42, 0.12, 0.005
 """How far hands or a tray that bear what was let go of may reach: wide, below its lowest point and over that (m)."""
 _FLOOR_FROM_M, _FLOOR_M = 0.07, (1.2, 2.4, 0.1)
@@ -63,8 +63,8 @@ class HandOverVerification(ArmSkill[InputsT]):
 
     def _watched(self, thing: str, release: Release, message: str) -> Routine[Seen]:
         """What is seen of the object: the first look that shows it counts, and it is watched until it is at rest."""
-        for level_m, viewpoints_B in self._looks(release):
-            yield from self._turn_to(release, level_m, viewpoints_B, thing, message)
+        for p_WT, viewpoints_B in self._looks(release):
+            yield from self._turn_to(p_WT, viewpoints_B, thing, message)
             end_s, seen = self.context.clock.now() + SETTLES_WITHIN_S, Seen.MOVES
             while seen is Seen.MOVES and self.context.clock.now() < end_s:
                 seen = yield from self._seen(thing, release, message)
@@ -84,16 +84,22 @@ class HandOverVerification(ArmSkill[InputsT]):
             raise _unseen(thing, failure) from failure
         return Seen.GIVEN if at_rest else Seen.MOVES
 
-    def _looks(self, release: Release) -> Sequence[tuple[float, Sequence[FloatArray]]]:
-        """At which height over the floor (m) to look, and from where: where it was let go of, then at the floor."""
+    def _looks(self, release: Release) -> Sequence[tuple[FloatArray, Sequence[FloatArray]]]:
+        """Which point of the world to look at, and from where (B): where it was let go of, then the floor.
+
+        A hand camera does not look as steeply down as to the floor right before the body.
+        """
+        p_WT, p_WF = (np.array([release.x_m, release.y_m, level_m]) for level_m in (release.low_m, 0.0))
         if not self.object_camera.on_hand:
-            return [*[(release.low_m, ())] * LOOKS, (0.0, ())]
-        p_BT, p_BF = self._p_BT(release, release.low_m), self._p_BT(release, 0.0)
+            return [*[(p_WT, ())] * LOOKS, (p_WF, ())]
+        p_BT, p_BF = (self.X_WB().inverse() @ each for each in (p_WT, p_WF))
+        ahead_B = -towards_shoulder(self.model.p_BS, p_BF)
+        p_BF = p_BF + max(0.0, _FLOOR_AHEAD_M - float(np.linalg.norm((p_BF - self.model.p_BS)[:2]))) * ahead_B
         highest_m = _HIGHEST_CAMERA_M - self._height_m()
         near = [self._viewpoints(p_BT, aside_rad, highest_m) for aside_rad in _ASIDE_RAD]
         first = [*near[0], *near[1], *near[2]]
         second = [*near[1], *near[2], *near[0]]
-        return [(release.low_m, first), (release.low_m, second), (0.0, overview_viewpoints(self.model, p_BF))]
+        return [(p_WT, first), (p_WT, second), (self.X_WB() @ p_BF, overview_viewpoints(self.model, p_BF))]
 
     def _viewpoints(self, p_BT: FloatArray, aside_rad: float, highest_m: float) -> list[FloatArray]:
         """Camera places (B) on the shoulder's side of a point, looking down at it; none above a height in B (m)."""
@@ -106,12 +112,10 @@ class HandOverVerification(ArmSkill[InputsT]):
         )
         return [place for place in places if place[2] < highest_m]
 
-    def _turn_to(
-        self, release: Release, level_m: float, viewpoints_B: Sequence[FloatArray], thing: str, message: str
-    ) -> Routine[None]:
-        """Point the camera at where the object was let go of; a hand that finds no way there looks from where it is."""
+    def _turn_to(self, p_WT: FloatArray, viewpoints_B: Sequence[FloatArray], thing: str, message: str) -> Routine[None]:
+        """Point the camera at a point of the world; a hand that finds no way there looks from where it is."""
         try:
-            yield from self.look_at(self._p_BT(release, level_m), viewpoints_B, message)
+            yield from self.look_at(self.X_WB().inverse() @ p_WT, viewpoints_B, message)
         except SkillFailure as failure:
             if not self.object_camera.on_hand or failure.cause is not Cause.PLANNING:
                 raise _unseen(thing, failure) from failure
@@ -161,10 +165,6 @@ class HandOverVerification(ArmSkill[InputsT]):
         front_m = max(x for x, _ in self.context.robot.capabilities().footprint_m) + _FLOOR_FROM_M
         X_BG = RigidTransform([front_m + 0.5 * _FLOOR_M[0], 0.0, -self._height_m() - 0.5 * _FLOOR_M[2]])
         return [*boxes, Box(X_BG, _FLOOR_M)]
-
-    def _p_BT(self, release: Release, level_m: float) -> FloatArray:
-        """The point (B) at a height over the floor (m) where the object was let go of."""
-        return np.asarray(self.X_WB().inverse() @ np.array([release.x_m, release.y_m, level_m]))
 
     def _height_m(self) -> float:
         return float(self.context.robot.odometry().X_OB.translation()[2])

@@ -28,6 +28,7 @@ __all__ = [
     "bounds",
     "clock_text",
     "in_range",
+    "likely",
     "number_in",
     "number_of",
     "quantity_of",
@@ -193,7 +194,7 @@ def number_of(value: Any, hint: Any) -> float:
     if isinstance(value, int) and abs(value) > LARGEST:
         raise QuantityError("should be a smaller number", f"it reads {shown(value)} now")
     if not in_range(value, hint):
-        raise QuantityError(f"should be {range_text(hint)}", f"it reads {shown(value)} now{_likely(value, hint)}")
+        raise QuantityError(f"should be {range_text(hint)}", f"it reads {shown(value)} now{_then(likely(value, hint))}")
     if whole and isinstance(value, float):
         hint_at = f"write {int(value)}" if value.is_integer() else f"it reads {shown(value)} now"
         raise QuantityError(wanted, hint_at)
@@ -271,17 +272,21 @@ def _text_hint(text: str, hint: Any) -> str:
     return f"it reads {shown(text)} now"
 
 
-def _likely(value: float, hint: Any) -> str:
+def likely(value: float, hint: Any) -> str:
     """The number in the quantity's own unit where another unit would bring it into the range; else nothing."""
     quantity = quantity_of(hint)
     if quantity is not None and quantity.mistake:
-        return f"; {quantity.mistake}"
+        return quantity.mistake
     if abs(value) > 1e15:
         return ""
     sizes = _OTHERS.get(_unit(hint), {}) if without_range(hint) is float else {}
     meant = {unit: value * size for unit, size in sizes.items() if in_range(value * size, hint)}
     told = [f"{number:.3g} for {value:g} {unit}" for unit, number in meant.items()]
-    return f"; write {' or '.join(told)}" if told else ""
+    return f"write {' or '.join(told)}" if told else ""
+
+
+def _then(words: str) -> str:
+    return f"; {words}" if words else ""
 
 
 def quantity_of(hint: Any) -> Quantity | None:

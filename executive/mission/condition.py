@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import Annotated, Any, Final
 
 from executive.mission.command import Command
 from executive.mission.expression import Expression, Kind
+from skills.quantities import Quantity, Share
 
 __all__ = [
+    "RANGES",
     "READINGS",
     "AllOf",
     "AnyOf",
@@ -33,6 +35,10 @@ READINGS: Final[Mapping[str, Kind]] = MappingProxyType(
     }
 )
 """The names that an expression may read besides a mission's own values."""
+RANGES: Final[Mapping[str, Any]] = MappingProxyType(
+    {"battery": Share, "elapsed": Annotated[float, Quantity(ge=0.0, le=604_800.0, unit="s")]}
+)
+"""The quantities of readings that are numbers."""
 
 
 @dataclass(frozen=True)

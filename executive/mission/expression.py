@@ -17,7 +17,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
+from skills.durations import seconds_in
 from skills.files.errors import suggestion
+from skills.quantities import QuantityError, clock_text
 
 __all__ = ["FUNCTIONS", "Expression", "ExpressionError", "Kind", "Template", "Value", "kind_of", "literal"]
 
@@ -89,6 +91,11 @@ class Expression:
 
     def __str__(self) -> str:
         return self.text
+
+    @property
+    def tree(self) -> ast.expr:
+        """Its syntax."""
+        return _parsed(self.text).body
 
     @property
     def names(self) -> frozenset[str]:
@@ -167,9 +174,37 @@ def _parsed(text: str) -> ast.Expression:
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ExpressionError(f"'{text[:60]}' is no expression", _HINT) from None
-    _refuse_others(tree.body, 0)
+        raise ExpressionError(f"'{text[:60]}' is no expression", slip_hint(text) or _HINT) from None
+    try:
+        _refuse_others(tree.body, 0)
+    except ExpressionError as error:
+        raise ExpressionError(error.message, slip_hint(text) or error.hint) from None
     return tree
+
+
+def slip_hint(text: str) -> str:
+    """What to write for a number that an expression does not take as it stands; empty where there is none."""
+    for pattern, meant in _SLIPS:
+        match = re.search(pattern, text)
+        if match is not None and (hint := meant(match)):
+            return hint
+    return ""
+
+
+def _span_hint(match: re.Match[str]) -> str:
+    seconds = seconds_in(match[0])
+    return "" if seconds is None else f"write {seconds:g}, in seconds, for {match[0].strip()}"
+
+
+_SLIPS: Final[tuple[tuple[str, Callable[[re.Match[str]], str]], ...]] = (
+    (r"(?<![\w.\"'])(\d{1,2}:\d\d)(?![\w.\"'])", lambda match: f'put it in quotes: "{match[1]}"'),
+    (r"(?<![\w.])(\d+),(\d+)(?![\w.])", lambda match: f"write {match[1]}.{match[2]}, with a point"),
+    (r"(?<![\w.])(\d+(?:\.\d+)?) ?%(?! ?\w)", lambda match: f"write {float(match[1]) / 100.0:g} for {match[0]}"),
+    (r"(?<![\w.])(?:\d+(?:\.\d+)? ?(?:ms|s|sec|seconds?|min|minutes?|h|hours?)\b ?)+", _span_hint),
+    (r"(?<![\w.])0+(\d+)(?![\w.])", lambda match: f"write {match[1]}, without the zero before it"),
+    (r"(?<![=<>!])=(?!=)", lambda match: "write == to compare"),
+)
+"""Numbers as people write them elsewhere, and what is said of them."""
 
 
 def _refuse_others(node: ast.expr, depth: int) -> None:
@@ -256,14 +291,36 @@ def _want(found: set[Kind], wanted: Kind, node: ast.expr) -> None:
 def _comparison(node: ast.Compare, kinds: list[Kind], ops: list[ast.cmpop]) -> None:
     for first, op, second in zip(kinds, ops, kinds[1:], strict=False):
         if first is not second:
-            raise ExpressionError(f"'{_told(node, 60)}' compares {first} with {second}", "compare one type")
+            hint = _text_hint(node) or "compare one type"
+            raise ExpressionError(f"'{_told(node, 60)}' compares {first} with {second}", hint)
         if first is Kind.TRUTH and not isinstance(op, ast.Eq | ast.NotEq):
             raise ExpressionError(f"'{_told(node, 60)}' orders true and false", "use == or !=")
     sides = (node.left, *node.comparators)
     if any(isinstance(each, ast.Name) and each.id == CLOCK for each in sides):
         for each in sides:
             if isinstance(each, ast.Constant) and not TIME_OF_DAY.fullmatch(f"{each.value!s}"):
-                raise ExpressionError(f"{each.value!r} is no time of day", 'write it as "08:30"')
+                hint = f'it is from 00:00 to 23:59; write it as "{_nearest_clock(each.value)}"'
+                raise ExpressionError(f"{each.value!r} is no time of day", hint)
+
+
+def _nearest_clock(value: object) -> str:
+    try:
+        return clock_text(value)
+    except QuantityError:
+        return "08:30"
+
+
+def _text_hint(node: ast.Compare) -> str:
+    """What to write where a number is compared with a text that means one, or a time of day with a number."""
+    sides = (node.left, *node.comparators)
+    if any(isinstance(each, ast.Name) and each.id == CLOCK for each in sides):
+        return 'a time of day is written as "08:30"'
+    texts = [each.value for each in sides if isinstance(each, ast.Constant) and isinstance(each.value, str)]
+    return next((hint for text in texts if (hint := slip_hint(text) or _quoted_hint(text))), "")
+
+
+def _quoted_hint(text: str) -> str:
+    return f"write {text}, without quotes" if re.fullmatch(r"-?\d+(?:\.\d+)?", text) else ""
 
 
 def _call(node: ast.expr, function: _Function, kinds: list[Kind]) -> Kind:

@@ -8,8 +8,9 @@ from types import MappingProxyType
 from typing import Final, Protocol
 
 from executive.language import Understanding
+from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
 from executive.mission.command import Command, Task
-from executive.mission.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
+from executive.mission.condition import RANGES, AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
 from executive.mission.expression import Expression, ExpressionError, Template, Value, literal
 from executive.mission.file.blocks import (
     Ask,
@@ -71,7 +72,20 @@ def read_block(reader: Reader, scope: Scope, step: StepFile, path: KeyPath) -> B
 
 
 def condition_of(reader: Reader, scope: Scope, condition: ConditionFile, path: KeyPath) -> Condition:
-    """The condition that stands at `path`. Raises InputError: an unknown name, or no question."""
+    """The condition that stands at `path`.
+
+    Raises:
+        InputError: an unknown name, no question, or a condition that cannot hold or cannot fail.
+    """
+    condition_at = _condition_of(reader, scope, condition, path)
+    try:
+        refuse_certain(condition_at, RANGES)
+    except ExpressionError as error:
+        raise scope.error(path, error.message, error.hint) from error
+    return condition_at
+
+
+def _condition_of(reader: Reader, scope: Scope, condition: ConditionFile, path: KeyPath) -> Condition:
     if condition.expression is not None:
         return ValueIs(_expression(scope, condition.expression, path))
     if condition.all is not None:
@@ -168,9 +182,11 @@ def _person(scope: Scope, name: str, path: KeyPath, knowledge: Knowledge) -> str
 
 def _expression(scope: Scope, text: str, path: KeyPath) -> Expression:
     try:
-        return Expression(text)
+        expression = Expression(text)
+        refuse_certain_comparisons(expression, RANGES)
     except ExpressionError as error:
         raise scope.error(path, error.message, error.hint) from error
+    return expression
 
 
 def plain_value(scope: Scope, value: Value, path: KeyPath) -> Expression:

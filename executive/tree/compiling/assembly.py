@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 from executive.mission.command import START, Command, Task
 from executive.mission.expression import kind_of, literal
@@ -44,12 +44,15 @@ from executive.tree.compiling.trips import are_trips, refuse_several, trips_plan
 from executive.tree.node import NodeSpec
 from skills.api import Skill, Surface
 from skills.files.errors import InputError, Problems, SourceLine, listing
+from skills.quantities import Quantity
 from skills.robot import Pose2D
 
 __all__ = ["Assembled", "StepPart", "assemble", "step_name"]
 
 NO_POLICY: Final = StepPolicy()
 _SKIPPING: Final = frozenset({"skip", "ask"})
+COUNTED: Final = Annotated[float, Quantity(ge=0.0, le=1_000.0)]
+"""How many objects a look counts."""
 _ANSWERS: Final[Mapping[str, tuple[str, type]]] = {"answer": ("key", bool), "count": ("count_key", float)}
 """What a status check can give: the option of its answer node that names the key, and the type."""
 
@@ -253,7 +256,8 @@ class _Assembler:
                 hint = "write {answer: NAME} beside a question, or {count: NAME} beside one that counts"
                 raise InputError.at(step.source, f"this step gives {said}, not '{port}'", hint=hint)
             option, kind = _ANSWERS[port]
-            keys[option] = give(self, name, builder.key(port), kind, builder)
+            counted = COUNTED if port == "count" else None
+            keys[option] = give(self, name, builder.key(port), kind, builder, counted)
         return answering(node, keys) if keys else node
 
     def _declare(self, mission: Mission, builder: PlanBuilder) -> NodeSpec:

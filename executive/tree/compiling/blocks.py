@@ -494,7 +494,7 @@ def _give_key(assembler: Assembler, name: str | None, key: str, kind: type, buil
     return give(assembler, name, key or f"{assembler.values_base}/{name}", kind, builder)
 
 
-def give(assembler: Assembler, name: str, key: str, kind: type, builder: PlanBuilder) -> str:
+def give(assembler: Assembler, name: str, key: str, kind: type, builder: PlanBuilder, quantity: Any = None) -> str:
     """Let later steps read a value under `name`; the key that it goes to, that of a declared one where it is declared.
 
     Raises InputError: the name is no word, is that of a reading, or has another type elsewhere: steps may be repeated.
@@ -508,7 +508,7 @@ def give(assembler: Assembler, name: str, key: str, kind: type, builder: PlanBui
         told = "is declared as" if name in flow.declared else "is elsewhere"
         what = f"'{name}' {told} {flow.kinds[key]}, and gets {kind_of(kind)}"
         raise InputError.at(builder.source, what, hint="use another name")
-    flow.names[name] = Named(key, kind)
+    flow.names[name] = Named(key, kind, None if name in flow.declared else quantity)
     return key
 
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
+from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
 from executive.mission.condition import (
+    RANGES,
     READINGS,
     AllOf,
     AnyOf,
@@ -39,10 +42,11 @@ __all__ = ["Decided", "Named", "decide_plan", "decision_of", "instant_decision",
 
 @dataclass(frozen=True)
 class Named:
-    """A value that steps may read: its blackboard key, and its type."""
+    """A value that steps may read: its blackboard key, its type, and its quantity where it has one."""
 
     key: str
     type: type
+    quantity: Any = None
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,12 @@ def decision_of(condition: Condition, builder: PlanBuilder, names: Mapping[str, 
             case Not(inner):
                 return DoesNotHold(made(inner))
 
-    return Decided(made(condition), tuple(looks), tuple(checks))
+    decided = Decided(made(condition), tuple(looks), tuple(checks))
+    try:
+        refuse_certain(condition, _ranges(names))
+    except ExpressionError as error:
+        raise InputError.at(builder.source, error.message, hint=error.hint) from error
+    return decided
 
 
 def instant_decision(condition: Condition, builder: PlanBuilder, names: Mapping[str, Named]) -> Decision:
@@ -123,6 +132,16 @@ def keys_of(each: Expression | Template, names: Mapping[str, Named]) -> Mapping[
 def kind_in(expression: Expression, builder: PlanBuilder, names: Mapping[str, Named]) -> Kind:
     """The type of an expression where these names are known. Raises InputError: they do not fit it."""
     try:
-        return expression.kind({**READINGS, **{name: kind_of(named.type) for name, named in names.items()}})
+        kind = expression.kind({**READINGS, **{name: kind_of(named.type) for name, named in names.items()}})
     except ExpressionError as error:
         raise InputError.at(builder.source, f"'{expression}': {error.message}", hint=error.hint) from error
+    try:
+        refuse_certain_comparisons(expression, _ranges(names))
+    except ExpressionError as error:
+        raise InputError.at(builder.source, error.message, hint=error.hint) from error
+    return kind
+
+
+def _ranges(names: Mapping[str, Named]) -> Mapping[str, Any]:
+    """The quantities of all names that have one."""
+    return {**RANGES, **{name: named.quantity for name, named in names.items() if named.quantity is not None}}

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from datetime import UTC, date, datetime, time, timedelta, tzinfo
 from typing import Final
 
+from skills.durations import seconds_in
 from skills.files.errors import InputError, listing, suggestion
 
 __all__ = [
@@ -131,12 +132,11 @@ class Every:
 
     @staticmethod
     def of(text: str) -> Every:
-        """The period in "30m", "2 h", "90 seconds" or "1 day". Raises InputError."""
-        found = _PERIOD.fullmatch(text.strip().lower())
-        seconds = int(found["count"]) * dict(_UNITS)[found["unit"]] if found else 0
-        if not 0 < seconds <= LONGEST.total_seconds():
-            hint = "give a whole number of s, m, h or d, at least 1 s and at most 366 d, as in 30m"
-            raise InputError(f"'{text}' is no period", hint=hint)
+        """The period in "30m", "1 h 30 min", "PT5M" or "1 day". Raises InputError."""
+        seconds = seconds_in(text) or 0.0
+        if not (1.0 <= seconds <= LONGEST.total_seconds() and seconds.is_integer()):
+            hint = "give whole seconds, from 1 s to 366 days, as in '30 min' or '1 h 30 min'"
+            raise InputError(f"'{text[:60]}' is no period", hint=hint)
         return Every(timedelta(seconds=seconds))
 
     def after(self, moment: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
@@ -190,9 +190,6 @@ Timed = Schedule | Once | Every
 Trigger = Timed | OnBatteryFull | OnCall | OnTopic
 
 _UNITS: Final = (("d", 86400), ("h", 3600), ("m", 60), ("s", 1))
-_PERIOD: Final = re.compile(
-    r"(?P<count>\d{1,9}) ?(?P<unit>[smhd])(?:(?<=s)ec(?:ond)?s?|(?<=m)in(?:ute)?s?|(?<=h)ours?|(?<=d)ays?)?"
-)
 _CLOCK: Final = re.compile(r"([01]?\d|2[0-3]):([0-5]\d)")
 _ONCE: Final = re.compile(r"(2\d{3})-(\d\d)-(\d\d)[ t](?P<time>\S+)")
 _BATTERY: Final = re.compile(r"battery (?:full|(?P<percent>\d{1,3}(?:\.\d+)?) ?%)")
@@ -203,7 +200,7 @@ _TOPIC: Final = re.compile(r"topic (?P<kind>[A-Za-z0-9_-]{1,64}):(?P<topic>\S(?:
 def trigger_of(text: str) -> Trigger:
     """The trigger that `str` wrote. Raises InputError."""
     first, _, rest = text.partition(" ")
-    if first == "every" and rest[:1].isdigit():
+    if first == "every" and (rest[:1].isdigit() or rest[:2].upper() in ("PT", "P1")):
         return Every.of(rest)
     return schedule_of(text) if first == "every" or first[:1].isdigit() else event_of(text)
 

@@ -22,10 +22,12 @@ from skills.faults.kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.words import parse_fault
 from skills.files.errors import InputError
 from skills.files.yaml_source import YamlSource, read_yaml, validate
+from skills.quantities import Angle, Coordinate, Delay, Duration, Height, Length, Quantity, Share, Turn
 
 SUFFIX = ".skilltest.yaml"
-_Positive = Annotated[float, Field(gt=0.0)]
-_Triple = tuple[float, float, float]
+_Place = tuple[Coordinate, Coordinate, Height]
+_Size = tuple[Length, Length, Length]
+_Shade = Annotated[int, Quantity(ge=0, le=255)]
 
 
 class _Strict(BaseModel):
@@ -35,9 +37,9 @@ class _Strict(BaseModel):
 class PoseSetup(_Strict):
     """A planar pose in the world frame."""
 
-    x: float = Field(default=0.0, description="metres")
-    y: float = Field(default=0.0, description="metres")
-    yaw: float = Field(default=0.0, description="radians, counter-clockwise from x")
+    x: Coordinate = Field(default=0.0, description="metres")
+    y: Coordinate = Field(default=0.0, description="metres")
+    yaw: Angle = Field(default=0.0, description="radians, counter-clockwise from x")
 
 
 class RobotSetup(_Strict):
@@ -48,27 +50,27 @@ class RobotSetup(_Strict):
         description="scripted: exact and fast; plant: the simulated Spot in the small room, with physics",
     )
     pose: PoseSetup = Field(default=PoseSetup(), description="where it stands (scripted only)")
-    arm: tuple[float, ...] | None = Field(
+    arm: tuple[Angle, ...] | None = Field(
         default=None, description="arm angles, rad; stowed unless said (scripted only)"
     )
     holding: bool = Field(default=False, description="it begins with a can in its gripper (scripted only)")
-    in_gripper: float | None = Field(
+    in_gripper: Turn | None = Field(
         default=None, description="opening (rad) at which a closing gripper holds something (scripted only)"
     )
-    pulled_at_s: float | None = Field(
-        default=None, ge=0.0, description="from then on somebody pulls at what it holds (scripted only)"
+    pulled_at_s: Delay | None = Field(
+        default=None, description="from then on somebody pulls at what it holds (scripted only)"
     )
     docked: bool = Field(default=False, description="it stands on a dock and charges (scripted only)")
-    charge: float = Field(default=0.9, ge=0.0, le=1.0, description="battery, 0 to 1 (scripted only)")
+    charge: Share = Field(default=0.9, description="battery, 0 to 1 (scripted only)")
     lost: bool = Field(default=False, description="it does not know where it is (scripted only)")
 
 
 class BlockSetup(_Strict):
     """An upright block in the scripted robot's world."""
 
-    at: _Triple = Field(description="middle of its base: x, y, z in metres")
-    size: _Triple = Field(description="extent along x, y and z in metres, each above 0")
-    colour: tuple[int, int, int] = Field(default=(200, 195, 185), description="red, green, blue from 0 to 255")
+    at: _Place = Field(description="middle of its base: x, y, z in metres")
+    size: _Size = Field(description="extent along x, y and z in metres, each above 0")
+    colour: tuple[_Shade, _Shade, _Shade] = Field(default=(200, 195, 185), description="red, green, blue from 0 to 255")
     loose: bool = Field(default=False, description="it can be taken")
 
 
@@ -86,7 +88,7 @@ class Expectation(_Strict):
     outcome: Literal["success", "failure", "cancelled"] = Field(description="the end")
     cause: Cause | None = Field(default=None, description="the cause of a failure")
     message: str | None = Field(default=None, description="a regular expression that is found in the last message")
-    within_s: _Positive | None = Field(default=None, description="seconds on the robot's clock at most")
+    within_s: Duration | None = Field(default=None, description="seconds on the robot's clock at most")
 
     @field_validator("message")
     @classmethod
@@ -114,7 +116,7 @@ class SkillTest(_Strict):
     robot: RobotSetup | None = Field(default=None, description="instead of the file's")
     world: WorldSetup | None = Field(default=None, description="instead of the file's")
     faults: tuple[str, ...] = Field(default=(), description='what goes wrong, as in "camera freezes at 3 s"')
-    cancel_at_s: Annotated[float, Field(ge=0.0)] | None = Field(default=None, description="cancel it at this time (s)")
+    cancel_at_s: Delay | None = Field(default=None, description="cancel it at this time (s)")
     expect: Expectation = Field(description="how it must end")
 
 

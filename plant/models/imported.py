@@ -11,11 +11,13 @@ from pydantic import BaseModel, ConfigDict, Field
 from plant.models.catalogue import ModelForm
 from skills.files.errors import InputError
 from skills.files.yaml_source import read_yaml, validate
+from skills.robot import quantities
 
 FACTS_FILE: Final = "object.yaml"
 _AGAIN: Final = "make it by `errand object import`"
 NAME: Final = r"^[A-Za-z][A-Za-z0-9_]{0,39}$"
-Size = Annotated[float, Field(gt=0.0, le=100.0, allow_inf_nan=False)]
+Inertia = Annotated[float, quantities.Quantity(ge=-1e6, le=1e6)]
+Parts = Annotated[int, quantities.Quantity(ge=1, le=10_000_000)]
 
 
 class ImportedObject(BaseModel):
@@ -29,12 +31,12 @@ class ImportedObject(BaseModel):
 
     name: Annotated[str, Field(pattern=NAME)]
     class_name: Annotated[str, Field(alias="class", pattern=NAME)]
-    mass_kg: Annotated[float, Field(gt=0.0)]
-    size_m: tuple[Size, Size, Size]
-    com_m: tuple[float, float, float]
-    inertia_kg_m2: tuple[float, float, float, float, float, float]
-    collision_parts: Annotated[int, Field(ge=1)]
-    triangles: Annotated[int, Field(ge=1)]
+    mass_kg: quantities.Mass
+    size_m: tuple[quantities.Length, quantities.Length, quantities.Length]
+    com_m: tuple[quantities.Coordinate, quantities.Coordinate, quantities.Coordinate]
+    inertia_kg_m2: tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia]
+    collision_parts: Parts
+    triangles: Parts
     round: bool = False
 
     def form(self, folder: Path) -> ModelForm:

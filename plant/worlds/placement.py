@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.models.catalogue import ModelClass, ModelForm, load_catalogue
 from plant.worlds.route import Route, route_of
-from plant.worlds.world import ObjectRule, PersonRule, Point, Polygon, Span, SurfaceTop, World, WorldError
+from plant.worlds.world import Lengths, ObjectRule, PersonRule, Point, Polygon, SurfaceTop, World, WorldError
 from skills.robot import FloatArray
 
 ATTEMPTS = 500
@@ -145,7 +145,7 @@ def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, in
 
 
 def _before_start(
-    world: World, ranges: tuple[Span, Span, Span], rng: np.random.Generator
+    world: World, ranges: tuple[Lengths, Lengths, Lengths], rng: np.random.Generator
 ) -> tuple[float, float, float]:
     """x, y and yaw of somebody at a random distance, bearing and turn before the start pose."""
     distance_m, bearing_rad, turned_rad = ranges

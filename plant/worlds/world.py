@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -20,7 +20,7 @@ from plant.models.imported import ImportedObject, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
 from skills.files.errors import InputError
 from skills.files.yaml_source import KeyPath, YamlSource, read_yaml, validate
-from skills.robot import Pose2D
+from skills.robot import Pose2D, quantities
 
 if TYPE_CHECKING:
     from pydrake.multibody.parsing import PackageMap
@@ -33,9 +33,12 @@ ROBOTS: Final = "map"
 TRUTH: Final = "truth"
 """The folder of a world's surveyed grids, where the robot has made its own map."""
 
-Point = tuple[float, float]
+Point = tuple[quantities.Coordinate, quantities.Coordinate]
 Polygon = tuple[Point, ...]
-Span = tuple[float, float]
+Pull = Annotated[float, quantities.Quantity(gt=0.0, le=100.0, unit="N")]
+Reaction = Annotated[float, quantities.Quantity(ge=0.0, le=60.0, unit="s")]
+Lengths = tuple[quantities.Margin, quantities.Margin]
+Angles = tuple[quantities.Angle, quantities.Angle]
 
 
 class WorldError(InputError):
@@ -53,10 +56,10 @@ class _Strict(BaseModel):
 class Rules(_Strict):
     """How objects lie on surfaces, in metres; see `objects.yaml`."""
 
-    from_edge_m: Span = Field(description="least and greatest distance of an object's centre from the front edge")
-    clear_m: float = Field(description="between objects, and from an object to a keep-clear outline")
-    rim_m: float = Field(description="between an object's outline and the surface's own outline")
-    drop_m: float = Field(description="objects start this high above the surface")
+    from_edge_m: Lengths = Field(description="least and greatest distance of an object's centre from the front edge")
+    clear_m: quantities.Margin = Field(description="between objects, and from an object to a keep-clear outline")
+    rim_m: quantities.Margin = Field(description="between an object's outline and the surface's own outline")
+    drop_m: quantities.Margin = Field(description="objects start this high above the surface")
 
 
 class ObjectRule(_Strict):
@@ -71,7 +74,7 @@ class StopRule(_Strict):
     """A waypoint at which a person stands for a while."""
 
     at: Point | str = Field(description="a point (x, y), or a room or surface of knowledge.yaml")
-    pause: float = Field(default=0.0, ge=0.0, le=86400.0, description="how long the person stands there, s")
+    pause: quantities.Delay = Field(default=0.0, description="how long the person stands there, s")
 
 
 class RouteRule(_Strict):
@@ -80,9 +83,9 @@ class RouteRule(_Strict):
     waypoints: tuple[Point | str | StopRule, ...] = Field(
         min_length=1, description="points (x, y), rooms or surfaces, in order; the person begins at the first"
     )
-    speed: float = Field(default=1.2, gt=0.0, le=3.0, description="how fast the person walks, m/s")
+    speed: quantities.Speed = Field(default=1.2, description="how fast the person walks, m/s")
     loop: bool = Field(default=False, description="whether the first waypoint follows the last; else once")
-    start: float = Field(default=0.0, ge=0.0, le=86400.0, description="when the person sets off, s")
+    start: quantities.Delay = Field(default=0.0, description="when the person sets off, s")
     yields: bool = Field(default=True, description="whether the person stops for a robot that is close ahead")
 
 
@@ -94,13 +97,13 @@ class PersonRule(_Strict):
 
     name: str = Field(description="the person's name in knowledge.yaml")
     model: str = Field(default="person", description="a class of `plant/models/catalogue.yaml`")
-    distance_m: Span | None = Field(default=None, description="least and greatest distance from the start pose")
-    bearing_rad: Span | None = Field(default=None, description="least and greatest bearing, seen from the start pose")
-    turned_rad: Span | None = Field(default=None, description="least and greatest turn away from facing the robot")
+    distance_m: Lengths | None = Field(default=None, description="least and greatest distance from the start pose")
+    bearing_rad: Angles | None = Field(default=None, description="least and greatest bearing, seen from the start pose")
+    turned_rad: Angles | None = Field(default=None, description="least and greatest turn away from facing the robot")
     route: RouteRule | None = Field(default=None, description="where the person walks")
     receives: bool = Field(default=True, description="whether the person takes what is held out to them")
-    pull_n: float = Field(default=15.0, gt=0.0, le=100.0, description="how hard the person pulls at it, N")
-    reaction_s: float = Field(default=1.0, ge=0.0, le=60.0, description="how long it is held out still before, s")
+    pull_n: Pull = Field(default=15.0, description="how hard the person pulls at it, N")
+    reaction_s: Reaction = Field(default=1.0, description="how long it is held out still before, s")
 
     @model_validator(mode="after")
     def _walks_or_stands(self) -> PersonRule:
@@ -109,7 +112,7 @@ class PersonRule(_Strict):
         return self
 
     @property
-    def ranges(self) -> tuple[Span, Span, Span] | None:
+    def ranges(self) -> tuple[Lengths, Angles, Angles] | None:
         """Distance, bearing and turn of one who stands."""
         if self.distance_m is None or self.bearing_rad is None or self.turned_rad is None:
             return None
@@ -124,18 +127,18 @@ class DoorRule(_Strict):
 
     name: str
     at: Point
-    yaw: float = Field(description="direction in which it slides open, along the wall")
-    width: float = Field(gt=0.0, le=10.0)
-    closes: float | None = Field(default=None, ge=0.0)
-    opens: float | None = Field(default=None, ge=0.0)
+    yaw: quantities.Angle = Field(description="direction in which it slides open, along the wall")
+    width: quantities.Opening
+    closes: quantities.Delay | None = None
+    opens: quantities.Delay | None = None
 
 
 class MoveRule(_Strict):
     """An object that somebody puts elsewhere: on a free spot of the surface `to`, or with its base at a point."""
 
     name: str
-    at: float = Field(ge=0.0, description="s")
-    to: str | tuple[float, float, float]
+    at: quantities.Delay = Field(description="s")
+    to: str | tuple[quantities.Coordinate, quantities.Coordinate, quantities.Height]
 
 
 class SeedRules(_Strict):
@@ -160,9 +163,9 @@ NO_SEED_RULES: Final = SeedRules(
 
 
 class _Pose(BaseModel):
-    x: float
-    y: float
-    yaw: float
+    x: quantities.Coordinate
+    y: quantities.Coordinate
+    yaw: quantities.Angle
 
     def pose(self) -> Pose2D:
         return Pose2D(self.x, self.y, self.yaw)
@@ -175,7 +178,7 @@ class _Place(BaseModel):
 
 class _Top(BaseModel):
     place: str
-    height: float
+    height: quantities.TopHeight
     polygon: Polygon
     viewpoints: tuple[_Pose, ...] = ()
 

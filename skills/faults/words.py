@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from skills.durations import seconds_in
 from skills.faults.kinds import STANDARD_FAULTS, Effect, FaultKind
 
 __all__ = ["Fault", "parse_fault", "random_faults"]
@@ -26,6 +27,10 @@ _WHEN: Final = re.compile(
     rf"(?: (?:for )?(?P<lasts>{_NUMBER}) ?s)?"
     rf"(?: (?:(?:at|from) (?P<from>{_NUMBER}) ?s(?: (?:to|until) (?P<to>{_NUMBER}) ?s)?"
     r"|after (?P<calls>\d+) calls?))?"
+)
+_SPAN: Final = re.compile(
+    rf"(?:PT[\dHMS.]+|\b{_NUMBER} ?(?:ms|min|mins|minutes?|h|hours?|days?|sec|secs|seconds?)\b"
+    rf"(?: (?:and )?{_NUMBER} ?(?:min|mins|minutes?|s|sec|secs|seconds?)\b)*)"
 )
 _PREFIX: Final = re.compile(r"(?P<sensor>\w+)(?:\.(?P<source>[\w-]+))?: ?(?P<words>.+)")
 _STREAM: Final = 11
@@ -57,7 +62,7 @@ def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS, *, cam
 
     Raises ValueError: no kind has such words, or they name something that the robot does not have; with the hint.
     """
-    plain = " ".join(words.split())
+    plain = _SPAN.sub(_seconds, " ".join(words.split()))
     prefix = _PREFIX.fullmatch(plain)
     source = None if prefix is None else prefix["source"]
     when = _WHEN.fullmatch(plain if prefix is None else f"{prefix['sensor']} {prefix['words']}")
@@ -74,6 +79,12 @@ def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS, *, cam
     near = difflib.get_close_matches(plain, examples, n=1, cutoff=0.5)
     hint = f"did you mean '{near[0]}'?" if near else f"known are, for instance: {'; '.join(examples)}"
     raise ValueError(f"there is no fault '{words}'; {hint}")
+
+
+def _seconds(match: re.Match[str]) -> str:
+    """A duration with other units in seconds; as it is where it is none."""
+    seconds = seconds_in(match[0])
+    return match[0] if seconds is None else f"{seconds:.12g} s"
 
 
 def _span(words: str, when: re.Match[str]) -> tuple[float, float]:

@@ -8,7 +8,6 @@ within a longer text the parameter's text is put in.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -20,7 +19,9 @@ from executive.mission.expression import Value
 from executive.mission.file.model import KeyPath
 from skills.files.errors import InputError, did_you_mean, listing, suggestion
 from skills.files.texts import json_object, plain_text
+from skills.files.yaml_scalars import scalar_of
 from skills.files.yaml_source import YamlSource
+from skills.quantities import LARGEST, Number, QuantityError, number_of, shown
 
 __all__ = ["Given", "given_values", "part_source", "round_source", "values_in_json", "with_parameters"]
 
@@ -47,11 +48,13 @@ def given_values(settings: Iterable[str]) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for setting in settings:
         name, equals, text = setting.partition("=")
-        plain_text(setting, what="--set")
+        plain_text(setting, what=f"--set {name[:40]}")
         try:
-            value = yaml.safe_load(text)
+            value = scalar_of(text)
         except (yaml.YAMLError, ValueError, RecursionError):
             value = None
+        if isinstance(value, int | float) and not abs(value) <= LARGEST:
+            raise InputError(f"--set {name[:40]}: its number is too large", hint="give a smaller one")
         if not equals or not _can_be_given(name, value):
             hint = "give a name, =, and a text, a number, true or false"
             raise InputError(f"--set {setting[:60]}: it is not NAME=VALUE", hint=hint)
@@ -76,7 +79,7 @@ def _guarded(name: str, value: Any) -> Any:
 
 
 def _can_be_given(name: str, value: Any) -> bool:
-    finite = not isinstance(value, float) or math.isfinite(value)
+    finite = not isinstance(value, int | float) or abs(value) <= LARGEST
     return bool(_NAME.fullmatch(name)) and isinstance(value, _SCALARS) and finite
 
 
@@ -133,11 +136,20 @@ def _fitting(parameter: _Parameter, value: Any, name: str, source: YamlSource, *
     fits = isinstance(value, kind) and (bool in kind or not isinstance(value, bool))
     if not fits:
         what = f"parameter '{name}' is a {parameter.kind}, and {str(value)[:60]!r} is none"
-        raise source.error(here, what, f"give it a {parameter.kind}")
+        raise source.error(here, what, _number_hint(value) if kind == (int, float) else f"give it a {parameter.kind}")
     if parameter.choices and value not in parameter.choices:
         what = f"parameter '{name}' cannot be {str(value)[:60]!r}"
         raise source.error(here, what, f"it is one of {listing(map(str, parameter.choices), last='or')}")
     return value
+
+
+def _number_hint(value: Any) -> str:
+    """What to write in place of a value that is no number."""
+    try:
+        number_of(value, Number)
+    except QuantityError as error:
+        return error.hint if error.hint.startswith("write") else "give it a number"
+    return "give it a number"
 
 
 def round_source(source: YamlSource, steps: KeyPath, name: str, value: Value) -> YamlSource:
@@ -183,7 +195,7 @@ def _declared(source: YamlSource) -> dict[str, _Parameter]:
             continue
         if default is not None and not isinstance(default, _SCALARS):
             hint = "give it a text, a number, true or false, or {type: .., default: ..}"
-            raise source.error((DECLARED, name), f"parameter '{name}' cannot hold {type(default).__name__}", hint)
+            raise source.error((DECLARED, name), f"parameter '{name}' cannot hold {shown(default)}", hint)
         found[name] = _Parameter(_kind(default), default)
     return found
 

@@ -42,7 +42,18 @@ from executive.mission.file.people import RouteFile
 from executive.mission.robots import RobotsFile
 from skills.files.errors import InputError, listing
 from skills.files.yaml_source import Name, Text, YamlSource
-from skills.quantities import Count, Duration, Number, Quantity, Share, Whole, bounds, without_range, without_unit
+from skills.quantities import (
+    Count,
+    Duration,
+    Number,
+    Quantity,
+    QuantityError,
+    Share,
+    Whole,
+    bounds,
+    without_range,
+    without_unit,
+)
 
 __all__ = [
     "GuardsFile",
@@ -105,6 +116,17 @@ _BESIDE: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
 """With which forms of a step a key goes."""
 _NEEDED: Final[Mapping[str, str]] = MappingProxyType({"if": "then", "try": "else", "repeat": "steps"})
 _FIELDS: Final = MappingProxyType({"with": "with_", "if": "if_", "else": "else_", "try": "try_", "while": "while_"})
+
+
+def _named_goal(value: object) -> object:
+    """A goal is named; a pose belongs to the skill that takes one. Raises QuantityError."""
+    if isinstance(value, list | dict):
+        hint = "for a pose write 'skill: navigate' with 'with: {x: 1.0, y: 2.0, yaw: 1.57}', in metres and radians"
+        raise QuantityError("should be the name of a place or person", hint)
+    return value
+
+
+Goal = Annotated[Text, BeforeValidator(_named_goal)]
 
 
 class GuardsFile(Strict):
@@ -194,7 +216,7 @@ class StepFile(PolicyFile):
 
     say: Text | None = Field(None, description="What to do, in English.")
     take: Text | None = Field(None, description="What is carried; a number may stand before it.")
-    to: Text | None = Field(None, description='The place or person, or "start", or "Robin at hall".')
+    to: Goal | None = Field(None, description='The place or person, or "start", or "Robin at hall".')
     do: Task | None = Field(None, description="What to do there to the object.")
     object: Text | None = Field(None, description="The object of the task, or who is looked for.")
     skill: Name | None = Field(None, description="The name of a registered skill.")

@@ -112,9 +112,18 @@ def test_other_times_are_refused_with_a_hint(said, words):
         schedule_of(said)
 
 
-@pytest.mark.parametrize("said", ["0m", "30", "m", "-5m", "1.5h", "400d", "9999999999s", "30 mm", "5 daysx"])
+@pytest.mark.parametrize(
+    ("said", "written"),
+    [("30", "every 30s"), ("1.5h", "every 90m"), ("1 h 30 min", "every 90m"), ("PT5M", "every 5m")],
+)
+def test_a_period_takes_every_form_of_a_duration(said, written):
+    assert str(Every.of(said)) == written
+    assert str(trigger_of(f"every {said}")) == written
+
+
+@pytest.mark.parametrize("said", ["0m", "m", "-5m", "0.5s", "400d", "9999999999s", "30 mm", "5 daysx"])
 def test_other_periods_are_refused_with_a_hint(said):
-    with pytest.raises(InputError, match="is no period; give a whole number of s, m, h or d"):
+    with pytest.raises(InputError, match="is no period; give whole seconds"):
         Every.of(said)
 
 

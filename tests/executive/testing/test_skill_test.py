@@ -107,7 +107,7 @@ def test_the_report_tells_faults_and_what_was_said_on_the_way(written):
         ("with: {seconds: 1}", "with: {seconds: long}", 2, "'long' does not fit; give a number"),
         ("with: {seconds: 5}", "with: {seconds: [5]}", 7, "does not fit; give a number"),
         ("with: {seconds: 5}", "with: {seconds: 5, where: {x_m: 1}}", 7, "where: 'y' is missing"),
-        ("with: {seconds: 1}", "with: {}", 4, "input port 'seconds' has no value; give it a float"),
+        ("with: {seconds: 1}", "with: {}", 4, "input port 'seconds' has no value; give it a number"),
         ("odometry jumps 0.5 m at 1 s", "odometry jumps at 1 s", 8, "there is no fault"),
         ("cause: EXECUTION", "cause: BAD_LUCK", 9, "cause"),
         ("message: moved", "message: '('", 9, "is no regular expression"),

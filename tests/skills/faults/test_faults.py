@@ -282,3 +282,17 @@ def test_gripping_again_at_once_does_not_help_but_later_the_gripper_is_as_strong
     robot.set_gripper(0.0, 100.0, until_s=9.0, lease=lease)
     clock.advance(0.1)
     assert inner.clamp_force_n == 100.0
+
+
+@pytest.mark.parametrize(
+    ("words", "span"),
+    [
+        ("camera.hand: dropout 2 min at 1 h 30 min", (5400.0, 5520.0)),
+        ("lidar: dropout from 5 s to 2 min", (5.0, 120.0)),
+        ("camera freezes PT5S at 3 s", (3.0, 8.0)),
+        ("odometry jumps 0.5 m at 2 min", (120.0, math.inf)),
+    ],
+)
+def test_the_times_of_a_fault_take_units(words, span):
+    fault = parse_fault(words)
+    assert (fault.from_s, fault.to_s) == span

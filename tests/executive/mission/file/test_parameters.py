@@ -71,3 +71,23 @@ def test_an_unknown_type_is_refused_in_its_line(resolved):
     with pytest.raises(InputError, match="parameter 'who' has no type; its type is one of text, number") as error:
         resolved(text=FILE.replace("type: person", "type: animal"))
     assert error.value.line == 4
+
+
+@pytest.mark.parametrize(
+    ("setting", "says"),
+    [
+        ("n=" + "9" * 5000, "--set n has 5002 letters"),
+        ("n=" + "9" * 1500, "too large"),
+        ("n=.inf", "too large"),
+        ("n=[1]", "NAME=VALUE"),
+    ],
+    ids=lambda text: text[:8],
+)
+def test_a_setting_that_is_no_plain_value_is_refused(setting, says):
+    with pytest.raises(InputError, match=says):
+        given_values([setting])
+
+
+@pytest.mark.parametrize(("setting", "value"), [("t=14:30", "14:30"), ("n=010", "010"), ("n=1e3", 1000.0), ("n=3", 3)])
+def test_a_setting_has_the_type_that_people_mean(setting, value):
+    assert list(given_values([setting]).values()) == [value]

@@ -113,3 +113,14 @@ def test_the_json_schema_names_every_key_with_a_description():
 def test_where_a_number_is_wanted_a_parameter_may_stand():
     timeout = mission_json_schema()["$defs"]["StepFile"]["properties"]["timeout"]
     assert '"pattern"' in json.dumps(timeout)
+
+
+@pytest.mark.parametrize("goal", ["[1.0, 2.0]", "{x: 5.0, y: 4.5}"])
+def test_a_pose_as_a_goal_points_to_the_skill_that_takes_one(load, goal):
+    with pytest.raises(InputError, match="name of a place or person; for a pose write 'skill: navigate'"):
+        load(f"name: m\nsteps:\n  - to: {goal}\n")
+
+
+def test_a_default_answer_is_a_finite_number(load):
+    with pytest.raises(InputError, match=r"default: .* a finite number"):
+        load("name: m\nsteps:\n  - {ask: how many, match: number, default: .inf}\n")

@@ -1,0 +1,73 @@
+"""Every number that a file may hold has a quantity: a new field without one is found here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin
+
+import pytest
+from pydantic import BaseModel
+
+from skills.quantities import quantity_of
+
+ROOT = Path(__file__).resolve().parent.parent
+OURS_ALONE = (
+    "executive/tree/estimate.py",
+    "plant/dataset/objects/finishes.py",
+    "plant/dataset/objects/recipes.py",
+    "plant/models/catalogue.py",
+    "plant/sensors/camera_spec.py",
+    "plant/worlds/builder/materials.py",
+    "plant/worlds/builder/plan.py",
+    "skills/perception/attributes.py",
+    "skills/perception/class_forms.py",
+    "skills/perception/training/coco.py",
+)
+"""Modules whose models describe files that come with the project, or that other programs write."""
+
+
+def files() -> list[str]:
+    """The modules with models of files that a user writes."""
+    paths = [path for home in ("executive", "plant", "skills") for path in (ROOT / home).rglob("*.py")]
+    texts = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in paths}
+    return sorted(name for name, text in texts.items() if "BaseModel)" in text and name not in OURS_ALONE)
+
+
+def bare(hint: Any) -> Iterator[Any]:
+    """The numbers without a quantity in the type of a field."""
+    if quantity_of(hint) is not None:
+        return
+    if get_origin(hint) is Annotated:
+        yield from bare(get_args(hint)[0])
+    elif hint in (int, float):
+        yield hint
+    else:
+        for part in get_args(hint):
+            yield from bare(part)
+
+
+def without_quantity(model: type[BaseModel]) -> list[str]:
+    """The fields of a model that are, or hold, a number without a quantity."""
+    hints = {name: Annotated[(f.annotation, *(f.metadata or ("",)))] for name, f in model.model_fields.items()}
+    return [name for name, hint in hints.items() if list(bare(hint))]
+
+
+@pytest.mark.parametrize("module", files())
+def test_every_number_of_a_file_has_a_quantity(module: str) -> None:
+    name = module.removesuffix(".py").replace("/", ".")
+    kinds = [each for each in vars(import_module(name)).values() if isinstance(each, type) and each.__module__ == name]
+    models = [each for each in kinds if issubclass(each, BaseModel)]
+    assert {model.__name__: names for model in models if (names := without_quantity(model))} == {}
+
+
+def test_a_number_without_a_quantity_is_found() -> None:
+    class File(BaseModel):
+        """A file."""
+
+        share: float = 0.5
+        places: tuple[tuple[float, float], ...] | None = None
+        name: str = ""
+
+    assert without_quantity(File) == ["share", "places"]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Final
 
 import typer
 from rich.console import Console
@@ -17,6 +18,10 @@ from skills.files.errors import InputError
 
 NOT_ACHIEVED = 1
 BAD_INPUT = 2
+_OF_NAMES: Final = frozenset(
+    {errno.ENAMETOOLONG, errno.ENOTDIR, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP, errno.EEXIST}
+)
+_SHOWN: Final = 100
 
 
 def console_for(as_json: bool) -> Console:
@@ -47,10 +52,19 @@ def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[
 
 @contextmanager
 def refusals() -> Iterator[None]:
-    """Bad input becomes one line on standard error for each error, and exit status 2."""
+    """Bad input becomes one line on standard error for each error, and exit status 2; so does a file that cannot be
+    used, such as one whose name is too long."""
     try:
         yield
     except InputError as error:
         for each in (error, *error.others):
             typer.echo(f"errand: {each}", err=True)
+        raise typer.Exit(BAD_INPUT) from error
+    except OSError as error:
+        if error.errno not in _OF_NAMES or error.filename is None:
+            raise
+        refused = InputError(
+            f"cannot use it ({error.strerror})", hint="name another", file=str(error.filename)[:_SHOWN]
+        )
+        typer.echo(f"errand: {refused}", err=True)
         raise typer.Exit(BAD_INPUT) from error

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 import yaml
@@ -14,10 +14,12 @@ from skills.stack import DEFAULT_FILE, plain
 
 __all__ = ["STACK", "stack", "stack_file"]
 
+_LONGEST_NAME: Final = 80
+
 
 def stack_file(given: Path | None) -> Path | None:
     """A stack file as it was given, or the one of that name that comes with Errand."""
-    if given is None or given.exists() or given != Path(given.name):
+    if given is None or given != Path(given.name) or len(given.name) > _LONGEST_NAME or given.exists():
         return given
     own = DEFAULT_FILE.with_name(f"{given}_stack.yaml")
     return own if own.is_file() else given

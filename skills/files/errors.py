@@ -26,6 +26,7 @@ NEAREST: Final = 3
 FEW: Final = 5
 MOST_LISTED: Final = 8
 MOST_LETTERS: Final = 1000
+FEW_LETTERS: Final = 60
 _USED_BY: Final = "used by"
 _MOST_USERS: Final = 3
 
@@ -69,8 +70,9 @@ class InputError(Exception):
         return cls(message, hint=hint, file=source.file, line=source.line)
 
     def __str__(self) -> str:
-        """One line: "file:line: what; hint"."""
-        place = "" if self.file is None else f"{self.file}: " if self.line is None else f"{self.file}:{self.line}: "
+        """One line: "file:line: what; hint"; of an endless name of a file the beginning."""
+        file = str(self.file) if len(str(self.file)) <= MOST_LETTERS else f"{str(self.file)[:FEW_LETTERS]}..."
+        place = "" if self.file is None else f"{file}: " if self.line is None else f"{file}:{self.line}: "
         return " ".join(f"{place}{self.message}{'; ' if self.hint else ''}{self.hint}".split())
 
     def within(self, file: Path, line: int) -> InputError:

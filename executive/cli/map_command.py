@@ -218,7 +218,7 @@ def _writing(folder: Path) -> Iterator[None]:
 
 def _mapper(world: World, out: Path) -> Mapper:
     """A new map, or the one that is in a folder. Raises InputError."""
-    from skills.mapping.map_folder import GRAPH_FILE, MapFolderError, load_mapper
+    from skills.mapping.map_folder import GRAPH_FILE, load_mapper
     from skills.mapping.mapper import Mapper
     from skills.mapping.pose_graph import MappingExtraMissingError, gtsam_module
 
@@ -231,10 +231,7 @@ def _mapper(world: World, out: Path) -> Mapper:
         out.mkdir(parents=True, exist_ok=True)
     if not (out / GRAPH_FILE).exists():
         return Mapper(world.start)
-    try:
-        return load_mapper(out)
-    except MapFolderError as error:
-        raise InputError(str(error)) from error
+    return load_mapper(out)
 
 
 def _route_points(path: Path) -> list[tuple[float, float]]:

@@ -34,7 +34,9 @@ def _group() -> None:
 
 @object_group.command(name="import")
 def import_command(
-    mesh: Annotated[Path, typer.Argument(metavar="MESH", help="A closed mesh: OBJ, STL, PLY, OFF, glTF or GLB.")],
+    mesh: Annotated[
+        Path, typer.Argument(metavar="MESH", help="A closed mesh: OBJ, STL, PLY, OFF, glTF, GLB or COLLADA.")
+    ],
     name: Annotated[str, typer.Option(help="What worlds call the model: letters, digits and _.")],
     mass: Annotated[float, quantity_option(Mass, help="Its mass, kg.")],
     out: Annotated[Path, typer.Option("--out", help="The model's folder; it is made.")],
@@ -42,7 +44,9 @@ def import_command(
         str | None, typer.Option("--class", help="The class that the detector takes it for; else none of them.")
     ] = None,
     scale: Annotated[float, quantity_option(Factor, help="Metres per unit of the file; 0.001 for millimetres.")] = 1.0,
-    up: Annotated[str | None, typer.Option(help="The file's axis that is up: x, y or z; z, but y of glTF.")] = None,
+    up: Annotated[
+        str | None, typer.Option(help="The file's axis that is up: x, y or z; z, but y of glTF and what COLLADA says.")
+    ] = None,
     close_holes: Annotated[bool, typer.Option("--close-holes", help="Close an open mesh where it is open.")] = False,
     as_json: AsJson = False,
 ) -> None:

@@ -13,6 +13,7 @@ from executive.evaluation.scenario_schema import EvaluationFile, FaultsFile, Mis
 from executive.evaluation.seeds import seed_range
 from executive.mission.variation import Variation
 from skills.files.errors import InputError
+from skills.files.outside import read_text
 from skills.files.yaml_source import KeyPath, YamlSource, read_yaml, validate
 
 __all__ = ["FileFinder", "is_evaluation", "load_evaluation"]
@@ -129,7 +130,7 @@ class _Reader:
                     "varied": {key: str(all_told[key]) for key in several},
                     **{key: None if file is None else str(file) for key, file in files.items()},
                 }
-                yield _Vary(values, {str(file): _text(file) for file in files.values() if file is not None})
+                yield _Vary(values, {str(file): read_text(file) for file in files.values() if file is not None})
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,7 @@ def _with_used(file: Path) -> Iterator[tuple[str, str]]:
         if path in known or not path.is_file():
             continue
         known.add(path)
-        yield str(path), _text(path)
+        yield str(path), read_text(path)
         todo += [(path.parent / used).resolve() for used in _uses(read_yaml(path).data)]
 
 
@@ -181,10 +182,3 @@ def _uses(data: Any) -> Iterator[str]:
         yield from (value for key, value in data.items() if key in ("use", "stack") and isinstance(value, str))
     for value in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
         yield from _uses(value)
-
-
-def _text(file: Path) -> str:
-    try:
-        return file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError("cannot read it", hint="name a text file", file=file) from error

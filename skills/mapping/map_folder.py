@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import json
 import math
+import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from skills.files.errors import InputError
+from skills.files.outside import plain_file, read_text
 from skills.mapping.keyframe import Keyframe
 from skills.mapping.mapper import Mapper, MapperOptions, Submap
 from skills.mapping.occupancy import BANDS_M, LayeredOccupancy
@@ -26,13 +31,22 @@ LAYER_M: Final = 0.025
 GRAPH_FILE: Final = "pose_graph.json"
 KEYFRAMES_FILE: Final = "keyframes.npz"
 _FORM: Final = 1
+MOST_GRAPH_BYTES: Final = 100_000_000
+MOST_KEYFRAMES_BYTES: Final = 4_000_000_000
+_AGAIN: Final = "copy the whole folder, or name another --out"
+_SHAPES: Final[Mapping[str, tuple[int, int | None]]] = {
+    "ranges_mm": (3, None),
+    "elevations_rad": (1, None),
+    "azimuths_rad": (1, None),
+    "rotations": (3, 3),
+    "translations": (2, 3),
+    "odometry": (2, 3),
+    "points": (3, 3),
+}
+"""How many dimensions each array has, and the length of the last."""
 _FREE, _OCCUPIED = 0.45, 0.65
 _SLIM_M: Final = 0.2
 """Less than half the body's width."""
-
-
-class MapFolderError(ValueError):
-    """A folder does not hold a map that can be continued; the text names the file."""
 
 
 @dataclass(frozen=True)
@@ -143,32 +157,92 @@ def save_graph(folder: Path, mapper: Mapper) -> None:
     _write(folder / GRAPH_FILE, json.dumps(document).encode())
 
 
+Triple = tuple[float, float, float]
+
+
+class _Told(BaseModel):
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False, populate_by_name=True)
+
+
+class _Edge(_Told):
+    first: int = Field(alias="from", ge=0)
+    second: int = Field(alias="to", ge=0)
+    measured: Triple
+    covariance: tuple[Triple, Triple, Triple]
+    closure: bool
+
+    def edge(self) -> Edge:
+        return Edge(self.first, self.second, Pose2D(*self.measured), np.array(self.covariance), self.closure)
+
+
+class _Submap(_Told):
+    anchor: int = Field(ge=0)
+    members: dict[int, Triple]
+
+
+class _Graph(_Told):
+    """What `save_graph` writes of the pose graph."""
+
+    form: Literal[1]
+    poses: list[Triple] = Field(min_length=1)
+    stamps_s: list[float]
+    edges: list[_Edge]
+    submaps: list[_Submap]
+
+    @model_validator(mode="after")
+    def _belongs_together(self) -> _Graph:
+        count = len(self.poses)
+        named = [end for edge in self.edges for end in (edge.first, edge.second)]
+        named += [index for submap in self.submaps for index in (submap.anchor, *submap.members)]
+        beyond = next((index for index in named if not 0 <= index < count), None)
+        if beyond is not None:
+            raise ValueError(f"it names keyframe {beyond}, and there are {count}")
+        if len(self.stamps_s) != count:
+            raise ValueError(f"it has {len(self.stamps_s)} stamps for {count} keyframes")
+        if any(np.linalg.eigvalsh(np.array(edge.covariance)).min() <= 0.0 for edge in self.edges):
+            raise ValueError("a covariance is not positive definite")
+        return self
+
+
 def load_mapper(folder: Path, options: MapperOptions | None = None) -> Mapper:
-    """A mapper with all that `save_graph` wrote; it does not know yet where the robot is. Raises MapFolderError."""
+    """A mapper with all that `save_graph` wrote; it does not know yet where the robot is.
+
+    Raises:
+        InputError: a file is missing or damaged, or the two do not belong together.
+    """
+    graph_file, keyframes_file = folder / GRAPH_FILE, folder / KEYFRAMES_FILE
     try:
-        document = json.loads((folder / GRAPH_FILE).read_text(encoding="utf-8"))
-        with np.load(folder / KEYFRAMES_FILE) as kept:
-            arrays = dict(kept)
-        graph = PoseGraph([Pose2D(*pose) for pose in document["poses"]], [_edge(told) for told in document["edges"]])
-        frames = _frames(arrays, document["stamps_s"])
-        submaps = [_submap(told) for told in document["submaps"]]
-        if document["form"] != _FORM or not len(frames) == len(graph.poses) > 0:
-            raise ValueError("its parts do not belong together")
-    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
-        why = f"{type(error).__name__}: {error}"
-        raise MapFolderError(f"{folder}: no map that can be continued ({why}); name another --out") from error
+        told = _Graph.model_validate_json(read_text(graph_file, most_bytes=MOST_GRAPH_BYTES, hint=_AGAIN))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        what = f"it is no pose graph ({where}{': ' if where else ''}{first['msg'].removeprefix('Value error, ')})"
+        raise InputError(what, hint=_AGAIN, file=graph_file) from error
+    plain_file(keyframes_file, most_bytes=MOST_KEYFRAMES_BYTES, hint=_AGAIN)
+    try:
+        with zipfile.ZipFile(keyframes_file) as packed:
+            if sum(part.file_size for part in packed.infolist()) > MOST_KEYFRAMES_BYTES:
+                raise InputError("its keyframes unfold to too much", hint=_AGAIN, file=keyframes_file)
+        with np.load(keyframes_file, allow_pickle=False) as kept:
+            frames = _frames(dict(kept), told.stamps_s)
+    except (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise InputError(
+            f"it is no recording of keyframes ({error})"[:300], hint=_AGAIN, file=keyframes_file
+        ) from error
+    graph = PoseGraph([Pose2D(*pose) for pose in told.poses], [edge.edge() for edge in told.edges])
+    submaps = [
+        Submap(each.anchor, None, {index: Pose2D(*pose) for index, pose in each.members.items()})
+        for each in told.submaps
+    ]
     return Mapper.going_on(graph, frames, submaps, options)
 
 
-def _edge(told: Mapping[str, Any]) -> Edge:
-    return Edge(told["from"], told["to"], Pose2D(*told["measured"]), np.array(told["covariance"]), told["closure"])
-
-
-def _submap(told: Mapping[str, Any]) -> Submap:
-    return Submap(told["anchor"], None, {int(index): Pose2D(*pose) for index, pose in told["members"].items()})
-
-
 def _frames(arrays: Mapping[str, Any], stamps_s: list[float]) -> list[Keyframe]:
+    for name, (dimensions, last) in _SHAPES.items():
+        array = arrays[name]
+        fits = array.ndim == dimensions and (last is None or array.shape[-1] == last) and array.dtype.kind in "fu"
+        if not fits or (dimensions > 1 and len(array) != len(stamps_s)):
+            raise ValueError(f"{name} is {array.dtype} of {array.shape}, for {len(stamps_s)} keyframes")
     ranges = arrays["ranges_mm"].astype(np.float32) / np.float32(1000.0)
     ranges[arrays["ranges_mm"] == 0] = math.nan
     return [

@@ -1,3 +1,4 @@
+import json
 import math
 from dataclasses import replace
 
@@ -6,8 +7,9 @@ import pytest
 from planar_robot import TWO_ROOMS, Box, PlanarClock, PlanarRobot
 
 from skills.estimate.grid_map import load_grid_map
+from skills.files.errors import InputError
 from skills.geometry import relative
-from skills.mapping.map_folder import MapFolderError, load_mapper, save_graph, save_grids, surveyed
+from skills.mapping.map_folder import load_mapper, save_graph, save_grids, surveyed
 from skills.mapping.mapper import Mapper
 from skills.mapping.survey import Survey
 from skills.robot import Pose2D
@@ -103,12 +105,59 @@ def test_a_saved_map_goes_on_where_the_robot_begins_again(explored):
     assert again.survey.trouble is None
 
 
-def test_a_damaged_map_is_refused(explored, tmp_path):
-    _, folder = explored
-    (tmp_path / "pose_graph.json").write_text((folder / "pose_graph.json").read_text()[:200])
-    (tmp_path / "keyframes.npz").write_bytes((folder / "keyframes.npz").read_bytes())
-    with pytest.raises(MapFolderError, match="no map that can be continued"):
+def change_graph(**values):
+    def change(folder):
+        document = json.loads((folder / "pose_graph.json").read_text())
+        (folder / "pose_graph.json").write_text(json.dumps({**document, **values}))
+
+    return change
+
+
+def an_edge(**values):
+    covariance = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    return {"from": 0, "to": 1, "measured": [0, 0, 0], "covariance": covariance, "closure": True, **values}
+
+
+def change_arrays(**values):
+    def change(folder):
+        with np.load(folder / "keyframes.npz") as kept:
+            arrays = dict(kept)
+        np.savez(folder / "keyframes.npz", **{**arrays, **values})
+
+    return change
+
+
+def cut(name, size):
+    return lambda folder: (folder / name).write_bytes((folder / name).read_bytes()[:size])
+
+
+@pytest.mark.parametrize(
+    ("damage", "file", "said"),
+    [
+        (cut("pose_graph.json", 200), "pose_graph.json", "no pose graph"),
+        (cut("keyframes.npz", 0), "keyframes.npz", "no recording"),
+        (cut("keyframes.npz", 500), "keyframes.npz", "no recording"),
+        (cut("keyframes.npz", -3), "keyframes.npz", "no recording"),
+        (lambda folder: (folder / "keyframes.npz").unlink(), "keyframes.npz", "no such file"),
+        (change_graph(edges=[an_edge(to=9_999)]), "pose_graph.json", "it names keyframe 9999"),
+        (change_graph(edges=[an_edge(to=-1)]), "pose_graph.json", "edges"),
+        (change_graph(edges=[an_edge(covariance=[[0] * 3] * 3)]), "pose_graph.json", "positive definite"),
+        (change_graph(edges=[an_edge(measured=["x", 0, 0])]), "pose_graph.json", "measured"),
+        (change_graph(submaps=[{"anchor": 9_999, "members": {}}]), "pose_graph.json", "keyframe 9999"),
+        (change_graph(stamps_s=[0.0]), "pose_graph.json", "stamps"),
+        (change_graph(poses=[]), "pose_graph.json", "poses"),
+        (change_graph(form=2), "pose_graph.json", "form"),
+        (change_arrays(odometry=np.zeros((1, 3))), "keyframes.npz", "odometry"),
+        (change_arrays(points=np.zeros(3)), "keyframes.npz", "points"),
+    ],
+)
+def test_a_damaged_map_is_refused_in_its_file(explored, tmp_path, damage, file, said):
+    for name in ("pose_graph.json", "keyframes.npz"):
+        (tmp_path / name).write_bytes((explored[1] / name).read_bytes())
+    damage(tmp_path)
+    with pytest.raises(InputError, match=said) as error:
         load_mapper(tmp_path)
+    assert error.value.file == tmp_path / file
 
 
 def test_a_route_is_driven_and_what_cannot_be_reached_is_told():

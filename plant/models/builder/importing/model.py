@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from plant.models.builder.importing.errors import ObjectImportError
-from plant.models.builder.importing.reading import Y_UP, Patch, read_patches
+from plant.models.builder.importing.reading import Patch, read_patches
 from plant.models.builder.importing.resting import feet, resting_rotation
 from plant.models.builder.importing.solid import Solid, convex_parts, hull_of, same_points, solid_of
 from plant.models.builder.inertia import scaled_to, solid_mass
@@ -40,6 +41,9 @@ PROUD_M: Final = 0.0003
 """The small spheres stand out by this much, so that they bear the body."""
 PLACES: Final = 6
 PERSON: Final = "person"
+_UNITS: Final = (("millimetres", 0.001), ("centimetres", 0.01), ("inches", 0.0254), ("feet", 0.3048), ("km", 1000.0))
+_PLAUSIBLE_M: Final = (0.02, 1.5)
+"""An object for a table is so long."""
 _UP: Final = {
     "x": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
     "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
@@ -110,6 +114,7 @@ def import_object(mesh: Path, wanted: Wanted, folder: Path) -> ImportedObject:
     wanted.refuse_wrong()
     body = _at_rest(_placed(mesh, wanted))
     mass = scaled_to(_mass(body.solid), wanted.mass_kg)
+    _refuse_impossible(mass)
     parts = [_shrunk(part, body.solid.points) for part in convex_parts(body.solid)]
     bearing = feet(body.solid.points, mass.com)
     files = [f"{wanted.name}_part_{number}.obj" for number in range(len(parts))]
@@ -132,25 +137,47 @@ def import_object(mesh: Path, wanted: Wanted, folder: Path) -> ImportedObject:
 
 def _placed(mesh: Path, wanted: Wanted) -> _Body:
     """The mesh in metres, z up. Raises ObjectImportError."""
-    up = wanted.up or ("y" if mesh.suffix.lower() in Y_UP else "z")
-    patches = tuple(patch.moved(wanted.scale * _UP[up], np.zeros(3)) for patch in read_patches(mesh))
+    read, own_up = read_patches(mesh)
+    patches = tuple(patch.moved(wanted.scale * _UP[wanted.up or own_up], np.zeros(3)) for patch in read)
     triangles = np.concatenate([patch.triangles for patch in patches])
     _refuse_size(np.ptp(triangles.reshape(-1, 3), axis=0), wanted.scale)
-    solid, inward = solid_of(triangles, close_holes=wanted.close_holes)
-    if inward:
-        patches = tuple(replace(p, triangles=p.triangles[:, ::-1], uvs=p.uvs[:, ::-1]) for p in patches)
+    solid, turned = solid_of(triangles, close_holes=wanted.close_holes)
+    ends = np.cumsum([len(patch.triangles) for patch in patches])[:-1]
+    patches = tuple(_turned(patch, which) for patch, which in zip(patches, np.split(turned, ends), strict=True))
     return _Body(patches, solid)
+
+
+def _turned(patch: Patch, which: NDArray[np.bool_]) -> Patch:
+    """The patch with some triangles (T,) looking the other way."""
+    both = which[:, None, None]
+    triangles = np.where(both, patch.triangles[:, ::-1], patch.triangles)
+    return replace(patch, triangles=triangles, uvs=np.where(both, patch.uvs[:, ::-1], patch.uvs))
 
 
 def _refuse_size(size_m: FloatArray, scale: float) -> None:
     """Refuse what is no object for a table: the unit of the file is another one, then."""
     told = " x ".join(f"{value:.3g}" for value in size_m)
     if size_m.max() > LARGEST_M:
-        hint = f"if its unit is millimetres, give --scale {0.001 * scale:g}"
-        raise ObjectImportError(f"it is {told} m large", hint)
+        raise ObjectImportError(f"it is {told} m large", _scale_hint(float(size_m.max()), scale))
     if size_m.max() < SMALLEST_M:
-        hint = "give --scale, the metres of one unit of the file"
-        raise ObjectImportError(f"it is {told} m small", hint)
+        raise ObjectImportError(f"it is {told} m small", _scale_hint(float(size_m.max()), scale))
+
+
+def _scale_hint(largest_m: float, scale: float) -> str:
+    """Which unit the file may have, by how long the object were then."""
+    fitting = [(unit, factor) for unit, factor in _UNITS if _PLAUSIBLE_M[0] <= factor * largest_m <= _PLAUSIBLE_M[1]]
+    if not fitting:
+        return "give --scale, the metres of one unit of the file"
+    told = (f"{factor * scale:g} if its unit is {unit} ({factor * largest_m:.3g} m long)" for unit, factor in fitting)
+    return f"give --scale {', '.join(told)}"
+
+
+def _refuse_impossible(mass: MassProperties) -> None:
+    """Refuse an inertia that no body has: pieces that are inside out count as holes."""
+    moments = np.linalg.eigvalsh(mass.inertia)
+    if moments[0] <= 0.0 or moments[2] > (1.0 + 1e-6) * (moments[0] + moments[1]):
+        hint = "unite its pieces to one body and let its normals be calculated again, or import its hull"
+        raise ObjectImportError("pieces of it are inside out, and no body has the inertia that it would have", hint)
 
 
 def _at_rest(body: _Body) -> _Body:

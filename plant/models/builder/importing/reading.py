@@ -11,20 +11,27 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from plant.models.builder.importing.collada import read_collada
 from plant.models.builder.importing.errors import ObjectImportError
 from plant.models.builder.importing.libraries import objects_module
 from plant.models.builder.mesh import Colour
+from plant.worlds.geometry_files import check_model
+from skills.files.errors import InputError
+from skills.files.outside import plain_file
+from skills.files.pictures import MOST_PIXELS
 from skills.robot import FloatArray, Picture
 
 MAX_BYTES: Final = 200_000_000
 MOST_TRIANGLES: Final = 100_000
 LARGEST_PICTURE_PX: Final = 1024
+COLLADA: Final = ".dae"
 Y_UP: Final = (".gltf", ".glb")
 """Formats that define y as up."""
 MOST_COLOURS: Final = 64
 """More colours than that are rounded to few."""
 GREY: Final[Colour] = (0.7, 0.7, 0.7)
 _NO_MESHES: Final = frozenset({"zip", "tar.gz", "bz2", "tar.bz2", "stl_ascii", "dxf", "xyz"})
+_NAMING_OTHERS: Final = (".obj", ".gltf")
 _SHADES: Final = 5
 
 
@@ -42,23 +49,51 @@ class Patch:
         return replace(self, triangles=self.triangles @ R.T + p)
 
 
-def read_patches(path: Path) -> tuple[Patch, ...]:
-    """The triangles of a mesh file in its own unit and axes.
+def read_patches(path: Path) -> tuple[tuple[Patch, ...], str]:
+    """The triangles of a mesh file in its own axes, and the axis that is up; in metres where the format knows its unit.
 
     Raises:
         ObjectImportError: the file is missing, too large or no mesh, is empty, or has too many triangles.
         ObjectsExtraMissingError: trimesh is not installed.
     """
     trimesh = objects_module("trimesh")
-    _refuse_unreadable(path, sorted(trimesh.available_formats() - _NO_MESHES))
+    suffix = path.suffix.lower()
+    formats = sorted({*trimesh.available_formats(), COLLADA.removeprefix(".")} - _NO_MESHES)
+    if suffix.removeprefix(".") not in formats:
+        what = f"'{path.suffix}' is the ending of no mesh format" if path.suffix else "it has no ending"
+        raise ObjectImportError(what, f"give one of {', '.join(formats)}")
+    try:
+        plain_file(path, most_bytes=MAX_BYTES, hint="check the path")
+        if suffix in _NAMING_OTHERS:
+            check_model(path, path.parent)
+        if suffix == COLLADA:
+            told = read_collada(path)
+            patches, up = tuple(_plain_patch(triangles, colour) for triangles, colour in told.parts), told.up
+        else:
+            patches, up = _with_trimesh(path, trimesh), "y" if suffix in Y_UP else "z"
+    except InputError as error:
+        what = error.message if error.file in (None, path) else f"{error.file.name}: {error.message}"
+        raise ObjectImportError(what, error.hint) from error
+    if not any(len(patch.triangles) for patch in patches):
+        raise ObjectImportError("it is no mesh: there are no triangles in it", "give a file with a surface")
+    if sum(len(patch.triangles) for patch in patches) > MOST_TRIANGLES:
+        raise _too_many(sum(len(patch.triangles) for patch in patches))
+    if len({patch.colour for patch in patches}) > MOST_COLOURS:
+        patches = tuple(replace(patch, colour=_rounded(patch.colour)) for patch in patches)
+    if not all(np.isfinite(patch.triangles).all() for patch in patches):
+        raise ObjectImportError("some of its points are no finite numbers", "export it once more")
+    return patches, up
+
+
+def _with_trimesh(path: Path, trimesh: Any) -> tuple[Patch, ...]:
+    """The triangles of a file that trimesh reads. Raises ObjectImportError."""
     try:
         scene = trimesh.load_scene(path, process=False)
         parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
         count = sum(len(part.faces) for part in parts)
         if count > MOST_TRIANGLES:
-            hint = "make it coarser, for example by Decimate in Blender or by MeshLab"
-            raise ObjectImportError(f"it has {count} triangles, and at most {MOST_TRIANGLES} are taken", hint)
-        patches = tuple(patch for part in parts for patch in _patches(part))
+            raise _too_many(count)
+        return tuple(patch for part in parts for patch in _patches(part))
     except ObjectImportError:
         raise
     except FileNotFoundError as error:
@@ -69,27 +104,15 @@ def read_patches(path: Path) -> tuple[Patch, ...]:
         raise ObjectImportError(
             f"it cannot be read as a mesh ({type(error).__name__})", "export it once more, for example as OBJ or GLB"
         ) from error
-    if not patches:
-        raise ObjectImportError("it is no mesh: there are no triangles in it", "give a file with a surface")
-    if len({patch.colour for patch in patches}) > MOST_COLOURS:
-        patches = tuple(replace(patch, colour=_rounded(patch.colour)) for patch in patches)
-    if not all(np.isfinite(patch.triangles).all() for patch in patches):
-        raise ObjectImportError("some of its points are no finite numbers", "export it once more")
-    return patches
 
 
-def _refuse_unreadable(path: Path, formats: list[str]) -> None:
-    try:
-        if not path.is_file():
-            raise ObjectImportError("there is no such file", "check the path")
-        size = path.stat().st_size
-    except OSError as error:
-        raise ObjectImportError(f"it cannot be read ({error.strerror})", "check the path") from error
-    if path.suffix.lower().removeprefix(".") not in formats:
-        what = f"'{path.suffix}' is the ending of no mesh format" if path.suffix else "it has no ending"
-        raise ObjectImportError(what, f"give one of {', '.join(formats)}")
-    if size > MAX_BYTES:
-        raise ObjectImportError(f"it is larger than {MAX_BYTES} bytes", "make it coarser")
+def _too_many(count: int) -> ObjectImportError:
+    hint = "make it coarser, for example by Decimate in Blender or by MeshLab"
+    return ObjectImportError(f"it has {count} triangles, and at most {MOST_TRIANGLES} are taken", hint)
+
+
+def _plain_patch(triangles: FloatArray, colour: Colour | None) -> Patch:
+    return Patch(triangles, np.zeros((len(triangles), 3, 2)), GREY if colour is None else colour)
 
 
 def _patches(part: Any) -> Iterator[Patch]:
@@ -119,6 +142,8 @@ def _picture(material: Any) -> Picture | None:
     found = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
     if found is None:
         return None
+    if found.width * found.height > MOST_PIXELS:
+        raise ObjectImportError(f"its picture has {found.width} x {found.height} pixels", "make the picture smaller")
     picture = np.asarray(found.convert("RGB"), dtype=np.uint8)
     shrink = LARGEST_PICTURE_PX / max(picture.shape[:2])
     if shrink < 1.0:

@@ -14,6 +14,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from plant.models.builder.importing.errors import ObjectImportError
 from plant.models.builder.importing.libraries import objects_module
+from plant.models.builder.importing.winding import outward, pieces
 from skills.robot import FloatArray
 
 MOST_PARTS: Final = 16
@@ -46,16 +47,19 @@ class Solid:
         return _volume(self.triangles)
 
 
-def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid, bool]:
-    """The body that triangles (T, 3, 3) enclose, and whether they looked inward.
+def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid, NDArray[np.bool_]]:
+    """The body that triangles (T, 3, 3) enclose, and which of them (T,) do not look outward and are turned for it.
 
     A closed surface has for every edge of a triangle one that runs the other way. With `close_holes`, each ring of
     edges without a partner is closed by a fan about its middle.
 
     Raises:
-        ObjectImportError: the surface is open, its triangles are wound differently, or it is flat.
+        ObjectImportError: the surface is open, its triangles cannot be wound alike, or it is flat.
     """
-    points, faces = _welded(triangles)
+    points, faces, kept = _welded(triangles)
+    alike = pieces(faces)
+    turned = np.zeros(len(faces), dtype=np.bool_) if alike is None else alike[1]
+    faces = _turned(faces, turned)
     rims = _unpaired(faces)
     if len(np.unique(rims, axis=0)) < len(rims):
         hint = "let its normals be calculated anew in the program that made it"
@@ -64,12 +68,22 @@ def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid
         hint = "close it in the program that made it, or add --close-holes"
         raise ObjectImportError(f"it is open (not watertight), at {len(rims)} edges", hint)
     points, faces = _closed(points, faces, rims)
-    solid = Solid(points, faces)
+    closed = pieces(faces)
+    if closed is not None:
+        inward = outward(points, faces, closed[0])
+    else:
+        inward = np.full(len(faces), _volume(np.asarray(points[faces])) < 0.0)
+    solid = Solid(points, _turned(faces, inward))
     box = float(np.prod(np.ptp(points, axis=0)))
     if abs(solid.volume_m3) <= _LEAST_VOLUME * box or box == 0.0:
         raise ObjectImportError("it encloses no volume", "give a body with a thickness, no sheet")
-    inward = solid.volume_m3 < 0
-    return (Solid(points, faces[:, ::-1]) if inward else solid), inward
+    changed = np.zeros(len(triangles), dtype=np.bool_)
+    changed[kept] = turned ^ inward[: len(turned)]
+    return solid, changed
+
+
+def _turned(faces: Faces, which: NDArray[np.bool_]) -> Faces:
+    return np.where(which[:, None], faces[:, ::-1], faces)
 
 
 def _volume(triangles: FloatArray) -> float:
@@ -87,10 +101,11 @@ def same_points(triangles: FloatArray) -> tuple[FloatArray, Faces]:
     return corners[first], index.reshape(-1, 3)
 
 
-def _welded(triangles: FloatArray) -> tuple[FloatArray, Faces]:
+def _welded(triangles: FloatArray) -> tuple[FloatArray, Faces, NDArray[np.bool_]]:
+    """Points, corners of the triangles that have an extent, and which of all (T,) these are."""
     points, faces = same_points(triangles)
     apart = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return points, faces[apart]
+    return points, faces[apart], apart
 
 
 def _edges(faces: Faces) -> Faces:

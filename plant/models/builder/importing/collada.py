@@ -1,0 +1,197 @@
+"""Reads COLLADA (.dae): triangles with colours, in metres by the unit that the file names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from plant.models.builder.importing.errors import ObjectImportError
+from plant.models.builder.mesh import Colour
+from skills.files.outside import read_text
+from skills.robot import FloatArray
+
+__all__ = ["Collada", "read_collada"]
+
+MOST_BYTES: Final = 100_000_000
+MOST_NODES: Final = 10_000
+MOST_DEPTH: Final = 50
+_UP: Final = {"X_UP": "x", "Y_UP": "y", "Z_UP": "z"}
+_AGAIN: Final = "export it once more, for example as GLB"
+_SEVERAL: Final = ("triangles", "polylist", "polygons")
+
+
+@dataclass(frozen=True)
+class Collada:
+    """Triangles (T, 3, 3) in metres with their colours (None: not told), and the axis that is up."""
+
+    parts: tuple[tuple[FloatArray, Colour | None], ...]
+    up: str
+
+
+def read_collada(path: Path) -> Collada:
+    """Read a COLLADA file.
+
+    Raises:
+        ObjectImportError: it is no COLLADA, or is damaged.
+        InputError: it cannot be read.
+    """
+    text = read_text(path, most_bytes=MOST_BYTES)
+    if not text.strip():
+        raise ObjectImportError("it is empty", "export it once more")
+    if "<!DOCTYPE" in text:
+        raise ObjectImportError("it declares document types", "remove <!DOCTYPE ...>")
+    try:
+        return _Document(ElementTree.fromstring(text)).read()
+    except ElementTree.ParseError as error:
+        raise ObjectImportError(f"broken XML in line {error.position[0]}", _AGAIN) from error
+    except (ValueError, IndexError, KeyError, RecursionError, OverflowError) as error:
+        raise ObjectImportError(f"it is damaged ({type(error).__name__})", _AGAIN) from error
+
+
+def _name(element: Element) -> str:
+    return element.tag.rpartition("}")[2]
+
+
+def _children(element: Element, *names: str) -> Iterator[Element]:
+    return (child for child in element if _name(child) in names)
+
+
+def _child(element: Element, name: str) -> Element:
+    found = next(_children(element, name), None)
+    if found is None:
+        raise KeyError(name)
+    return found
+
+
+def _numbers(element: Element) -> FloatArray:
+    return np.array((element.text or "").split(), dtype=np.float64)
+
+
+@dataclass
+class _Document:
+    root: Element
+    by_id: dict[str, Element] = field(default_factory=dict)
+    nodes: int = 0
+
+    def read(self) -> Collada:
+        """All triangles of the scene."""
+        if _name(self.root) != "COLLADA":
+            raise ObjectImportError("it is no COLLADA file", _AGAIN)
+        self.by_id = {identifier: each for each in self.root.iter() if (identifier := each.get("id"))}
+        asset = next(_children(self.root, "asset"), None)
+        unit = None if asset is None else next(_children(asset, "unit"), None)
+        axis = None if asset is None else next(_children(asset, "up_axis"), None)
+        unit_m = 1.0 if unit is None else float(unit.get("meter", "1"))
+        if not (np.isfinite(unit_m) and unit_m > 0.0):
+            raise ObjectImportError(f"its unit is {unit_m:g} m", "correct <unit meter=...> in it")
+        up = _UP.get("Y_UP" if axis is None else (axis.text or "").strip(), "y")
+        scale = np.diag([unit_m, unit_m, unit_m, 1.0])
+        parts = [part for scene in self._scenes() for node in scene for part in self._node(node, scale, 0)]
+        return Collada(tuple(parts), up)
+
+    def _scenes(self) -> list[Element]:
+        """The scene that is shown, else all of them."""
+        named = [each.get("url", "") for each in self.root.iter() if _name(each) == "instance_visual_scene"]
+        shown = [self._found(url) for url in named]
+        return shown or [each for each in self.root.iter() if _name(each) == "visual_scene"]
+
+    def _found(self, url: str) -> Element:
+        return self.by_id[url.removeprefix("#")]
+
+    def _node(self, node: Element, X: FloatArray, depth: int) -> Iterator[tuple[FloatArray, Colour | None]]:
+        """The triangles of a node and those below it, moved by X."""
+        self.nodes += 1
+        if self.nodes > MOST_NODES or depth > MOST_DEPTH:
+            raise ObjectImportError("it has too many nodes", _AGAIN)
+        if _name(node) != "node":
+            return
+        for child in node:
+            X = X @ _transform(child)
+        for child in node:
+            if _name(child) == "instance_geometry":
+                colours = dict(self._colours(child))
+                for triangles, symbol in self._geometry(self._found(child.get("url", ""))):
+                    moved = triangles @ X[:3, :3].T + X[:3, 3]
+                    turned = np.linalg.det(X[:3, :3]) < 0.0
+                    yield (moved[:, ::-1] if turned else moved), colours.get(symbol)
+            elif _name(child) == "instance_node":
+                yield from self._node(self._found(child.get("url", "")), X, depth + 1)
+            elif _name(child) == "node":
+                yield from self._node(child, X, depth + 1)
+
+    def _geometry(self, geometry: Element) -> Iterator[tuple[FloatArray, str]]:
+        """Triangles (T, 3, 3) of a geometry, and the name of their material."""
+        for mesh in _children(geometry, "mesh"):
+            for group in _children(mesh, *_SEVERAL):
+                faces = _corners(group)
+                if len(faces):
+                    yield self._positions(group)[faces], group.get("material", "")
+
+    def _positions(self, group: Element) -> FloatArray:
+        """The points (N, 3) that a group of triangles counts."""
+        vertex = next(each for each in _children(group, "input") if each.get("semantic") == "VERTEX")
+        vertices = self._found(vertex.get("source", ""))
+        position = next(each for each in _children(vertices, "input") if each.get("semantic") == "POSITION")
+        source = self._found(position.get("source", ""))
+        accessor = next((each for each in source.iter() if _name(each) == "accessor"), None)
+        stride = 3 if accessor is None else int(accessor.get("stride", "3"))
+        return _numbers(_child(source, "float_array")).reshape(-1, stride)[:, :3]
+
+    def _colours(self, instance: Element) -> Iterator[tuple[str, Colour]]:
+        """The diffuse colours of the materials that are bound in an instance, by their names there."""
+        for bound in (each for each in instance.iter() if _name(each) == "instance_material"):
+            material = self.by_id.get(bound.get("target", "").removeprefix("#"))
+            effect = None if material is None else next(_children(material, "instance_effect"), None)
+            found = None if effect is None else self.by_id.get(effect.get("url", "").removeprefix("#"))
+            diffuse = None if found is None else next((each for each in found.iter() if _name(each) == "diffuse"), None)
+            colour = None if diffuse is None else next(_children(diffuse, "color"), None)
+            if colour is not None:
+                r, g, b = np.clip(_numbers(colour)[:3], 0.0, 1.0)
+                yield bound.get("symbol", ""), (float(r), float(g), float(b))
+
+
+def _corners(group: Element) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
+    """The points (T, 3) at the corners of a group's triangles; polygons become fans."""
+    inputs = list(_children(group, "input"))
+    stride = 1 + max(int(each.get("offset", "0")) for each in inputs)
+    offset = next(int(each.get("offset", "0")) for each in inputs if each.get("semantic") == "VERTEX")
+    counts = next(_children(group, "vcount"), None)
+    indices = [_numbers(each).astype(np.int64).reshape(-1, stride)[:, offset] for each in _children(group, "p")]
+    if _name(group) == "polygons":
+        sizes = [len(each) for each in indices]
+    elif counts is not None:
+        sizes = [int(size) for size in _numbers(counts)]
+    else:
+        sizes = [3] * (sum(map(len, indices)) // 3)
+    every, starts = np.concatenate([*indices, np.empty(0, np.int64)]), np.cumsum([0, *sizes])
+    if starts[-1] != len(every) or any(size < 3 for size in sizes):
+        raise ValueError("corners are missing")
+    fans = [
+        (every[start], every[start + step], every[start + step + 1])
+        for start, size in zip(starts, sizes, strict=False)
+        for step in range(1, size - 1)
+    ]
+    return np.array(fans, dtype=np.int64).reshape(-1, 3)
+
+
+def _transform(element: Element) -> FloatArray:
+    """The (4, 4) matrix of an element that moves a node; of any other the unit matrix."""
+    X, kind = np.eye(4), _name(element)
+    if kind == "matrix":
+        X = _numbers(element).reshape(4, 4)
+    elif kind == "translate":
+        X[:3, 3] = _numbers(element)
+    elif kind == "scale":
+        X[:3, :3] = np.diag(_numbers(element))
+    elif kind == "rotate":
+        x, y, z, degrees = _numbers(element)
+        axis, turn = np.array([x, y, z]) / max(float(np.hypot(np.hypot(x, y), z)), 1e-12), np.radians(degrees)
+        cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+        X[:3, :3] += np.sin(turn) * cross + (1.0 - np.cos(turn)) * (cross @ cross)
+    return X

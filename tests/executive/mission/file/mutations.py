@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import yaml
 
+from tests.hostile_values import DATA
+
 Path_ = tuple[str | int, ...]
 FREE = ("parameters", "knowledge", "with", "gives")  # below these any key may be right
 NAMES = ("to", "take", "object", "skill", "use", "world")
@@ -254,7 +256,7 @@ VALUES = (
     "$${room}", "beer", "tea", "dock", "rooms", "people in hall", "14:30", "2 s", "9" * 400, "x" * 3000, "\u0000",
     "\ud7ff", "🙂", "a\nb", "__import__('os')", "every_block.yaml", "../x.yaml", [], {}, [[]], [None], {"a": 1},
     ["dock"], [{}], [{"to": "hall"}], {"times": 2}, {"expression": "true"}, {"all": ["holding"]}, {"answer": "count"},
-    {1: 2}, {True: []},
+    {1: 2}, {True: []}, *(value for value in DATA if not isinstance(value, bytes)),
 )  # fmt: skip
 
 

@@ -1,0 +1,290 @@
+"""Files of every kind with random changes: each is refused in its file and line, or is read; never a traceback.
+
+    python -m tests.benchmarks.mutated_files --files 5000 --seed 1 [--kinds mission,map]
+
+Tells for each kind how many were refused and how many were read, how much memory came on top, and what was wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from executive.evaluation.scenario import load_evaluation
+from executive.language import load_parser
+from executive.mission.file.overrides import overridden
+from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
+from executive.mission.knowledge import load_knowledge
+from executive.mission.scenario_file import load_scenario, scenario_of
+from executive.mission.stack_file import load_stack
+from executive.testing.skill_test import load_skill_tests
+from executive.tree.compiler import compile_mission
+from executive.tree.registry import installed_skills
+from plant.models.builder.importing import ObjectImportError
+from plant.models.builder.importing.reading import read_patches
+from plant.models.builder.importing.solid import solid_of
+from plant.models.imported import read_imported
+from plant.worlds.world import WORLDS_FOLDER, load_world
+from skills.estimate.grid_map import load_grid_map
+from skills.files.errors import InputError
+from tests.executive.mission.file.mutations import mutated_files, some_bytes
+from tests.hostile_values import FILES
+
+ROOT = Path(__file__).parents[2]
+MOST_S, MOST_MB = 1.5, 300.0
+FLAT = WORLDS_FOLDER / "flat"
+CAMERAS = ("hand", "frontleft", "frontright", "left", "right", "back")
+MODEL = """<sdf version="1.9"><model name="walls"><link name="walls">
+<visual name="v"><geometry><mesh><uri>walls.obj</uri></mesh></geometry></visual>
+</link></model></sdf>
+"""
+DIRECTIVES = """directives:
+- add_model: {name: walls, file: package://world/walls.sdf}
+- add_weld: {parent: world, child: "walls::walls", X_PC: {translation: [0, 0, 0], rotation: !Rpy {deg: [0, 0, 9]}}}
+"""
+IMPORTED = """name: tool
+class: hammer
+mass_kg: 0.5
+size_m: [0.1, 0.2, 0.03]
+com_m: [0, 0, 0]
+inertia_kg_m2: [0.1, 0.1, 0.1, 0, 0, 0]
+collision_parts: 1
+triangles: 12
+round: false
+"""
+EVALUATION = """missions: [go_living_room.yaml]
+worlds: [flat, shop]
+seeds: 1-3
+time_limit: 10 min
+variations:
+  light: [dim]
+  clutter: [0, 2]
+  faults: [none, {name: blind, faults: ["camera.hand: dropout 5 s at 20 s"]}]
+"""
+MAP = "image: m.pgm\nresolution: 0.05\norigin: [0.0, 0.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+CORNERS = "0 0 0 1 0 0 0 1 0 0 0 1"
+COLLADA = f"""<COLLADA><asset><unit meter="0.01"/><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="12">{CORNERS}</float_array></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 1 2 3 2 0 3</p></triangles>
+</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/>
+</node></visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>
+"""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Good files of a kind as they are called, where a changed one is put, and what reads it.
+
+    Those that are `raw` are changed by bytes, the others as YAML as well.
+    """
+
+    good: Mapping[str, bytes]
+    target: str
+    read: Callable[[Path], object]
+    raw: bool = False
+
+
+def missions() -> Callable[[Path], None]:
+    """What loads and compiles a mission; the world, the skills and the parser are loaded once."""
+    flat, skills, parser = load_knowledge(FLAT / "knowledge.yaml"), installed_skills(), load_parser()
+
+    def compile_path(path: Path) -> None:
+        loaded = load_mission(path)
+        knowledge = overridden(loaded, flat)
+        for part in [for_robot(loaded, name, name) for name in loaded.parts] if loaded.parts else [loaded]:
+            mission = mission_from_file(part, parser=parser, knowledge=knowledge)
+            compile_mission(mission, knowledge=knowledge, registry=skills)
+
+    return compile_path
+
+
+def scenarios() -> Callable[[Path], None]:
+    """What reads a scenario of the flat."""
+    knowledge, rules = load_knowledge(FLAT / "knowledge.yaml"), load_world("flat").seed_rules
+    objects = {rule.name: rule.model for rule in rules.objects}
+    people = {rule.name: rule.route is not None for rule in rules.people}
+
+    def read(path: Path) -> None:
+        file, source = load_scenario(path)
+        scenario_of(file, source, knowledge, cameras=CAMERAS, objects=objects, people=people)
+
+    return read
+
+
+def read_mesh(path: Path) -> None:
+    """Read a mesh file as far as its solid. Raises InputError, which names the file."""
+    try:
+        patches, _ = read_patches(path)
+        solid_of(np.concatenate([patch.triangles for patch in patches]))
+    except ObjectImportError as error:
+        raise InputError(error.message, hint=error.hint, file=path) from error
+
+
+def contents(*files: Path) -> dict[str, bytes]:
+    """Files by their names."""
+    return {file.name: file.read_bytes() for file in files}
+
+
+def pictures() -> dict[str, bytes]:
+    """A small map in two forms."""
+    grey = np.full((12, 16), 254, np.uint8)
+    grey[0] = 0
+    pgm, png = (cv2.imencode(ending, grey)[1].tobytes() for ending in (".pgm", ".png"))
+    return {"pgm": pgm, "png": png, "p2": b"P2\n# c\n16 12\n255\n" + b" ".join(b"%d" % value for value in grey.flat)}
+
+
+def kinds(folder: Path) -> dict[str, Kind]:
+    """All kinds; the files that go with a changed one are put into the folder."""
+    home = folder / "home"
+    home.mkdir()
+    for name in ("knowledge.yaml", "objects.yaml"):
+        shutil.copy(FLAT / name, home)
+    (home / "world.dmd.yaml").write_text(DIRECTIVES)
+    (home / "walls.sdf").write_text(MODEL)
+    (home / "walls.obj").write_text(MESH)
+    for name, content in {"m.pgm": pictures()["pgm"], "m.yaml": MAP.encode(), "tool.sdf": MODEL.encode()}.items():
+        (folder / name).write_bytes(content)
+    good = [*sorted((ROOT / "missions").glob("*.yaml")), ROOT / "tests/executive/mission/file/every_block.yaml"]
+    for each in good:
+        shutil.copy(each, folder)
+
+    def beside(path: Path) -> Path:
+        return folder / path.name
+
+    skills = installed_skills()
+
+    def world(_: Path) -> object:
+        return load_world(home)
+
+    return {
+        "mission": Kind(contents(*good), "mission.yaml", missions()),
+        "knowledge": Kind(contents(FLAT / "knowledge.yaml"), "knowledge.yaml", load_knowledge),
+        "world": Kind(contents(FLAT / "knowledge.yaml"), "home/knowledge.yaml", world),
+        "objects": Kind(contents(FLAT / "objects.yaml"), "home/objects.yaml", world),
+        "directives": Kind({"d": DIRECTIVES.encode()}, "home/world.dmd.yaml", world),
+        "model": Kind({"m": MODEL.encode()}, "home/walls.sdf", world, raw=True),
+        "map": Kind({"m": MAP.encode()}, "map.yaml", load_grid_map),
+        "picture": Kind(pictures(), "m.pgm", lambda _: load_grid_map(folder / "m.yaml"), raw=True),
+        "stack": Kind(contents(*sorted((ROOT / "skills").glob("*_stack.yaml"))), "stack.yaml", load_stack),
+        "scenario": Kind(contents(*(ROOT / "missions/scenarios").glob("*.yaml")), "scenario.yaml", scenarios()),
+        "evaluation": Kind(
+            {"e": EVALUATION.encode()},
+            "evaluation.yaml",
+            lambda path: load_evaluation(path, mission_file=beside, stack_file=beside),
+        ),
+        "skill test": Kind(
+            contents(*(ROOT / "tests/skills").rglob("*.skilltest.yaml")),
+            "test.yaml",
+            lambda path: load_skill_tests(path, skills),
+        ),
+        "object": Kind({"o": IMPORTED.encode()}, "object.yaml", lambda path: read_imported(path.parent)),
+        "obj": Kind({"m": MESH.encode()}, "m.obj", read_mesh, raw=True),
+        "dae": Kind({"m": COLLADA.encode()}, "m.dae", read_mesh, raw=True),
+    }
+
+
+def changed(kind: Kind, count: int, seed: int, folder: Path) -> Sequence[tuple[str, bytes]]:
+    """So many changed files of a kind; every tenth is none of that kind at all."""
+    good = [folder / f"good-{number}" for number in range(len(kind.good))]
+    for file, content in zip(good, kind.good.values(), strict=True):
+        file.write_bytes(content)
+    rng = np.random.default_rng(seed)
+    hostile = [(f"hostile-{number}", FILES[(seed + number) % len(FILES)]) for number in range(-(-count // 10))]
+    if not kind.raw:
+        return [*hostile, *mutated_files(good, count - len(hostile), seed)]
+    texts = list(kind.good.values())
+    drawn = (texts[int(rng.integers(len(texts)))] for _ in range(count - len(hostile)))
+    return [*hostile, *((f"bytes-{number}", some_bytes(text, rng)) for number, text in enumerate(drawn))]
+
+
+def fault(path: Path, read: Callable[[Path], object], most_s: float = MOST_S) -> tuple[str, str]:
+    """How a file ends ("read", "refused"), and what is wrong with that."""
+    begun = time.process_time()
+    try:
+        read(path)
+        how, wrong = "read", ""
+    except InputError as error:
+        how, wrong = "refused", next(filter(None, map(_told_badly, (error, *error.others))), "")
+    except Exception:
+        how, wrong = "traceback", traceback.format_exc()[-1500:]
+    spent_s = time.process_time() - begun
+    return how, wrong or (f"it takes {spent_s:.1f} s" if spent_s > most_s else "")
+
+
+def _told_badly(error: InputError) -> str:
+    """What is wrong with an error."""
+    if error.file is None or not error.message:
+        return f"no place: {error}"
+    if error.line is None and error.file.suffix in (".yaml", ".sdf"):
+        return f"no line: {error}"
+    lines = error.file.read_bytes().count(b"\n") + 1 if error.file.is_file() else 0
+    if error.line is not None and not 1 <= error.line <= lines:
+        return f"line {error.line} of {lines}: {error}"
+    return f"too long: {str(error)[:300]}" if len(str(error)) > 2000 else ""
+
+
+def benchmark(files: int, seed: int, chosen: Sequence[str], tell: Callable[[str], None], most_s: float = MOST_S) -> int:
+    """Try so many; the number of those with something wrong."""
+    bad, begun = 0, time.perf_counter()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        every = kinds(folder)
+        start_mb = _memory_mb()
+        for number, (title, kind) in enumerate(every.items()):
+            if chosen and title not in chosen:
+                continue
+            target, found = folder / kind.target, Counter[str]()
+            before = target.read_bytes() if target.exists() else None
+            for each, content in kind.good.items():
+                target.write_bytes(content)
+                if (ends := fault(target, kind.read, most_s)) != ("read", ""):
+                    tell(f"{title}: the good file {each}: {ends}")
+                    bad += 1
+            for each, content in changed(kind, -(-files // len(chosen or every)), seed + number, folder):
+                target.write_bytes(content)
+                how, wrong = fault(target, kind.read, most_s)
+                found[how] += 1
+                if wrong:
+                    bad += 1
+                    tell(f"{title}: {each}: {wrong}")
+            if before is not None:
+                target.write_bytes(before)
+            tell(f"{title}: {dict(found)}")
+    more_mb = _memory_mb() - start_mb
+    bad += more_mb > MOST_MB
+    tell(f"{files} files in {time.perf_counter() - begun:.0f} s: {bad} with a defect, {more_mb:.0f} MB more")
+    return bad
+
+
+def _memory_mb() -> float:
+    """The memory in use, where the system tells."""
+    pages = Path("/proc/self/statm")
+    return int(pages.read_text().split()[1]) * 4096 / 1e6 if pages.exists() else 0.0
+
+
+def main() -> int:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--files", type=int, default=5000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kinds", type=lambda text: text.split(","), default=[])
+    options = parser.parse_args()
+    return int(benchmark(options.files, options.seed, options.kinds, lambda text: print(text, flush=True)) > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -111,6 +111,8 @@ class _Building:
         if points is not None:
             there = (compose(world.start, Pose2D(x, y, 0.0)) for x, y in points)
             route = [(pose.x_m, pose.y_m) for pose in there]
+        with _writing(out):
+            out.mkdir(parents=True, exist_ok=True)
         lease = self._robot.acquire_lease("errand map")
         self._survey: Survey = Survey(self._robot, lease, mapper, home=world.start, route=route)
         self._first = len(mapper.keyframes)
@@ -227,8 +229,6 @@ def _mapper(world: World, out: Path) -> Mapper:
         gtsam_module()
     except MappingExtraMissingError as error:
         raise InputError(str(error), hint="pip install 'spot-errand[mapping]'") from error
-    with _writing(out):
-        out.mkdir(parents=True, exist_ok=True)
     if not (out / GRAPH_FILE).exists():
         return Mapper(world.start)
     return load_mapper(out)

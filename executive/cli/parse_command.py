@@ -16,6 +16,7 @@ from executive.language.explain_views import arcs_svg, explanation_lines
 from executive.mission.file.model import DEFAULT_WORLD
 from executive.mission.written import written
 from skills.files.errors import InputError
+from skills.files.outside import read_text
 
 __all__ = ["parse"]
 
@@ -97,7 +98,4 @@ def _draw(meaning: Understanding, file: Path) -> None:
 
 def _lines_of(file: Path | None) -> list[str]:
     assert file is not None
-    try:
-        return file.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read it ({error})", hint="name a text file in UTF-8", file=file) from error
+    return read_text(file, most_bytes=20_000_000, hint="name a text file in UTF-8").splitlines()

@@ -23,6 +23,7 @@ from executive.cli.score_report import scores_json, show_scores
 from executive.cli.worst_sheet import Shown, contact_sheet
 from skills.detection import Detection
 from skills.files.errors import InputError
+from skills.files.outside import read_text
 from skills.perception.detector.augmentation import AugmentedDetector
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector
 from skills.perception.detector.upright import turned, turned_back
@@ -37,6 +38,7 @@ LEAST_SCORE: Final = 0.01
 TIMED_PICTURES: Final = 200
 TOGETHER: Final = 8
 WORST: Final = 20
+MOST_BYTES: Final = 2_000_000_000
 
 Found = tuple[Detection, ...]
 
@@ -107,12 +109,8 @@ def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, v
 def _document(data: Path) -> Any:
     """The JSON value of a file. Raises InputError, or ValueError for what is no JSON."""
     try:
-        return json.loads(data.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"cannot read it ({error.strerror})", hint="name a COCO file with --data", file=data
-        ) from error
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        return json.loads(read_text(data, most_bytes=MOST_BYTES, hint="name a COCO file with --data"))
+    except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f"it is no JSON ({error})") from error
 
 

@@ -21,6 +21,7 @@ from executive.cli.worlds import knowledge_of, open_world
 from plant.worlds.world import WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.files.errors import InputError
+from skills.files.outside import read_text
 from skills.files.schema_errors import first_error
 from skills.quantities import Angle, Coordinate, Opening, Quantity
 from skills.robot import Picture, Pose2D
@@ -125,12 +126,9 @@ def _grey(grid: GridMap) -> Picture:
 
 def _cylinders(path: Path) -> _Cylinders:
     """Raises InputError: it is no such file."""
+    text = read_text(path, most_bytes=MAX_BYTES, hint="check the path")
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"it is larger than {MAX_BYTES} bytes", hint="give a smaller one", file=path)
-        return TypeAdapter(_Cylinders).validate_python(json.loads(path.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", hint="check the path", file=path) from error
+        return TypeAdapter(_Cylinders).validate_python(json.loads(text))
     except json.JSONDecodeError as error:
         raise InputError(f"damaged JSON, {error.msg}", hint="correct it there", file=path, line=error.lineno) from error
     except ValidationError as error:

@@ -15,7 +15,9 @@ from zstandard import ZstdError
 
 from executive.record.schemas import TOPIC
 from skills.files.errors import InputError
+from skills.files.outside import plain_file
 
+MOST_BYTES = 100_000_000_000
 _DAMAGE = (McapError, struct.error, ZstdError, ValueError)
 
 
@@ -33,6 +35,7 @@ def read_events(path: Path) -> tuple[Event, ...]:
 
     Raises InputError: there is no such file, or it is no event log.
     """
+    plain_file(path, most_bytes=MOST_BYTES, hint="name a log that exists")
     try:
         with path.open("rb") as file:
             return tuple(_events(NonSeekingReader(file)))

@@ -10,6 +10,7 @@ from typing import Final
 
 from executive.mission.knowledge import Knowledge
 from skills.files.errors import InputError
+from skills.files.outside import read_text
 
 __all__ = ["Vocabulary", "of_world", "read_vocabulary"]
 
@@ -68,10 +69,7 @@ def read_vocabulary(file: Path, robot_name: str | None) -> Vocabulary:
     Raises:
         InputError: it cannot be read, is no text, or holds more than 5000 names or one of more than 80 letters.
     """
-    try:
-        lines = [" ".join(line.split()) for line in file.read_text(encoding="utf-8-sig").splitlines()]
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read it ({error})", hint="name a text file in UTF-8", file=file) from error
+    lines = [" ".join(line.split()) for line in read_text(file, hint="name a text file in UTF-8").splitlines()]
     for number, line in enumerate(lines, 1):
         if len(line) > _MOST_LETTERS:
             raise InputError("the name is too long", hint="write one name on each line", file=file, line=number)

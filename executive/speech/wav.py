@@ -12,6 +12,7 @@ import numpy as np
 
 from executive.speech.sound import RATE_HZ, Samples
 from skills.files.errors import InputError
+from skills.files.outside import plain_file
 
 if TYPE_CHECKING:
     from soundfile import SoundFile
@@ -21,6 +22,7 @@ __all__ = ["read_wav"]
 _OPEN_END: Final = 0x7FFF_F000
 """From this size on the head says that its writer did not know it (recorders that write into a pipe)."""
 _HEAD_BYTES: Final = 44
+MOST_BYTES: Final = 8_000_000_000
 _RATES_HZ: Final = range(4_000, 384_001)
 _SAMPLE_BYTES: Final = {"PCM_U8": 1, "PCM_16": 2, "PCM_24": 3, "PCM_32": 4, "FLOAT": 4, "DOUBLE": 8}
 _CONTEXT: Final = 16
@@ -39,6 +41,7 @@ def read_wav(file: Path) -> Iterator[Samples]:
     """
     from soundfile import LibsndfileError, SoundFile
 
+    plain_file(file, most_bytes=MOST_BYTES, hint="name a wav file")
     try:
         with file.open("rb") as stream:
             head = stream.read(_HEAD_BYTES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 from collections.abc import Iterator
@@ -126,11 +127,16 @@ def _too_large(file: Path, pixels: str, most_pixels: int) -> InputError:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """OpenCV keeps its own words on damaged files to itself."""
+    """OpenCV and the libraries below it, which write to the process's stderr, keep their words on damaged files."""
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
+        os.dup2(nowhere, 2)
         yield
     finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.close(nowhere)
         cv2.utils.logging.setLogLevel(level)
 
 

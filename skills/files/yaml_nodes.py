@@ -96,6 +96,8 @@ class _Reading:
         if node.tag in _NUMBERS and len(node.value) > MOST_DIGITS:
             what = f"a number of {len(node.value)} digits (at most {MOST_DIGITS} are read)"
             raise self._error(node, what, "write a shorter one")
+        if not node.value.isascii() and any("\ud800" <= letter <= "\udfff" for letter in node.value):
+            raise self._error(node, "half a letter (a lone surrogate) stands in it", "write the whole letter")
         if node.tag in self.tags:
             return node.value
         try:

@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from skills.files.errors import InputError
 from skills.files.outside import plain_file, read_text
+from skills.files.schema_errors import first_error
 from skills.mapping.keyframe import Keyframe
 from skills.mapping.mapper import Mapper, MapperOptions, Submap
 from skills.mapping.occupancy import BANDS_M, LayeredOccupancy
@@ -214,9 +215,8 @@ def load_mapper(folder: Path, options: MapperOptions | None = None) -> Mapper:
     try:
         told = _Graph.model_validate_json(read_text(graph_file, most_bytes=MOST_GRAPH_BYTES, hint=_AGAIN))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        what = f"it is no pose graph ({where}{': ' if where else ''}{first['msg'].removeprefix('Value error, ')})"
+        where, why, _ = first_error(error.errors())
+        what = f"it is no pose graph ({': '.join(filter(None, ('.'.join(map(str, where)), why)))})"
         raise InputError(what, hint=_AGAIN, file=graph_file) from error
     plain_file(keyframes_file, most_bytes=MOST_KEYFRAMES_BYTES, hint=_AGAIN)
     try:

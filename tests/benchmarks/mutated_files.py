@@ -42,7 +42,7 @@ from tests.executive.mission.file.mutations import mutated_files, some_bytes
 from tests.hostile_values import FILES
 
 ROOT = Path(__file__).parents[2]
-MOST_S, MOST_MB = 1.5, 300.0
+MOST_S, MOST_MB = 3.0, 300.0
 FLAT = WORLDS_FOLDER / "flat"
 CAMERAS = ("hand", "frontleft", "frontright", "left", "right", "back")
 MODEL = """<sdf version="1.9"><model name="walls"><link name="walls">

@@ -16,10 +16,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from skills.files.errors import InputError
+from skills.files.outside import read_bytes
+
 if TYPE_CHECKING:
     import onnxruntime
 
 QUIET: Final = 4
+MOST_BYTES: Final = 2_000_000_000
 _SEAL_KEY: Final = b"sha256"
 _SEAL_HEAD: Final = b"\x72\x4a\x0a\x06" + _SEAL_KEY + b"\x12\x40"
 _SEAL_LENGTH: Final = len(_SEAL_HEAD) + 64
@@ -104,11 +108,10 @@ class _Reader:
     def content(self) -> bytes:
         """The file's bytes, whose seal fits."""
         try:
-            content = self.file.read_bytes()
-        except FileNotFoundError as error:
-            raise self.error("there is no such model of the detector") from error
-        except OSError as error:
-            raise self.error(f"cannot read it ({error.strerror})") from error
+            content = read_bytes(self.file, most_bytes=MOST_BYTES)
+        except InputError as error:
+            missing = "there is no such model of the detector"
+            raise self.error(error.message if self.file.exists() else missing) from error
         body, seal = content[:-_SEAL_LENGTH], content[-_SEAL_LENGTH:]
         if seal.startswith(_SEAL_HEAD) and seal != _seal(body):
             raise self.error("the model of the detector is damaged (it has another digest than it tells)")

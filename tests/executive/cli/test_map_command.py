@@ -117,4 +117,4 @@ def test_a_damaged_map_is_refused(room, tmp_path):
     (tmp_path / "pose_graph.json").write_text("{}")
     ran = invoke("map", "build", "--world", room, "--out", tmp_path)
     assert ran.exit_code == 2
-    assert "no map that can be continued" in ran.stderr
+    assert "it is no pose graph" in ran.stderr

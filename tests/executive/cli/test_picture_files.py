@@ -69,11 +69,12 @@ def test_what_is_cut_off_is_damaged(tmp_path, ending):
     assert refused(file) == "the picture is damaged or cut off"
 
 
-def test_a_wrong_byte_is_damage(tmp_path):
+def test_a_wrong_byte_is_damage(tmp_path, capfd):
     content = bytearray(written(tmp_path / "a.png", noise(100, 100, 3)).read_bytes())
     content[len(content) // 2] ^= 255
     (tmp_path / "a.png").write_bytes(content)
     assert refused(tmp_path / "a.png") == "the picture is damaged or cut off"
+    assert capfd.readouterr().err == ""
 
 
 @pytest.mark.parametrize("name", ["a.txt", "a.png"])

@@ -204,7 +204,7 @@ def test_a_missing_file_and_a_binary_one_are_refused(score, tmp_path):
     for name in ("none.json", "data.json"):
         result = score("--data", tmp_path / name)
         assert result.exit_code == 2
-        assert f"{name}: " in result.stderr
+        assert f"{name}:" in result.stderr
 
 
 def test_a_damaged_picture_is_named(score, data):

@@ -37,7 +37,7 @@ def test_a_file_of_names_has_one_on_each_line(tmp_path):
 @pytest.mark.parametrize(
     ("content", "told"),
     [
-        (b"\xff\xfe\x00", "cannot read"),
+        (b"\xff\xfe\x00", "UTF-16"),
         (b"x" * 200, "too long"),
         (b"\n".join(b"n%d" % n for n in range(6000)), "too many"),
     ],
@@ -51,5 +51,5 @@ def test_a_file_that_holds_no_names_is_told(tmp_path, content, told):
 
 
 def test_a_missing_file_of_names_is_told(tmp_path):
-    with pytest.raises(InputError, match="cannot read"):
+    with pytest.raises(InputError, match="no such file"):
         read_vocabulary(tmp_path / "none.txt", None)

@@ -84,11 +84,11 @@ def test_an_empty_file_is_told(tmp_path):
 
 
 def test_a_missing_file_is_told(tmp_path):
-    assert "cannot read it" in _refusal(tmp_path / "a.wav")
+    assert "no such file" in _refusal(tmp_path / "a.wav")
 
 
 def test_a_folder_is_told(tmp_path):
-    assert "cannot read it" in _refusal(tmp_path)
+    assert "it is a folder" in _refusal(tmp_path)
 
 
 @pytest.mark.parametrize("kept", [13, 20, 30, 40])

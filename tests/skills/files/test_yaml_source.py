@@ -157,6 +157,7 @@ def test_many_merges_of_a_large_mapping_are_refused(tmp_path):
         ("a: 1\nb: !!int x\n", "put it in quotes", 2),
         ("a: 1\n---\nb: 2\n", "more than one document", 2),
         ("a: *b\n", "undefined alias", 1),
+        ('a: 1\nb: "\\ud800"\n', "lone surrogate", 2),
         ("a: 1\n".encode("utf-16"), "UTF-16", 1),
         (b"a: 1\nb: caf\xe9\n", "UTF-8", 2),
     ],

@@ -69,6 +69,13 @@ def _child(element: Element, name: str) -> Element:
     return found
 
 
+def _input(element: Element, semantic: str) -> Element:
+    found = next((each for each in _children(element, "input") if each.get("semantic") == semantic), None)
+    if found is None:
+        raise KeyError(semantic)
+    return found
+
+
 def _numbers(element: Element) -> FloatArray:
     return np.array((element.text or "").split(), dtype=np.float64)
 
@@ -135,10 +142,8 @@ class _Document:
 
     def _positions(self, group: Element) -> FloatArray:
         """The points (N, 3) that a group of triangles counts."""
-        vertex = next(each for each in _children(group, "input") if each.get("semantic") == "VERTEX")
-        vertices = self._found(vertex.get("source", ""))
-        position = next(each for each in _children(vertices, "input") if each.get("semantic") == "POSITION")
-        source = self._found(position.get("source", ""))
+        vertices = self._found(_input(group, "VERTEX").get("source", ""))
+        source = self._found(_input(vertices, "POSITION").get("source", ""))
         accessor = next((each for each in source.iter() if _name(each) == "accessor"), None)
         stride = 3 if accessor is None else int(accessor.get("stride", "3"))
         return _numbers(_child(source, "float_array")).reshape(-1, stride)[:, :3]
@@ -160,7 +165,7 @@ def _corners(group: Element) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
     """The points (T, 3) at the corners of a group's triangles; polygons become fans."""
     inputs = list(_children(group, "input"))
     stride = 1 + max(int(each.get("offset", "0")) for each in inputs)
-    offset = next(int(each.get("offset", "0")) for each in inputs if each.get("semantic") == "VERTEX")
+    offset = int(_input(group, "VERTEX").get("offset", "0"))
     counts = next(_children(group, "vcount"), None)
     indices = [_numbers(each).astype(np.int64).reshape(-1, stride)[:, offset] for each in _children(group, "p")]
     if _name(group) == "polygons":

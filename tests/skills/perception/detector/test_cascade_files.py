@@ -53,7 +53,7 @@ def test_a_missing_file_is_named(tmp_path):
 
 
 def test_a_folder_is_no_file(tmp_path):
-    assert "cannot read it" in refused(tmp_path)
+    assert "it is a folder" in refused(tmp_path)
 
 
 def test_another_version_is_named(tmp_path):

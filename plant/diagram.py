@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -167,11 +168,16 @@ def build_diagram(
 def try_geometry(directives: Path | None, models: Iterable[Path]) -> None:
     """Build a world's geometry and some models, and throw them away. Raises InputError: Drake cannot use a file."""
     plant, _ = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
-    if directives is not None:
-        add_scenery(plant, directives, parser_of)
-    parser = parser_of(plant)
-    for model in models:
-        add_model(parser, model)
+    parser, logger = parser_of(plant), logging.getLogger("drake")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL)  # what it would log is in the error
+    try:
+        if directives is not None:
+            add_scenery(plant, directives, parser_of)
+        for model in models:
+            add_model(parser, model)
+    finally:
+        logger.setLevel(level)
 
 
 def parser_of(plant: MultibodyPlant) -> Parser:

@@ -25,7 +25,6 @@ from executive.tree.estimate import Estimate, RoutePlanner
 from executive.tree.node_view import node_view
 from executive.view.collapse import folded_to
 from executive.view.text import to_rich
-from plant.worlds.world import World
 from skills.files.errors import InputError
 
 SHOWN_NODES: Final = 40
@@ -60,7 +59,6 @@ class Checker:
     def __init__(self, like: Request | None = None) -> None:
         self._like = like or Request()
         self._routes: dict[tuple[Path, str, Path | None], RoutePlanner] = {}
-        self._tried: set[tuple[Path, tuple[str, ...]]] = set()
 
     def check(self, file: Path) -> CheckedFile:
         """Check one file; raises nothing for what stands in it."""
@@ -68,7 +66,7 @@ class Checker:
         try:
             prepared = prepare(replace(self._like, file=file), ask=None)
             trees = tuple(each.tree for each in prepared.all)
-            self._try_world(prepared.world)
+            refuse_unusable(prepared.world)
             checked = {each.mission.robot_name: check_prepared(each, self._planner(each)) for each in prepared.all}
         except InputError as error:
             return CheckedFile(file, _placed(file, (error, *error.others)), trees)
@@ -79,13 +77,6 @@ class Checker:
         warnings = tuple(warning for each in checked.values() for warning in each.warnings)
         estimates = {name: each.estimate for name, each in checked.items()}
         return CheckedFile(file, _placed(file, errors), trees, _of_all(prepared, estimates), warnings)
-
-    def _try_world(self, world: World) -> None:
-        """Let the simulation read a world's geometry, once for each world. Raises InputError."""
-        key = (world.folder, tuple(world.imports))
-        if key not in self._tried:
-            refuse_unusable(world)
-            self._tried.add(key)
 
     def _planner(self, prepared: Prepared) -> RoutePlanner:
         world, stack = prepared.world, prepared.stack_file

@@ -10,6 +10,7 @@ from pathlib import Path
 from executive.cli.requests import Prepared
 from executive.cli.route_cache import route_cache_of
 from executive.cli.starts import DEFAULT_KIND
+from executive.cli.worlds import refuse_unusable
 from executive.mission.stack_file import load_stack
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
 from executive.tree.estimate import Route, RoutePlanner, load_estimates
@@ -88,6 +89,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
 
 def refuse_impossible(prepared: Prepared) -> None:
     """Raise InputError for all that `errand check` finds, before anything moves."""
+    refuse_unusable(prepared.world)
     problems = Problems()
     for error in (error for each in prepared.all for error in check_prepared(each).errors):
         problems.add(error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,10 +36,16 @@ def refuse_unusable(world: World) -> None:
     is_ours = world.folder.is_relative_to(WORLDS_FOLDER)
     if is_ours and not world.imports:
         return
+    models = tuple(each.folder / f"{name}.sdf" for name, each in world.imports.items())
+    _try(None if is_ours else world.directives_path, models)
+
+
+@cache
+def _try(directives: Path | None, models: tuple[Path, ...]) -> None:
+    """Let the simulation read files that are good, once in a process."""
     from plant.diagram import try_geometry
 
-    models = [each.folder / f"{name}.sdf" for name, each in world.imports.items()]
-    try_geometry(None if is_ours else world.directives_path, models)
+    try_geometry(directives, models)
 
 
 def refuse_blocked(world: World, pose: Pose2D) -> None:

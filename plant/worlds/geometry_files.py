@@ -36,6 +36,7 @@ MOST_MODEL_BYTES: Final = 20_000_000
 MOST_FILES: Final = 2_000
 MOST_XML_DEPTH: Final = 60
 MOST_CHAIN: Final = 20
+_BESIDE: Final = "put it beside the file that names it"
 _PACKAGES: Final = (OWN_PACKAGE, "errand", "drake")
 _IN_PACKAGE: Final = re.compile(r"(?:package|model)://([^/]*)/?(.*)", re.DOTALL)
 _NAMING: Final = frozenset({"uri", "filename", "albedo_map", "normal_map", "diffuse_map"})
@@ -92,7 +93,7 @@ class _Walk:
             return
         named = _NAMED.get(kind)
         if named is None:
-            plain_file(file, most_bytes=MOST_MESH_BYTES)
+            plain_file(file, most_bytes=MOST_MESH_BYTES, hint=_BESIDE)
             return
         for line, name in named(file):
             self._follow(file, line, name, (*chain, file.resolve()), False)
@@ -152,7 +153,7 @@ def _is_ours(path: Path) -> bool:
 
 def _named_in_xml(file: Path) -> Iterator[tuple[int, str]]:
     """Lines and names of the files that an SDF, URDF or MJCF names."""
-    text = read_text(file, most_bytes=MOST_MODEL_BYTES)
+    text = read_text(file, most_bytes=MOST_MODEL_BYTES, hint=_BESIDE)
     found, open_elements, letters = list[tuple[int, str]](), list[str](), list[str]()
     parser = expat.ParserCreate()
 
@@ -186,13 +187,13 @@ def _named_in_xml(file: Path) -> Iterator[tuple[int, str]]:
 
 
 def _named_in_obj(file: Path) -> Iterator[tuple[None, str]]:
-    plain_file(file, most_bytes=MOST_MESH_BYTES)
+    plain_file(file, most_bytes=MOST_MESH_BYTES, hint=_BESIDE)
     for match in _LIBRARY.finditer(file.read_bytes()):
         yield None, match[1].decode("utf-8", "replace").strip()
 
 
 def _named_in_mtl(file: Path) -> Iterator[tuple[int, str]]:
-    text = read_text(file)
+    text = read_text(file, hint=_BESIDE)
     for match in _MAP.finditer(text):
         yield text.count("\n", 0, match.start(1)) + 1, match[1]
 

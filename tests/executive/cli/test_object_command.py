@@ -77,7 +77,7 @@ def test_scripts_are_told_the_same_twice(mesh, tmp_path):
         (("--mass", "nan"), "should be a finite number"),
         (("--mass", "300"), "it reads 300 now; write 0.3 for 300 g"),
         (("--scale", 0), "--scale: should be above 0 and at most 1000"),
-        (("--scale", 1000), "drill.stl: it is 200 x 60 x 40 m large; if its unit is millimetres, give --scale 1"),
+        (("--scale", 1000), "drill.stl: it is 200 x 60 x 40 m large; give --scale 1 if its unit is millimetres"),
         (("--name", "my drill"), "the name 'my drill' is no identifier"),
         (("--name", "wrench"), "the name 'wrench' is taken by a class of objects"),
         (("--class", "drill"), "there is no class 'drill'; known are beer, coke"),
@@ -100,7 +100,11 @@ def test_what_cannot_be_is_one_line_and_status_2(mesh, tmp_path, arguments, why)
     ("name", "text", "why"),
     [
         ("none.stl", None, "none.stl: there is no such file; check the path"),
-        ("notes.txt", "hello", "'.txt' is the ending of no mesh format; give one of glb, gltf, obj, off, ply, stl"),
+        (
+            "notes.txt",
+            "hello",
+            "'.txt' is the ending of no mesh format; give one of dae, glb, gltf, obj",
+        ),
         ("notes", "hello", "it has no ending"),
         ("notes.stl", "hello", "notes.stl: it is no mesh: there are no triangles in it"),
         ("notes.obj", "hello", "notes.obj: it is no mesh: there are no triangles in it"),
@@ -109,7 +113,7 @@ def test_what_cannot_be_is_one_line_and_status_2(mesh, tmp_path, arguments, why)
         (
             "parts.gltf",
             '{"asset": {"version": "2.0"}, "buffers": [{"uri": "no.bin", "byteLength": 1}], "scenes": [{}]}',
-            "parts.gltf: a file that it names is missing; put it beside the mesh",
+            "parts.gltf: no.bin: there is no such file; put it beside the file that names it",
         ),
         ("empty.obj", "", "empty.obj: it is no mesh: there are no triangles in it"),
         ("empty.ply", "", "empty.ply: it cannot be read as a mesh"),

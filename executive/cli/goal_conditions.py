@@ -78,7 +78,7 @@ def _unseen(tree: CompiledTree, result: RobotResult) -> Sequence[str]:
     """The names of skills that were done on their own and leave nothing to judge."""
     done = {one.path_id for one in result.executions if one.done}
     names = {node.path_id: node.name for node in tree.root.walk() if not is_speech(node)}
-    paths = [_node_of(part) for part in tree.parts if part.goal is None]
+    paths = [_node_of(part) for part in tree.parts if part.goal is None and part.skill is not None]
     return list(dict.fromkeys(names[path] for path in paths if path in done and path in names))
 
 

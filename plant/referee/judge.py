@@ -10,45 +10,12 @@ import numpy as np
 from plant.referee.contacts import Collision
 from plant.referee.goal import GoalCondition, GoalKind, Region, Verdict, When
 from plant.referee.object_history import SETTLE_S, Lift, ObjectHistory
+from plant.referee.truth import ON_TRAY_GAP_S, TimedPath, Truth
 from skills.robot import FloatArray
 
 NEAR_PERSON_M = 2.0
 NAMED_REGIONS = 3
 PERSON = "person"
-ON_TRAY_GAP_S = 0.5
-
-
-@dataclass(frozen=True)
-class TimedPath:
-    """Where a robot or a person went: points (m, world) with the times (s) at which they were reached, (N, 4)."""
-
-    points: FloatArray
-
-    def at(self, time_s: float) -> FloatArray:
-        """The position at a time, (3,)."""
-        return self.points[self._index(time_s), :3]
-
-    def between(self, from_s: float, until_s: float) -> FloatArray:
-        """The positions from just before a time to another, (N, 3)."""
-        first = max(0, int(np.searchsorted(self.points[:, 3], from_s)) - 1)
-        return self.points[first : self._index(until_s) + 1, :3]
-
-    def _index(self, time_s: float) -> int:
-        return max(0, int(np.searchsorted(self.points[:, 3], time_s, side="right")) - 1)
-
-
-@dataclass(frozen=True)
-class Truth:
-    """The record up to `now_s`: histories of the objects, and the paths of robots and people by name.
-
-    `given` has for each object and person the times (s) from and to which the object rested on the person's tray.
-    """
-
-    now_s: float
-    histories: tuple[ObjectHistory, ...]
-    robots: Mapping[str, TimedPath]
-    persons: Mapping[str, TimedPath]
-    given: Mapping[tuple[str, str], Sequence[tuple[float, float]]]
 
 
 @dataclass(frozen=True)

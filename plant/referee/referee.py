@@ -17,8 +17,9 @@ from pydrake.systems.framework import Context
 from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
 from plant.referee.entities import Entities, Kind
 from plant.referee.goal import GoalCondition, Verdict
-from plant.referee.judge import ON_TRAY_GAP_S, TimedPath, Truth, judge
+from plant.referee.judge import judge
 from plant.referee.object_history import Lift, ObjectHistory, ObjectSample
+from plant.referee.truth import TimedPath, Truth, extend, note_stay
 from plant.snapshot.values import State, array_of
 from skills.robot import FloatArray
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from plant.kinds import RobotKind
     from plant.worlds.placement import Placement
 
-PATH_STEP_M = 0.02
 PATH_VALUES = 4
 BEFORE_SAMPLES = 3
 
@@ -101,9 +101,9 @@ class Referee:
         self._bases = {name: self._position(plant_context, body) for name, body in self._entities.bases.items()}
         self._persons = {name: self._position(plant_context, body) for name, body in self._entities.persons.items()}
         for name, p_WB in self._bases.items():
-            _extend(self._paths[name], p_WB, time_s)
+            extend(self._paths[name], p_WB, time_s)
         for name, p_W in self._persons.items():
-            _extend(self._person_paths[name], p_W, time_s)
+            extend(self._person_paths[name], p_W, time_s)
         self._now_s = time_s
         neighbours = self._neighbours(pairs)
         for name, body in self._entities.objects.items():
@@ -226,17 +226,8 @@ class Referee:
         """Remember which object rests on whose tray, and in which times."""
         for history in self._histories.values():
             if history.on_tray_of is not None:
-                stays = self._given.setdefault((history.name, history.on_tray_of), [])
-                goes_on = bool(stays) and time_s - stays[-1][1] <= ON_TRAY_GAP_S
-                first_s = stays.pop()[0] if goes_on else time_s
-                stays.append((first_s, time_s))
+                note_stay(self._given.setdefault((history.name, history.on_tray_of), []), time_s)
 
 
 def _timed(path: Sequence[FloatArray]) -> FloatArray:
     return np.array(path, dtype=np.float64).reshape(-1, PATH_VALUES)
-
-
-def _extend(path: list[FloatArray], p_W: FloatArray, time_s: float) -> None:
-    """Add a point to a path, with its time, when it is some way from the last."""
-    if not path or float(np.linalg.norm(p_W[:2] - path[-1][:2])) >= PATH_STEP_M:
-        path.append(np.append(p_W, time_s))

@@ -1,10 +1,14 @@
 """Random missions over all constructs and nestings, run with scripted skills to an end: what must always hold.
 
     python -m tests.benchmarks.random_missions --trees 20000 --seed 1
+    python -m tests.benchmarks.random_missions --trees 5000 --claims
 
 Failures, presses of buttons, answers, pauses, cancels and other missions in between come at random; one seed gives the
 same mission and the same run. Tells how many missions ran, how they ended, and what was found wrong, each with its
 seed.
+
+With `--claims` the skills act on a small world, and in every other mission some lie. The referee judges by that world's
+history: its verdict must be that of somebody who looked on, and without a lie it must be the tree's claim.
 """
 
 from __future__ import annotations
@@ -23,6 +27,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from executive.cli.goal_conditions import verdict_of
 from executive.mission.command import parse_command
 from executive.mission.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
 from executive.mission.expression import Expression, Template
@@ -50,7 +55,6 @@ from executive.mission.file.model import (
     StepGuards,
     StepPolicy,
 )
-from executive.mission.knowledge import Knowledge
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.journal import TickNote
@@ -64,14 +68,13 @@ from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectObservation, Part, Runn
 from skills.check_door.skill import CheckDoorInputs
 from skills.files.errors import InputError
 from skills.speak.skill import SpeakInputs
-from tests.executive.conftest import KNOWLEDGE, PORTS, EmptyCostmap, ManualClock, Script, ScriptedRobot, StillLocaliser
+from tests.benchmarks.scripted_world import WORLD, Clock, ScriptedWorld, expected
+from tests.executive.conftest import PORTS, EmptyCostmap, ManualClock, Script, ScriptedRobot, StillLocaliser
 from tests.executive.conftest import default_end as usual_end
 
+LYING, ACCIDENTS = 0.05, 0.01
 TICK_S, LIMIT_S, ENDINGS_S = 0.5, 120.0, 30.0
 MOST_TICKS = 3000
-WORLD = Knowledge.model_validate(
-    {**KNOWLEDGE, "doors": [{"between": ["hall", "kitchen"], "at": [2.5, 0.0], "width": 1.0}]}
-)
 COMMANDS = (
     "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]",
     "Take [Nothing] to [hall] and do [Nothing] to [Nothing]",
@@ -84,9 +87,24 @@ COMMANDS = (
     "Take [Nothing] to [Nothing] and do [wait] to [3 second]",
     "Take [Nothing] to [Nothing] and do [charge] to [Nothing]",
 )
+PAIRS = tuple(
+    (
+        f"Take [Nothing] to [{source}] and do [grasp] to [{thing}]",
+        f"Take [{thing}] to [{goal}] and do [Nothing] to [Nothing]",
+    )
+    for source, thing, goal in (
+        ("kitchen", "drink", "bedroom"),
+        ("counter", "coke", "shelf"),
+        ("shelf", "coke", "counter"),
+        ("kitchen", "beer", "Robin"),
+        ("bedroom", "coke", "start"),
+        ("kitchen", "2 drink", "bedroom"),
+    )
+)
 LOOKS = (
     "Take [Nothing] to [kitchen] and do [find] to [beer]",
     "Take [Nothing] to [hall] and do [find] to [person]",
+    "Take [Nothing] to [bedroom] and do [find] to [coke]",
 )
 NUMBERS = ("n", "n + 1", "n * 2 - 3", "min(n, 4)", "7 // (n + 1)", "battery * 10", "1 / n", "elapsed", "length(word)")
 TRUTHS = (
@@ -136,7 +154,9 @@ class MissionMaker:
     def small(self, still: bool) -> MissionStep:
         """A step that holds no others."""
         rng = self.rng
-        kind = rng.randrange(8) if not still else rng.randrange(4)
+        kind = rng.randrange(10) if not still else rng.randrange(4)
+        if kind > 7:
+            return MissionStep(tuple(map(parse_command, rng.choice(PAIRS))))
         if kind == 0:
             return self.set()
         if kind == 1:
@@ -279,6 +299,7 @@ class Robotics:
     failing: float = 0.15
     active: list[Any] = field(default_factory=list)
     raised: int = 0
+    world: ScriptedWorld | None = None
 
     def registry(self) -> dict[str, type[Skill[Any]]]:
         """The skills by name."""
@@ -304,7 +325,7 @@ class Robotics:
             default_timeout_s = 30.0
 
             def begin(self, inputs: Any) -> None:
-                self.inputs, self.left = inputs, mine.rng.choice([1, 2, 3])
+                self.inputs, self.left = inputs, mine.rng.choice([1, 2, 3] if mine.world is None else [2, 3])
                 mine.active.append(self)
 
             def step(self) -> Running | Succeeded | Failed:
@@ -329,6 +350,8 @@ class Robotics:
                 self.raised += 1
                 raise RuntimeError(INJECTED)
             return Failed(self.rng.choice(CAUSES), f"{name} does not work")
+        if self.world is not None and (done := self._in_world(skill, name, self.world)) is not None:
+            return done
         if name == "check_door":
             return Succeeded("seen", {"open": self.rng.random() < 0.5})
         if name == "find_people":
@@ -340,13 +363,41 @@ class Robotics:
         found: Any = usual_end(self.script, name)(skill)
         return found  # type: ignore[no-any-return]
 
+    def _in_world(self, skill: Any, name: str, world: ScriptedWorld) -> Succeeded | Failed | None:
+        """How an attempt ends that acts on the world; None: it does not."""
+        now_s, inputs = self.robot.clock.now(), skill.inputs
+        acts: Mapping[str, Callable[[float, Any], Succeeded | Failed]] = {
+            "navigate": world.navigate,
+            "detect": world.detect,
+            "find_people": world.find_people,
+            "grasp": world.grasp,
+            "place": lambda t_s, inputs: world.let_go(t_s, inputs.surface.name, name),
+            "hand_over": lambda t_s, inputs: world.let_go(t_s, world.person(inputs.person), name),
+            "approach": lambda t_s, inputs: Succeeded("near", {"observation": inputs.observation}),
+        }
+        if name == "speak" and world.speak(now_s, inputs.text):
+            skill.context.publish("speech", {"robot": self.robot.name, "text": inputs.text, "t": now_s})
+        if name not in acts:
+            return None
+        done = acts[name](now_s, inputs)
+        if isinstance(done, Succeeded) and name in ("grasp", "place", "hand_over"):
+            self.robot.holding = name == "grasp"
+        return done
+
 
 class Operator:
-    """Does things at random while a mission runs; every pause ends, and every button is released."""
+    """Does things at random while a mission runs; every pause ends, and every button is released.
 
-    def __init__(self, rng: random.Random, control: Control, robot: ScriptedRobot, other: CompiledTree) -> None:
+    A `calm` one leaves what is in the gripper alone.
+    """
+
+    def __init__(
+        self, rng: random.Random, control: Control, robot: ScriptedRobot, other: CompiledTree, *, calm: bool = False
+    ) -> None:
+        self.calm = calm
         self.rng, self.control, self.robot, self.other = rng, control, robot, other
-        self.cancel_at = rng.choice([None, None, None, rng.randint(0, 10), rng.randint(0, 80)])
+        cancels = [None, None, None, rng.randint(0, 10), rng.randint(0, 80)]
+        self.cancel_at = None if calm and rng.random() < 0.9 else rng.choice(cancels)
         self.insist_after = rng.choice([None, None, rng.randint(0, 6)])
         self.busy = rng.choice([0.0, 0.02, 0.1])
         self.cancelled = self.insisted = self.preempted = False
@@ -393,9 +444,9 @@ class Operator:
             control.stop_button()
         elif what == 5:
             robot.charge = rng.choice([0.05, 0.5, 0.9])
-        elif what == 6:
+        elif what == 6 and not self.calm:
             robot.holding = not robot.holding
-        elif not self.preempted and self.control.state.mode.value != "ended":
+        elif what == 7 and not self.preempted and self.control.state.mode.value != "ended":
             self.preempted = True
             control.preempt(self.other)
 
@@ -408,6 +459,25 @@ class Ran:
     log: tuple[tuple[str, str], ...]
     wrong: tuple[str, ...]
     nodes: int
+
+
+@dataclass(frozen=True)
+class Claimed:
+    """One run in the scripted world: what the tree claims, the referee's verdict, and what was right; what lied."""
+
+    claim: bool
+    verdict: bool | None
+    right: bool | None
+    lies: tuple[tuple[float, str], ...]
+    why: str
+
+    @property
+    def wrong(self) -> str:
+        """What is wrong with the verdict; nothing: it is right."""
+        if self.verdict is not (self.right if self.claim else False):
+            return f"claim {self.claim}, verdict {self.verdict}, right {self.right}: {self.why}"
+        denied = self.claim and self.verdict is False
+        return f"nothing lied, and the claim is denied: {self.why}" if denied and not self.lies else ""
 
 
 def made_mission(seed: int) -> Mission:
@@ -465,10 +535,32 @@ class KillingJournal:
             raise KilledError
 
 
-def _compiled(seed: int, robot: ScriptedRobot) -> tuple[Robotics, CompiledTree, CompiledTree]:
+def claimed(seed: int) -> Claimed:
+    """Make the mission of a seed and run it in the scripted world; in every odd one some skills lie.
+
+    Raises InputError: it cannot be compiled.
+    """
+    lying, accidents = (LYING, ACCIDENTS) if seed % 2 else (0.0, 0.0)
+    world = ScriptedWorld(random.Random(f"world {seed}"), lying, accidents)
+    clock = Clock(world)
+    robotics, tree, other = _compiled(seed, ScriptedRobot(clock), world)
+    heard: list[tuple[str, Mapping[str, Any]]] = []
+    result = _run(seed, clock, robotics, tree, other, heard=heard).result.worst
+    clock.over = True
+    clock.advance(TICK_S)  # what was let go in the last tick comes to rest
+    verdict = verdict_of(tree, result, lambda conditions: world.judge(conditions, clock.now()))
+    transitions = [message for topic, message in heard if topic == "transitions"]
+    right = expected(tree, result, transitions, world)
+    return Claimed(result.outcome is Outcome.SUCCESS, verdict.success, right, tuple(world.lies), verdict.why)
+
+
+def _compiled(
+    seed: int, robot: ScriptedRobot, world: ScriptedWorld | None = None
+) -> tuple[Robotics, CompiledTree, CompiledTree]:
     """What happens to the robot, the mission of a seed, and another that may come in between."""
     rng = random.Random(f"run {seed}")
-    robotics = Robotics(rng, robot, failing=rng.choice([0.0, 0.1, 0.4]))
+    failing = rng.choice([0.0, 0.1, 0.4] if world is None else [0.0, 0.02, 0.1])
+    robotics = Robotics(rng, robot, failing=failing, world=world)
     registry = robotics.registry()
     tree = compile_mission(made_mission(seed), knowledge=WORLD, registry=registry)
     between = Mission("between", DEFAULT_WORLD, "Alice", (MissionStep(skill=SkillCall("stow")),))
@@ -476,19 +568,31 @@ def _compiled(seed: int, robot: ScriptedRobot) -> tuple[Robotics, CompiledTree, 
 
 
 def _run(
-    seed: int, clock: ManualClock, robotics: Robotics, tree: CompiledTree, other: CompiledTree, journal: Any = None
+    seed: int,
+    clock: ManualClock,
+    robotics: Robotics,
+    tree: CompiledTree,
+    other: CompiledTree,
+    journal: Any = None,
+    heard: list[tuple[str, Mapping[str, Any]]] | None = None,
 ) -> Ran:
-    """Run a tree to its end."""
+    """Run a tree to its end; all messages go to `heard`."""
     rng, robot = robotics.rng, robotics.robot
     control = Control(pace=None)
-    operator = Operator(rng, control, robot, other)
+    operator = Operator(rng, control, robot, other, calm=robotics.world is not None)
     log: list[tuple[str, str]] = []
+
+    def publish(topic: str, message: Mapping[str, Any]) -> None:
+        log.append((topic, repr(message)))
+        if heard is not None:
+            heard.append((topic, message))
+
     with LockStepWorker(clock) as worker:
         result = run(
             [RunEntry(tree, robot, StillLocaliser(), EmptyCostmap(), journal)],  # type: ignore[arg-type]
             clock=clock,
             worker=worker,
-            publish=lambda topic, message: log.append((topic, repr(message))),
+            publish=publish,
             settings=RunSettings(
                 seed=seed,
                 tick_period_s=TICK_S,
@@ -588,6 +692,28 @@ def benchmark(trees: int, seed: int, limit_s: float, tell: Callable[[str], None]
     return bad
 
 
+def benchmark_claims(trees: int, seed: int, limit_s: float, tell: Callable[[str], None]) -> int:
+    """Judge so many, or as many as the time (s) allows; the number of verdicts that are wrong."""
+    begun, verdicts, bad, done = time.perf_counter(), Counter[str](), 0, 0
+    for number in range(seed * 1_000_000, seed * 1_000_000 + trees):
+        if time.perf_counter() - begun > limit_s:
+            break
+        done += 1
+        try:
+            one = claimed(number)
+        except InputError:
+            verdicts["not compiled"] += 1
+            continue
+        words = {True: "fulfilled", False: "denied", None: "not judged"}[one.verdict]
+        verdicts[f"{words}, {'some lied' if one.lies else 'none lied'}" if one.claim else "not claimed"] += 1
+        if one.wrong:
+            bad += 1
+            tell(f"seed {number}: {one.wrong}"[:900])
+    tell(f"{done} missions in {time.perf_counter() - begun:.0f} s: {bad} with a wrong verdict")
+    tell(", ".join(f"{name} {count}" for name, count in verdicts.most_common()))
+    return bad
+
+
 def main() -> int:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -595,8 +721,11 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--limit", type=float, default=480.0, help="seconds at most")
     parser.add_argument("--kill", action="store_true", help="kill each in some tick, and take it up again")
+    parser.add_argument("--claims", action="store_true", help="compare claims with verdicts in the scripted world")
     options = parser.parse_args()
     tell = functools.partial(print, flush=True)
+    if options.claims:
+        return int(benchmark_claims(options.trees, options.seed, options.limit, tell) > 0)
     return int(benchmark(options.trees, options.seed, options.limit, tell, kill=options.kill) > 0)
 
 

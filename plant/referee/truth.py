@@ -1,0 +1,60 @@
+"""The record that the referee judges by: what happened to the objects, and where robots and people went."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from plant.referee.object_history import ObjectHistory
+from skills.robot import FloatArray
+
+PATH_STEP_M = 0.02
+ON_TRAY_GAP_S = 0.5
+
+
+@dataclass(frozen=True)
+class TimedPath:
+    """Where a robot or a person went: points (m, world) with the times (s) at which they were reached, (N, 4)."""
+
+    points: FloatArray
+
+    def at(self, time_s: float) -> FloatArray:
+        """The position at a time, (3,)."""
+        return self.points[self._index(time_s), :3]
+
+    def between(self, from_s: float, until_s: float) -> FloatArray:
+        """The positions from just before a time to another, (N, 3)."""
+        first = max(0, int(np.searchsorted(self.points[:, 3], from_s)) - 1)
+        return self.points[first : self._index(until_s) + 1, :3]
+
+    def _index(self, time_s: float) -> int:
+        return max(0, int(np.searchsorted(self.points[:, 3], time_s, side="right")) - 1)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The record up to `now_s`: histories of the objects, and the paths of robots and people by name.
+
+    `given` has for each object and person the times (s) from and to which the object rested on the person's tray.
+    """
+
+    now_s: float
+    histories: tuple[ObjectHistory, ...]
+    robots: Mapping[str, TimedPath]
+    persons: Mapping[str, TimedPath]
+    given: Mapping[tuple[str, str], Sequence[tuple[float, float]]]
+
+
+def extend(path: list[FloatArray], p_W: FloatArray, time_s: float) -> None:
+    """Add a point to a path, with its time, when it is some way from the last."""
+    if not path or float(np.linalg.norm(p_W[:2] - path[-1][:2])) >= PATH_STEP_M:
+        path.append(np.append(p_W, time_s))
+
+
+def note_stay(stays: list[tuple[float, float]], time_s: float) -> None:
+    """Add that an object rests on a tray now: the last stay goes on, unless it ended some time ago."""
+    goes_on = bool(stays) and time_s - stays[-1][1] <= ON_TRAY_GAP_S
+    first_s = stays.pop()[0] if goes_on else time_s
+    stays.append((first_s, time_s))

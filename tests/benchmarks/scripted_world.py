@@ -1,0 +1,363 @@
+"""A small world that scripted skills act on, its history for the referee, and what a person would say of a run."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from executive.mission.geometry import inside
+from executive.mission.goal import GoalCondition, GoalKind, When
+from executive.mission.knowledge import ANYBODY, Knowledge
+from executive.run.executions import is_speech
+from executive.run.outcome import RobotResult
+from executive.tree.compiler import CompiledTree, StepPart
+from plant.referee import GoalCondition as Asked
+from plant.referee import Verdict
+from plant.referee.judge import judge
+from plant.referee.object_history import ObjectHistory, ObjectSample
+from plant.referee.truth import TimedPath, Truth, extend, note_stay
+from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
+from tests.executive.conftest import KNOWLEDGE, ManualClock
+
+__all__ = ["WORLD", "Clock", "ScriptedWorld", "expected"]
+
+SAMPLES: Final = 5
+NEAR_PERSON_M: Final = 2.0
+HAND, FLOOR = "hand", "floor"
+PEOPLE: Final = {"Sam": (0.5, 4.5), "Robin": (0.5, 0.5)}
+OBJECTS: Final = {
+    "coke": ("coke", "counter"),
+    "coke_2": ("coke", "shelf"),
+    "beer": ("beer", "counter"),
+    "beer_2": ("beer", "shelf"),
+    "hammer": ("hammer", "bedside table"),
+}
+
+
+def _square(x: float, y: float, dx: float, dy: float) -> list[list[float]]:
+    return [[x - dx, y - dy], [x + dx, y - dy], [x + dx, y + dy], [x - dx, y + dy]]
+
+
+_PLACES: Final = {
+    "kitchen": _square(4.5, 0.0, 1.5, 2.0),
+    "bedroom": _square(-4.5, 0.0, 1.5, 2.0),
+    "hall": _square(0.0, 0.0, 2.0, 2.0),
+    "bathroom": _square(0.5, 4.0, 1.0, 1.0),
+}
+_SURFACES: Final = {
+    "shelf": _square(5.5, 1.5, 0.5, 0.5),
+    "counter": _square(5.5, -1.5, 0.5, 0.5),
+    "bedside table": _square(-5.5, 1.5, 0.5, 0.5),
+}
+WORLD: Final = Knowledge.model_validate(
+    {
+        **KNOWLEDGE,
+        "places": {name: {**facts, "polygon": _PLACES[name]} for name, facts in KNOWLEDGE["places"].items()},  # type: ignore[attr-defined]
+        "surfaces": {name: {**facts, "polygon": _SURFACES[name]} for name, facts in KNOWLEDGE["surfaces"].items()},  # type: ignore[attr-defined]
+        "doors": [{"between": ["hall", "kitchen"], "at": [2.5, 0.0], "width": 1.0}],
+    }
+)
+
+
+@dataclass(frozen=True)
+class Moved:
+    """An object came from one place to another; `robot`: a robot did it."""
+
+    t_s: float
+    name: str
+    before: str
+    after: str
+    robot: bool = True
+
+
+@dataclass
+class ScriptedWorld:
+    """Where the robot and the objects are. Skills that `lie` claim what they have not done; with `accidents`, what was
+    put down falls.
+
+    Objects are on a surface, on the floor, in the hand, or with a person.
+    """
+
+    rng: random.Random
+    lying: float = 0.0
+    accidents: float = 0.0
+    robot_W: tuple[float, float] = (0.0, 0.0)
+    places: dict[str, str] = field(default_factory=lambda: {name: place for name, (_, place) in OBJECTS.items()})
+    moves: list[Moved] = field(default_factory=list)
+    drives: list[tuple[float, tuple[float, float]]] = field(default_factory=list)
+    said: list[tuple[float, str]] = field(default_factory=list)
+    lies: list[tuple[float, str]] = field(default_factory=list)
+    histories: dict[str, ObjectHistory] = field(
+        default_factory=lambda: {name: ObjectHistory(name, class_name) for name, (class_name, _) in OBJECTS.items()}
+    )
+    path: list[Any] = field(default_factory=list)
+    given: dict[tuple[str, str], list[tuple[float, float]]] = field(default_factory=dict)
+
+    def lie(self, now_s: float, what: str) -> bool:
+        """Whether a skill lies now, in its way."""
+        lies = self.rng.random() < self.lying
+        if lies:
+            self.lies.append((now_s, what))
+        return lies
+
+    def move(self, now_s: float, name: str, after: str, *, robot: bool = True) -> None:
+        """Put an object somewhere."""
+        self.moves.append(Moved(now_s, name, self.places[name], after, robot))
+        self.places[name] = after
+
+    def held(self) -> str | None:
+        """What is in the hand."""
+        return next((name for name, place in self.places.items() if place == HAND), None)
+
+    def navigate(self, now_s: float, inputs: Any) -> Succeeded | Failed:
+        """Be at the goal."""
+        if not self.lie(now_s, "navigate"):
+            self.robot_W = (inputs.goal.x_m, inputs.goal.y_m)
+            self.drives.append((now_s, self.robot_W))
+        return Succeeded("there")
+
+    def detect(self, now_s: float, inputs: Any) -> Succeeded | Failed:
+        """See what is on the surfaces."""
+        on = [surface.name for surface in inputs.surfaces]
+        seen = [name for name, place in self.places.items() if place in on and OBJECTS[name][0] in inputs.classes]
+        if self.lie(now_s, "detect"):
+            if seen:
+                return Failed(Cause.POSTCONDITION, "not seen")
+            x, y, z = self.on_surface(next(iter(OBJECTS)), on[0]) if on[0] in _SURFACES else (0.0, 0.0, 0.0)
+            return _seen([ObjectObservation(now_s, Thing(inputs.classes[0]), (x, y + 0.07, z), (0.06,) * 3, 0.0, 0.9)])
+        if not seen:
+            return Failed(Cause.POSTCONDITION, "not seen")
+        return _seen([self.observation(now_s, name) for name in seen])
+
+    def find_people(self, now_s: float, inputs: Any) -> Succeeded | Failed:
+        """See who is in a room."""
+        wanted = None if inputs.person in (ANYBODY, "person") else inputs.person
+        there = [p for name, p in PEOPLE.items() if wanted in (None, name) and inside(inputs.area_W, p)]
+        if self.lie(now_s, "find_people"):
+            there = [] if there else [(0.0, 0.0)]
+        if not there:
+            return Failed(Cause.POSTCONDITION, "nobody is there")
+        size = (0.5, 0.5, 1.7)
+        return _seen([ObjectObservation(now_s, Thing("person"), (x, y, 0.9), size, 0.0, 0.9) for x, y in there])
+
+    def grasp(self, now_s: float, inputs: Any) -> Succeeded | Failed:
+        """Have it in the hand."""
+        at = np.array(inputs.observation.position_W)
+        near = [name for name in self.places if float(np.linalg.norm(self.position(name) - at)) < 0.03]
+        if self.held() is not None or not near:
+            return Failed(Cause.POSTCONDITION, "nothing was taken")
+        if not self.lie(now_s, "grasp"):
+            self.move(now_s, near[0], HAND)
+        return Succeeded("held", {"tried": (*inputs.avoid, 1)})
+
+    def let_go(self, now_s: float, after: str, what: str) -> Succeeded | Failed:
+        """Let go of what is in the hand; a lie drops it."""
+        name, lies = self.held(), self.lie(now_s, what)
+        if name is not None:
+            self.move(now_s, name, FLOOR if lies else after)
+        return Succeeded("let go")
+
+    def speak(self, now_s: float, text: str) -> bool:
+        """Whether it is said."""
+        if self.lie(now_s, "speak"):
+            return False
+        self.said.append((round(now_s, 6), text))
+        return True
+
+    def person(self, name: str) -> str:
+        """Who takes it."""
+        return name if name in PEOPLE else min(PEOPLE, key=lambda each: math.dist(PEOPLE[each], self.robot_W))
+
+    def on_surface(self, name: str, surface: str) -> tuple[float, float, float]:
+        """Where an object lies on a surface."""
+        number, polygon = list(OBJECTS).index(name), _SURFACES[surface]
+        x, y = np.mean(polygon, axis=0)
+        return float(x), float(y) + 0.15 * (number - 2), WORLD.surfaces[surface].height + 0.06
+
+    def position(self, name: str, place: str | None = None) -> Any:
+        """Where an object is, (3,)."""
+        place = self.places[name] if place is None else place
+        if place == HAND:
+            return np.array([*self.robot_W, 1.5])
+        if place == FLOOR:
+            return np.array([9.0, float(list(OBJECTS).index(name)), 0.05])
+        if place in PEOPLE:
+            return np.array([*PEOPLE[place], 1.1])
+        return np.array(self.on_surface(name, place))
+
+    def observation(self, now_s: float, name: str) -> ObjectObservation:
+        """An object as it is seen."""
+        x, y, z = map(float, self.position(name))
+        thing, place = Thing(OBJECTS[name][0]), self.places[name]
+        return ObjectObservation(now_s, thing, (x, y, z), (0.06, 0.06, 0.12), 0.0, 0.9, place)
+
+    def accident(self, now_s: float) -> None:
+        """Something that a robot put down may fall."""
+        put = [move.name for move in self.moves if move.robot and self.places[move.name] in _SURFACES]
+        if put and self.rng.random() < self.accidents:
+            self.lies.append((now_s, "fall"))
+            self.move(now_s, self.rng.choice(put), FLOOR, robot=False)
+
+    def sample(self, now_s: float) -> None:
+        """Let the referee's record grow."""
+        for name, history in self.histories.items():
+            place, p_W = self.places[name], self.position(name)
+            held = place == HAND
+            history.take(
+                ObjectSample(
+                    time_s=now_s,
+                    p_WO=p_W,
+                    gripper="Alice" if held else None,
+                    X_WH=RigidTransform(p_W) if held else None,
+                    supported=not held,
+                    on_floor=place == FLOOR,
+                    tray_of=place if place in PEOPLE else None,
+                )
+            )
+            if history.on_tray_of is not None:
+                note_stay(self.given.setdefault((name, history.on_tray_of), []), now_s)
+        extend(self.path, np.array([*self.robot_W, 0.5]), now_s)
+
+    def judge(self, conditions: Sequence[Asked], now_s: float) -> Verdict:
+        """The referee's verdict."""
+        people = {name: TimedPath(np.array([[*p_W, 0.9, 0.0]])) for name, p_W in PEOPLE.items()}
+        robots = {"Alice": TimedPath(np.array(self.path))}
+        truth = Truth(now_s, tuple(self.histories.values()), robots, people, self.given)
+        return judge(conditions, truth, bumps=())
+
+
+def _seen(observations: list[ObjectObservation]) -> Succeeded:
+    return Succeeded("seen", {"observation": observations[0], "observations": tuple(observations)})
+
+
+class Clock(ManualClock):
+    """Time in which the world goes on."""
+
+    def __init__(self, world: ScriptedWorld) -> None:
+        super().__init__()
+        self.world, self.over = world, False
+        world.sample(0.0)
+
+    def advance(self, dt_s: float) -> None:
+        """Let time pass."""
+        begun_s = self.time_s
+        if not self.over:
+            self.world.accident(begun_s)
+        for number in range(1, SAMPLES + 1):
+            self.world.sample(begun_s + number * dt_s / SAMPLES)
+        super().advance(dt_s)
+
+
+def expected(
+    tree: CompiledTree, result: RobotResult, transitions: Sequence[Mapping[str, Any]], world: ScriptedWorld
+) -> bool | None:
+    """What a person would say of a mission that claims success, who has seen the world and the log of the tree.
+
+    True: all that was done and counts was so when it was to be so. None: there is nothing to judge by.
+    """
+    seen = _Person(tree, transitions, world)
+    found = [holds for part in tree.parts for holds in seen.of(part, result)]
+    found += [holds for node in tree.root.walk() if is_speech(node) for holds in seen.speech(node.path_id)]
+    return all(found) if found else None
+
+
+class _Person:
+    """Somebody who looks on."""
+
+    def __init__(self, tree: CompiledTree, transitions: Sequence[Mapping[str, Any]], world: ScriptedWorld) -> None:
+        self.world = world
+        self.logged: dict[str, list[tuple[float, str]]] = {}
+        for each in transitions:
+            self.logged.setdefault(str(each["node"]), []).append((float(each["t"]), str(each["to"])))
+        self.above: dict[str, tuple[str, ...]] = {tree.root.path_id: ()}
+        for node in tree.root.walk():
+            for child in node.children:
+                self.above[child.path_id] = (*self.above[node.path_id], node.path_id)
+
+    def times(self, path: str) -> Iterator[tuple[float, float]]:
+        """When something was done that counts: nothing around it failed or was broken off while it was done."""
+        begun_s = None
+        for t_s, to in self.logged.get(path, ()):
+            if to == "RUNNING":
+                begun_s = t_s
+            elif to == "SUCCESS" and all(self._went_well(above, t_s) for above in self.above[path]):
+                yield (t_s if begun_s is None else begun_s), t_s
+
+    def _went_well(self, path: str, t_s: float) -> bool:
+        ends = (to for when_s, to in self.logged.get(path, ()) if when_s >= t_s and to != "RUNNING")
+        return next(ends, "SUCCESS") == "SUCCESS"
+
+    def of(self, part: StepPart, result: RobotResult) -> Iterator[bool]:
+        """Whether what a part was to bring about was so, each time."""
+        goal = part.goal
+        if goal is None or goal.when is When.ALWAYS:
+            return
+        if goal.kind is GoalKind.ANSWERED:
+            for finding in result.findings:
+                if f"{finding.path_id}/".startswith(f"{part.path_id}/"):
+                    yield finding.answer is (self.count(goal, finding.t_s) >= max(1, goal.count))
+            return
+        for begun_s, ended_s in self.times(part.node or part.path_id):
+            yield self.done(goal, begun_s, ended_s)
+
+    def done(self, goal: GoalCondition, begun_s: float, ended_s: float) -> bool:
+        """Whether it was so when it was to be so."""
+        needed = max(1, goal.count)
+        if goal.kind is GoalKind.WENT:
+            x, y = self.robot_at(ended_s)
+            if goal.person is not None:
+                return math.dist((x, y), PEOPLE[goal.person]) <= NEAR_PERSON_M
+            return any(inside(area.polygon, (x, y)) for area in goal.goal)
+        mine = [move for move in self.world.moves if move.robot and self.fits(goal, move.name)]
+        if goal.kind is GoalKind.GRASPED:
+            sources = {area.name for area in goal.source}
+            since_s = begun_s if goal.when is When.SOME_TIME else -1.0
+            taken = [
+                m.name for m in mine if m.after == HAND and m.before in sources and since_s <= m.t_s <= ended_s + 0.01
+            ]
+            held = [name for name in taken if goal.when is When.SOME_TIME or self.place_at(name, ended_s) == HAND]
+            return len(set(held)) >= needed
+        goals = {area.name for area in goal.goal}
+        if goal.kind is GoalKind.HANDED_OVER:
+            goals = {goal.person} if goal.person is not None else set(PEOPLE)
+        put = [m for m in mine if m.after in goals and begun_s <= m.t_s <= ended_s + 0.01]
+        there = [m for m in put if self.place_at(m.name, ended_s) == m.after and self.stayed(m, ended_s)]
+        return len({m.name for m in there}) >= needed
+
+    def stayed(self, put: Moved, since_s: float) -> bool:
+        """Whether it is still there, or the robot took it away."""
+        after = [move for move in self.world.moves if move.name == put.name and move.t_s > put.t_s]
+        return not after or after[0].robot
+
+    def speech(self, path: str) -> Iterator[bool]:
+        """Whether something was said, each time."""
+        for begun_s, ended_s in self.times(path):
+            yield any(begun_s - 0.01 <= t_s <= ended_s + 0.01 for t_s, _ in self.world.said)
+
+    def count(self, goal: GoalCondition, t_s: float) -> int:
+        """How many of what was asked for there were."""
+        if goal.classes == (ANYBODY,):
+            people = [p for name, p in PEOPLE.items() if goal.person in (None, name)]
+            return sum(any(inside(area.polygon, p) for area in goal.source) for p in people)
+        places = {area.name for area in goal.source}
+        return sum(self.fits(goal, name) and self.place_at(name, t_s) in places for name in OBJECTS)
+
+    def fits(self, goal: GoalCondition, name: str) -> bool:
+        """Whether an object is of the classes."""
+        return not goal.classes or OBJECTS[name][0] in goal.classes
+
+    def place_at(self, name: str, t_s: float) -> str:
+        """Where an object was."""
+        before = [move.after for move in self.world.moves if move.name == name and move.t_s <= t_s + 1e-6]
+        return before[-1] if before else OBJECTS[name][1]
+
+    def robot_at(self, t_s: float) -> tuple[float, float]:
+        """Where the robot was."""
+        before = [p_W for when_s, p_W in self.world.drives if when_s <= t_s + 1e-6]
+        return before[-1] if before else (0.0, 0.0)

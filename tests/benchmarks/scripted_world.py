@@ -120,6 +120,7 @@ class ScriptedWorld:
         if not self.lie(now_s, "navigate"):
             self.robot_W = (inputs.goal.x_m, inputs.goal.y_m)
             self.drives.append((now_s, self.robot_W))
+            extend(self.path, np.array([*self.robot_W, 0.5]), now_s)
         return Succeeded("there")
 
     def detect(self, now_s: float, inputs: Any) -> Succeeded | Failed:

@@ -1,0 +1,200 @@
+"""When the goal conditions of each construct must hold: what a run leaves for the referee."""
+
+import pytest
+
+from executive.cli.goal_conditions import Share, conditions_of
+from executive.mission.command import parse_command
+from executive.mission.condition import Look, ValueIs
+from executive.mission.expression import Expression
+from executive.mission.file import blocks
+from executive.mission.file.model import Mission, MissionStep, SkillCall, StepPolicy
+from executive.run.outcome import Outcome
+from executive.tree.compiler import compile_mission
+from plant.referee import GoalKind, When
+from skills.api import Cause, Failed, Succeeded
+
+AT_END, AT_STEP = When.END_OF_MISSION, When.END_OF_STEP
+
+
+def step(text, **policy):
+    return MissionStep((parse_command(text),), policy=StepPolicy(**policy))
+
+
+def go(place, **policy):
+    return step(f"Take [Nothing] to [{place}] and do [Nothing] to [Nothing]", **policy)
+
+
+GET = step("Take [Nothing] to [kitchen] and do [grasp] to [coke]")
+PUT = step("Take [coke] to [bedroom] and do [Nothing] to [Nothing]")
+LOOK = Look(parse_command("Take [Nothing] to [kitchen] and do [find] to [coke]"))
+
+
+def block(made):
+    return MissionStep(block=made)
+
+
+def holds(text):
+    return ValueIs(Expression(text))
+
+
+@pytest.fixture
+def ran(knowledge, registry, run_tree, script, robot):
+    """Runs steps with scripted skills: the tree, and the robot's result."""
+
+    def put(skill):
+        robot.let_go()
+        return Succeeded("put down")
+
+    script.ends.setdefault("place", put)
+
+    def run(*steps, whole=None, name="Alice"):
+        mission = Mission("m", "flat", name, steps, whole=whole)
+        tree = compile_mission(mission, knowledge=knowledge, registry=registry)
+        return tree, run_tree(tree).robots[0]
+
+    return run
+
+
+@pytest.fixture
+def asked(ran):
+    """Runs steps that succeed: what is asked of where the robot went, in order, as (place, when)."""
+
+    def ask(*steps, whole=None):
+        tree, result = ran(*steps, whole=whole)
+        assert result.outcome is Outcome.SUCCESS, result.message
+        found = conditions_of(tree, result)
+        return [(one.goal[0].name, one.when) for one in found if one.kind is GoalKind.WENT]
+
+    return ask
+
+
+def when(*steps, condition="elapsed > 0.05", times=1):
+    return (blocks.Handler(holds(condition), steps, times),)
+
+
+def test_of_two_places_the_first_holds_at_the_end_of_its_step_and_the_last_until_the_end(asked):
+    assert asked(go("hall"), go("kitchen")) == [("hall", AT_STEP), ("kitchen", AT_END)]
+
+
+def test_if_is_asked_for_the_branch_that_was_taken(asked):
+    choose = blocks.Choose(holds("elapsed < 0"), (go("hall"),), (go("kitchen"),))
+    assert asked(block(choose)) == [("kitchen", AT_END)]
+
+
+def test_each_look_of_a_condition_is_judged_at_its_time(ran):
+    tree, result = ran(block(blocks.Repeat((block(blocks.Choose(LOOK, (go("hall"),))),), 2)))
+    looks = [one for one in conditions_of(tree, result) if one.kind is GoalKind.ANSWERED]
+    assert [one.answer for one in looks] == [True, True]
+    assert looks[0].answered_s < looks[1].answered_s
+
+
+def test_each_round_of_repeat_is_asked_for(asked):
+    repeat = blocks.Repeat((go("hall"), go("kitchen")), 2)
+    assert asked(block(repeat)) == [("hall", AT_STEP)] * 2 + [("kitchen", AT_STEP), ("kitchen", AT_END)]
+
+
+def test_rounds_are_asked_for_though_the_last_decision_reset_them(asked):
+    count = blocks.Set({"n": Expression("n + 1")})
+    repeat = blocks.Repeat((go("hall"), block(count)), 9, while_=holds("n < 2"))
+    assert asked(block(blocks.Set({"n": Expression("0")})), block(repeat)) == [("hall", AT_STEP), ("hall", AT_END)]
+
+
+def test_what_a_failed_branch_of_try_did_does_not_count(asked, script):
+    script.seen_on = ()
+    tried = blocks.Try((go("hall"), GET), (go("kitchen"),))
+    assert asked(block(tried)) == [("kitchen", AT_END)]
+
+
+def test_what_together_stopped_does_not_count(asked):
+    slow = blocks.Group((go("hall"), go("kitchen"), go("hall")))
+    together = blocks.Together((block(slow), block(blocks.Wait(seconds=0.2))), 1)
+    assert asked(block(together), go("bedroom")) == [("bedroom", AT_END)]
+
+
+@pytest.mark.parametrize("as_whole", [True, False])
+def test_when_is_asked_for_at_the_end_of_its_own_steps(asked, as_whole):
+    group = blocks.Group(() if as_whole else (go("kitchen"),), when=when(go("hall")))
+    found = asked(go("kitchen"), whole=group) if as_whole else asked(block(group))
+    assert sorted(found, key=str) == [("hall", AT_STEP), ("kitchen", AT_END)]
+
+
+def test_after_a_handler_that_went_elsewhere_the_last_place_is_asked_for_at_the_end_of_its_step(asked):
+    group = blocks.Group((go("kitchen"), block(blocks.Wait(seconds=9.0))), when=when(go("hall"), condition="elapsed > 4"))
+    assert sorted(asked(block(group)), key=str) == [("hall", AT_END), ("kitchen", AT_STEP)]
+
+
+def test_always_is_asked_for(asked):
+    group = blocks.Group((go("kitchen"),), always=(go("hall"),))
+    assert asked(block(group)) == [("kitchen", AT_STEP), ("hall", AT_END)]
+
+
+def test_a_group_and_the_rounds_of_for_each_are_asked_for_as_steps_in_a_row(asked):
+    group = blocks.Group((go("hall"), block(blocks.Group((go("kitchen"),)))))
+    assert asked(block(group), go("hall")) == [("hall", AT_STEP), ("kitchen", AT_STEP), ("hall", AT_END)]
+
+
+def test_a_failed_attempt_does_not_count(asked, script):
+    failures = iter([True, True, True, True, True, True])
+
+    def stow(skill):
+        return Failed(Cause.PLANNING, "stuck") if next(failures, False) else Succeeded("stowed")
+
+    script.ends["stow"] = stow
+    group = blocks.Group((go("hall"), MissionStep(skill=SkillCall("stow"))))
+    tried = MissionStep(block=group, policy=StepPolicy(retries=6))
+    assert asked(tried) == [("hall", AT_STEP)]
+
+
+def test_an_object_that_was_put_somewhere_must_stay_there(ran):
+    grasped, placed = conditions_of(*ran(GET, PUT))
+    assert (grasped.when, placed.when, placed.taken_s) == (AT_STEP, AT_END, ())
+
+
+def test_an_object_may_leave_the_place_where_a_later_step_takes_it(ran):
+    tree, result = ran(GET, PUT, step("Take [Nothing] to [bedroom] and do [grasp] to [coke]"))
+    first, put, again = conditions_of(tree, result)[0], *(
+        one for one in conditions_of(tree, result) if one.kind is GoalKind.PLACED
+    ), conditions_of(tree, result)[-1]
+    assert (first.when, again.when) == (AT_STEP, AT_END)
+    assert [began for began, _ in put.taken_s] == [again.began_s]
+
+
+def test_what_a_failed_step_took_away_was_taken_by_the_mission(ran, script):
+    script.ends["relocalise"] = lambda skill: Failed(Cause.PLANNING, "stuck")
+    taking = blocks.Try((GET, MissionStep(skill=SkillCall("relocalise"))), (block(blocks.Wait(seconds=0.2)),))
+    tree, result = ran(GET, PUT, block(taking))
+    placed = next(one for one in conditions_of(tree, result) if one.kind is GoalKind.PLACED)
+    assert len(placed.taken_s) == 1
+
+
+def test_what_another_robot_of_the_run_takes_away_was_taken_by_the_mission(ran):
+    tree, result = ran(GET, PUT)
+    (later,) = (one for one in result.executions if one.path_id.endswith("1-kitchen"))
+    other = Share(tree, ran(GET)[1], 0)
+    placed = next(one for one in conditions_of(tree, result, before=(other,)) if one.kind is GoalKind.PLACED)
+    assert len(placed.taken_s) == 1
+    assert later.done
+
+
+def test_what_is_held_while_holding_must_hold_always(ran):
+    group = blocks.Group((go("hall"),), holds=holds("holding"))
+    tree, result = ran(GET, block(group))
+    always = [one for one in conditions_of(tree, result) if one.when is When.ALWAYS]
+    assert [(one.kind, one.classes) for one in always] == [(GoalKind.GRASPED, ())]
+
+
+# a skill on its own -> what it is asked for
+@pytest.mark.parametrize(
+    ("call", "kind", "where"),
+    [
+        (SkillCall("navigate", {"x": 4.0, "y": -1.0}), GoalKind.WENT, "(4.00, -1.00)"),
+        (SkillCall("place", {"surface": "counter"}), GoalKind.PLACED, "counter"),
+        (SkillCall("hand_over", {"person": "Sam"}), GoalKind.HANDED_OVER, None),
+        (SkillCall("stow"), None, None),
+    ],
+)
+def test_a_skill_on_its_own_is_judged_by_what_its_inputs_say(ran, call, kind, where):
+    tree, result = ran(GET, MissionStep(skill=call))
+    last = tree.parts[-1].goal
+    assert (last and GoalKind[last.kind.name]) is kind
+    assert where is None or last.goal[0].name == where

@@ -8,15 +8,19 @@ from typing import Final
 from executive.mission.command import Command, Task, Thing
 from executive.mission.knowledge import Knowledge
 
-__all__ = ["UNNAMED", "UNSURE", "InGripper", "after_command", "cannot_take", "is_same", "objection"]
+__all__ = ["UNNAMED", "UNSURE", "InGripper", "after_command", "cannot_take", "either", "is_same", "objection"]
 
 
 @dataclass(frozen=True)
 class InGripper:
-    """What is held; `thing` is None where only that something is held is known; not even that unless `sure`."""
+    """What is held; `thing` is None where only that something is held is known; not even that unless `sure`.
+
+    `perhaps` are the things of which one may be held, where they are known.
+    """
 
     thing: Thing | None = None
     sure: bool = True
+    perhaps: tuple[Thing, ...] = ()
 
     def __str__(self) -> str:
         return "an object" if self.thing is None else f"the {self.thing}"
@@ -27,6 +31,16 @@ UNSURE: Final = InGripper(sure=False)
 """After a branch that may have been taken or not."""
 
 
+def either(*held: InGripper | None) -> InGripper:
+    """What is held where nobody knows which of these it is, nor whether it is anything."""
+    things: list[Thing] = []
+    for each in held:
+        if each is not None and each.thing is None and not each.perhaps:
+            return UNSURE
+        things += () if each is None else each.perhaps or filter(None, (each.thing,))
+    return InGripper(sure=False, perhaps=tuple(dict.fromkeys(things)))
+
+
 def after_command(command: Command, held: InGripper | None, knowledge: Knowledge) -> InGripper | None:
     """What is held after a command that went well; None for nothing."""
     if command.task is Task.GRASP:
@@ -35,14 +49,16 @@ def after_command(command: Command, held: InGripper | None, knowledge: Knowledge
 
 
 def is_same(held: InGripper | None, thing: Thing | None, knowledge: Knowledge) -> bool:
-    """Whether what is held is what `thing` asks for."""
-    return held is not None and _fits(held, thing, knowledge)
+    """Whether what is held, or whatever of several it is, is what `thing` asks for."""
+    if held is None:
+        return False
+    return all(_fits(one, thing, knowledge) for one in map(InGripper, held.perhaps or (held.thing,)))
 
 
 def objection(command: Command, held: InGripper | None, knowledge: Knowledge) -> tuple[str, str] | None:
     """Why a command cannot be carried out with what is held, and a hint; None when it can."""
     if command.task is Task.GRASP:
-        if held is None or is_same(held, command.object, knowledge):
+        if held is None or not held.sure or is_same(held, command.object, knowledge):
             return None
         return cannot_take(held, f"the {command.object}")
     carried = _carried(command)

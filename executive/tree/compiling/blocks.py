@@ -26,7 +26,7 @@ from executive.mission.file.blocks import (
 )
 from executive.mission.file.model import MissionStep, StepPolicy
 from executive.mission.goal import command_goal, held_goal
-from executive.mission.gripper import UNSURE, InGripper
+from executive.mission.gripper import InGripper, either
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.decisions import AnswerIs, MustHold, MustNotBegin
 from executive.tree.compiling.builder import PlanBuilder, pose_2d, slug
@@ -86,7 +86,11 @@ class Flow:
         shared = {n: named for n, named in first.names.items() if all(b.names.get(n) == named for b in others)}
         self.names.clear()
         self.names.update(shared)
-        self.held = first.held if all(branch.held == first.held for branch in others) else UNSURE
+        self.held = (
+            first.held
+            if all(branch.held == first.held for branch in others)
+            else either(*(each.held for each in branches))
+        )
         self.opening = all(branch.opening for branch in branches)
 
     def may_lack(self, before: Flow) -> None:
@@ -247,7 +251,7 @@ def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder, policy: S
     flow = assembler.flow
     if flow.held != before.held and block.times != 1:
         flow.names = dict(before.names)
-        flow.held, flow.opening = UNSURE, False
+        flow.held, flow.opening = either(before.held, flow.held), False
         body = _row(assembler, block.steps, builder.at("round"), "round")
     if mode == "until" and condition is not None:
         decide, key, parts = _decided(assembler, condition, builder.at("until"))
@@ -255,7 +259,7 @@ def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder, policy: S
     if mode == "while":
         assembler.flow.join([before, assembler.flow.copy()])
     elif assembler.flow.held != before.held:
-        assembler.flow.held = UNSURE
+        assembler.flow.held = either(before.held, assembler.flow.held)
     words = "" if condition is None else str(condition)
     often = f"{mode} {words}" if condition is not None else f"{block.times} times" if block.times else "for ever"
     every = f", every {block.every_s:g} s" if block.every_s else ""
@@ -306,7 +310,7 @@ def _try(assembler: Assembler, block: Try, builder: PlanBuilder, policy: StepPol
     tried, after_tried = _branch(assembler, block.steps, builder.at("try"), "try", flow)
     midway = flow.copy()
     if after_tried.held != flow.held:
-        midway.held, midway.opening = UNSURE, False
+        midway.held, midway.opening = either(flow.held, after_tried.held), False
     other, after_other = _branch(assembler, block.otherwise, builder.at("else"), "else", midway)
     flow.join([after_tried, after_other])
     return Assembled((builder.node("try", "else the other", *tried.nodes, *other.nodes),), (*tried.parts, *other.parts))
@@ -326,7 +330,7 @@ def _together(assembler: Assembler, block: Together, builder: PlanBuilder, polic
             flow.names.update({name: named for name, named in after.names.items() if before.get(name) != named})
     moved = [after.held for after in afters if after.held != flow.held]
     if moved:
-        flow.held, flow.opening = (moved[0] if everything else UNSURE), False
+        flow.held, flow.opening = (moved[0] if everything else either(flow.held, *moved)), False
     needed = block.needed or len(block.steps)
     name = "side by side" if everything else f"side by side, until {needed} of {len(block.steps)} are done"
     node = builder.node("together", name, *(each.nodes[0] for each in made), needed=needed)

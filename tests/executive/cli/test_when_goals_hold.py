@@ -119,7 +119,9 @@ def test_when_is_asked_for_at_the_end_of_its_own_steps(asked, as_whole):
 
 
 def test_after_a_handler_that_went_elsewhere_the_last_place_is_asked_for_at_the_end_of_its_step(asked):
-    group = blocks.Group((go("kitchen"), block(blocks.Wait(seconds=9.0))), when=when(go("hall"), condition="elapsed > 4"))
+    group = blocks.Group(
+        (go("kitchen"), block(blocks.Wait(seconds=9.0))), when=when(go("hall"), condition="elapsed > 4")
+    )
     assert sorted(asked(block(group)), key=str) == [("hall", AT_END), ("kitchen", AT_STEP)]
 
 
@@ -152,9 +154,11 @@ def test_an_object_that_was_put_somewhere_must_stay_there(ran):
 
 def test_an_object_may_leave_the_place_where_a_later_step_takes_it(ran):
     tree, result = ran(GET, PUT, step("Take [Nothing] to [bedroom] and do [grasp] to [coke]"))
-    first, put, again = conditions_of(tree, result)[0], *(
-        one for one in conditions_of(tree, result) if one.kind is GoalKind.PLACED
-    ), conditions_of(tree, result)[-1]
+    first, put, again = (
+        conditions_of(tree, result)[0],
+        *(one for one in conditions_of(tree, result) if one.kind is GoalKind.PLACED),
+        conditions_of(tree, result)[-1],
+    )
     assert (first.when, again.when) == (AT_STEP, AT_END)
     assert [began for began, _ in put.taken_s] == [again.began_s]
 
@@ -194,7 +198,7 @@ def test_what_is_held_while_holding_must_hold_always(ran):
     ],
 )
 def test_a_skill_on_its_own_is_judged_by_what_its_inputs_say(ran, call, kind, where):
-    tree, result = ran(GET, MissionStep(skill=call))
+    tree, _ = ran(GET, MissionStep(skill=call))
     last = tree.parts[-1].goal
     assert (last and GoalKind[last.kind.name]) is kind
     assert where is None or last.goal[0].name == where

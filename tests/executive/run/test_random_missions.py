@@ -1,11 +1,14 @@
 """Random missions over all constructs and nestings: they come to an end, nothing is left over, a seed gives one log."""
 
+import contextlib
+
 import pytest
 
 from skills.files.errors import InputError
-from tests.benchmarks.random_missions import ran
+from tests.benchmarks.random_missions import claimed, ran
 
-MISSIONS, GROUP = 300, 30
+MISSIONS, CLAIMS, GROUP = 300, 60, 30
+LYING = (63, 97)
 
 
 @pytest.mark.parametrize("first", range(0, MISSIONS, GROUP))
@@ -24,3 +27,15 @@ def test_random_missions(first):
 @pytest.mark.parametrize("seed", range(1000, 1040))
 def test_the_same_seed_gives_the_same_log(seed):
     assert ran(seed).log == ran(seed).log
+
+
+@pytest.mark.parametrize("first", range(0, CLAIMS, GROUP))
+def test_claim_and_verdict_differ_only_where_a_skill_lied(first):
+    for seed in range(first, first + GROUP):
+        with contextlib.suppress(InputError):
+            assert not claimed(seed).wrong, f"seed {seed}"
+
+
+def test_lies_that_matter_are_among_the_random_missions():
+    """Seeds whose skills lie so that the claim is denied, and one whose lie does not matter."""
+    assert [(one.claim, one.verdict, bool(one.lies)) for one in map(claimed, LYING)] == [(True, False, True)] * 2

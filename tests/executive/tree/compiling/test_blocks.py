@@ -228,6 +228,16 @@ def test_a_round_may_begin_with_what_the_one_before_has_taken(compiled_steps, ti
     assert any(node.name == "the coke is in the gripper" for node in tree.root.walk()) is unsure
 
 
+BEER = "Take [Nothing] to [kitchen] and do [grasp] to [beer]"
+
+
+@pytest.mark.parametrize(("then", "counts"), [(TAKE, True), (BEER, False)])
+def test_what_a_branch_may_have_taken_counts_only_as_what_it_is(compiled_steps, then, counts):
+    """A coke that may be in the gripper is no beer."""
+    tree = compiled_steps(block(Choose(HOLDING, (go(TAKE),))), go(then))
+    assert any(node.kind == "only if holding" and "in-gripper" in node.path_id for node in tree.root.walk()) is counts
+
+
 def test_what_is_taken_before_a_block_is_held_in_its_branches(compiled_steps):
     tree = compiled_steps(go(TAKE), block(Choose(HOLDING, (go(BRING),), (to("bathroom"),))))
     assert [held(tree, n)[0] for n in (-2, -1)] == [(True, "coke")] * 2

@@ -194,6 +194,7 @@ def condition_of(condition: GoalCondition, *, robot: str, answer: bool | None) -
         count=condition.count,
         source=tuple(map(_region, condition.source)),
         goal=tuple(map(_region, condition.goal)),
+        maybe=tuple(map(_region, condition.maybe)),
         person=condition.person,
         wanted=condition.wanted,
         answer=answer,

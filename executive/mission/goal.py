@@ -29,6 +29,7 @@ __all__ = [
 
 BELOW_TOP_M: Final = 0.05
 ABOVE_TOP_M: Final = 0.30
+FLOOR_M: Final = (-0.05, 0.30)
 NEAR_M: Final = 0.75
 POSE_NEAR_M: Final = 0.25
 
@@ -66,7 +67,8 @@ class Area:
 class GoalCondition:
     """One condition. `classes` fulfil it, `count` of them, together called `wanted`; they come from a `source` area
     (none: anywhere) and they or the robot go to a `goal` area; `person` is the one to be handed to or asked for (None:
-    anyone); `when` tells at which times it must hold."""
+    anyone); `when` tells at which times it must hold. What lies
+    in the `maybe` areas may be counted in an answer, or missed."""
 
     kind: GoalKind
     classes: tuple[str, ...] = ()
@@ -76,6 +78,7 @@ class GoalCondition:
     person: str | None = None
     wanted: str = ""
     when: When = When.END_OF_MISSION
+    maybe: tuple[Area, ...] = ()
 
 
 def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition | None:
@@ -164,7 +167,11 @@ def _answered(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]
             GoalKind.ANSWERED, (ANYBODY,), command.object_count, rooms, person=person, wanted=str(command.object)
         )
     classes, areas = _classes(command.object, knowledge), _areas(command, knowledge, elsewhere)
-    return GoalCondition(GoalKind.ANSWERED, classes, command.object_count, areas, wanted=str(command.object))
+    place = None if command.goal is None else knowledge.place(command.goal)
+    rooms = [name for name in knowledge.places if place in (None, name)]
+    floors = tuple(Area(f"the floor of the {name}", knowledge.places[name].polygon, FLOOR_M) for name in rooms)
+    asked = str(command.object)
+    return GoalCondition(GoalKind.ANSWERED, classes, command.object_count, areas, wanted=asked, maybe=floors)
 
 
 def _carried(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> GoalCondition:

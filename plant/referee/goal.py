@@ -58,9 +58,10 @@ class GoalCondition:
 
     `classes` are the object classes that fulfil it (none: any), `wanted` what they are called together (empty: the
     classes) and `count` how many objects (0 counts as 1). `source` is where the objects were taken from (empty:
-    anywhere) or, for an answer, where the robot looked; `goal` where the objects or the robot go (any of the regions).
-    `person` receives the object or, where the class is "person", is asked for (None: anyone). `answer` is what was
-    said, at `answered_s` (None: now). `robot` is the one that acts (None: any).
+    anywhere) or, for an answer, where the robot looked; an answer may count or miss what lies in `maybe`. `goal` is
+    where the objects or the robot go (any of the regions). `person` receives the object or, where the class is
+    "person", is asked for (None: anyone). `answer` is what was said, at `answered_s` (None: now). `robot` is the one
+    that acts (None: any).
 
     `when` says at which times it must hold. The step ran from `began_s` (None: since `since_s`) to `ended_s` (None: it
     ends now). An object that must stay until the end of the mission may be lifted again within the intervals
@@ -73,6 +74,7 @@ class GoalCondition:
     count: int = 1
     source: tuple[Region, ...] = ()
     goal: tuple[Region, ...] = ()
+    maybe: tuple[Region, ...] = ()
     person: str | None = None
     answer: bool | None = None
     answered_s: float | None = None

@@ -249,7 +249,7 @@ def _judge_near_person(condition: GoalCondition, robot: str, truth: Truth) -> Fi
 
 def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
     """The answer equal to the truth at the time when it was given."""
-    then_s = condition.answered_s
+    then_s, aside = condition.answered_s, []
     if condition.classes == (PERSON,):
         when_s = truth.now_s if then_s is None else then_s
         people = ((name, path.at(when_s)) for name, path in truth.persons.items() if condition.person in (None, name))
@@ -258,20 +258,20 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
         who = condition.person or "nobody"
         nothing = f"{who} {verb} {'not ' if condition.person else ''}in {_where(condition.source)}"
     else:
-        rest = (
-            (each, (each.last.p_WO if each.resting else None) if then_s is None else each.at(then_s))
+        rest = [
+            (each.name, p_W)
             for each in _of_class(condition, truth)
-        )
-        there = [
-            f"the {history.name} {'is' if then_s is None else 'was'} on {on}"
-            for history, p_W in rest
-            if p_W is not None and (on := _region_at(condition.source, p_W)) is not None
+            if (p_W := each.at(then_s) if then_s is not None else each.last.p_WO if each.resting else None) is not None
         ]
+        verb = "is" if then_s is None else "was"
+        there = [f"the {name} {verb} on {on}" for name, p_W in rest if (on := _region_at(condition.source, p_W))]
+        aside = [f"the {name} {verb} on {on}" for name, p_W in rest if (on := _region_at(condition.maybe, p_W))]
         nothing = f"there is no {_wanted(condition)}{_in(condition.source)}"
-    fact = len(there) >= condition.needed
+    most = len(there) + len(aside)
+    right = len(there) < condition.needed if condition.answer is False else most >= condition.needed
     said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
-    found = " and ".join(there) or nothing
-    return Finding(condition.answer is fact, f"the answer was {said}, and {found}.")
+    found = " and ".join((*there, *aside)) or nothing
+    return Finding(condition.answer is not None and right, f"the answer was {said}, and {found}.")
 
 
 def _judge_cleared(condition: GoalCondition, truth: Truth) -> Finding:

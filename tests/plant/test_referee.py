@@ -528,6 +528,16 @@ def test_answer_is_compared_with_the_truth(answer, true_of):
     assert not stage.holds(dataclasses.replace(asked, answer=None))
 
 
+def test_an_answer_may_count_or_miss_what_lies_on_the_floor():
+    stage = Stage()
+    floor = square("the floor", -4.0, 4.0, z_min_m=-0.05, z_max_m=0.3)
+    asked = GoalCondition(GoalKind.ANSWERED, ("coke",), source=(SHELF,), maybe=(floor,))
+    assert stage.holds(dataclasses.replace(asked, answer=True))
+    assert stage.holds(dataclasses.replace(asked, answer=False))
+    assert not stage.holds(dataclasses.replace(asked, answer=True, maybe=()))
+    assert not stage.holds(dataclasses.replace(asked, answer=False, source=(TABLE,)))
+
+
 ROOM, OTHER = square("the kitchen", 0.0, 3.0, half=1.0), square("the hall", 4.0, 4.0)
 
 

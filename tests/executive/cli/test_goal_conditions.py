@@ -54,6 +54,12 @@ def test_a_question_about_people_asks_for_them_in_rooms(knowledge, goal, who, pe
     assert [region.name for region in asked.source] == rooms
 
 
+@pytest.mark.parametrize(("goal", "floors"), [("kitchen", ["the floor of the kitchen"]), ("counter", [])])
+def test_a_question_about_a_room_may_count_what_lies_on_its_floor(knowledge, goal, floors):
+    (asked,) = conditions(knowledge, f"Take [Nothing] to [{goal}] and do [find] to [coke]")
+    assert [region.name for region in asked.maybe] == floors
+
+
 def test_a_person_is_named(knowledge):
     (condition,) = conditions(knowledge, "Take [coke] to [Sam] and do [Nothing] to [Nothing]")
     assert (condition.kind, condition.person) == (GoalKind.HANDED_OVER, "Sam")

@@ -29,7 +29,7 @@ from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
 from skills.place.free_spot import clear_spots, free_spots, roomiest_first, spots, unseen_view
 from skills.quantities import Coordinate, Length, Tries, TurnRate
-from skills.robot import ArmTrajectory, FloatArray, Pose2D
+from skills.robot import ArmTrajectory, FloatArray, Image, Pose2D
 from skills.stack import ArmPlanner
 
 ABOVE_M = 0.10
@@ -53,6 +53,7 @@ _BESIDE, _TUCKED_M, _EDGE_M = 0.6, 0.03, 0.1
 _AT_HAND_M, _HIDDEN = 0.4, 0.5
 """A picture of which half is nearer than that, or too near to tell, shows what is held and not what lies behind it."""
 _OVER_SPOT_M = 0.45
+_SETTLES_WITHIN_S, _MOVES_ABOUT_M = 5.0, 0.2
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class Place(ArmSkill[PlaceInputs]):
         Cause.PRECONDITION: "nothing is held",
         Cause.PLANNING: "no free spot is seen within reach, or the arm finds no path to it",
         Cause.EXECUTION: "the robot or its arm did not reach its goal",
-        Cause.POSTCONDITION: "the object is not seen where it was put down, or is still in the gripper",
+        Cause.POSTCONDITION: "the object is not seen at rest where it was put down, or is still in the gripper",
     }
     default_timeout_s = 150.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
@@ -301,7 +302,13 @@ class Place(ArmSkill[PlaceInputs]):
         return cost
 
     def _look(self, surface: Surface, spot_W: FloatArray, beside: Sequence[Box] = ()) -> Routine[SurfaceView | None]:
-        """What a picture shows of the surface, None where the object in the gripper hides all that is free.
+        """What a picture shows of the surface, None where the object in the gripper hides all that is free."""
+        return (yield from self._seen_on(surface, spot_W, beside))[1]
+
+    def _seen_on(
+        self, surface: Surface, spot_W: FloatArray, beside: Sequence[Box] = ()
+    ) -> Routine[tuple[Image, SurfaceView | None]]:
+        """A picture and what it shows of the surface, None where the object in the gripper hides all that is free.
 
         It hides the picture's lower half at least, so the camera looks low. Raises SkillFailure: there is no surface.
         """
@@ -320,7 +327,8 @@ class Place(ArmSkill[PlaceInputs]):
         hidden = near > _HIDDEN and robot.gripper().holding and robot.scan() is not None
         if view is None and not hidden:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
-        return None if view is None or (hidden and len(free_spots(view, self._spots(surface))) == 0) else view
+        full = view is None or (hidden and len(free_spots(view, self._spots(surface))) == 0)
+        return image, None if full else view
 
     def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView | None]:
         """What the cameras at the body's front see of the floor: the object hides it from one on the hand."""
@@ -406,21 +414,27 @@ class Place(ArmSkill[PlaceInputs]):
             raise SkillFailure(Cause.PLANNING, "the hand cannot be drawn back from the object")
 
     def _check(self, surface: Surface, spot_W: FloatArray, put_down: Sequence[Box] = ()) -> Routine[None]:
-        """Raise SkillFailure with cause POSTCONDITION unless something stands where the object was put.
+        """Raise SkillFailure with cause POSTCONDITION unless something stands, at rest, where the object was put.
 
         The arm goes round `put_down`, the object's box (B), on its way.
         """
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
-        view = yield from self._look(surface, spot_W, put_down)
-        if view is None:
-            raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
-        off = [float(np.min(np.linalg.norm(c.points.p_W[:, :2] - spot_W, axis=1))) for c in view.clusters]
-        if not off or min(off) > self.options.seen_again_m:
-            yield from self.try_stow()
-            raise SkillFailure(
-                Cause.POSTCONDITION, f"the object is not seen on the {surface.name} where it was put down"
-            )
+        end_s, at_rest = self.context.clock.now() + _SETTLES_WITHIN_S, False
+        while not at_rest:
+            image, view = yield from self._seen_on(surface, spot_W, put_down)
+            if view is None:
+                raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
+            off = [float(np.min(np.linalg.norm(c.points.p_W[:, :2] - spot_W, axis=1))) for c in view.clusters]
+            if not off or min(off) > self.options.seen_again_m:
+                yield from self.try_stow()
+                where = f"on the {surface.name} where it was put down"
+                raise SkillFailure(Cause.POSTCONDITION, f"the object is not seen {where}")
+            p_WO = np.array([*spot_W, surface.height_m])
+            at_rest = yield from self.at_rest_since(image, p_WO, _MOVES_ABOUT_M, "looking whether it is at rest")
+            if not at_rest and self.context.clock.now() > end_s:
+                yield from self.try_stow()
+                raise SkillFailure(Cause.POSTCONDITION, f"the object still moves on the {surface.name}")
 
     def _held(self, carried: RotationMatrix) -> HeldObject:
         """What is held, as the skill noted that took it, or else as may be guessed from how it was brought."""

@@ -8,7 +8,8 @@ from py_trees.common import Status
 
 from executive.tree.behaviours.board import Constant, FromBoard
 from executive.tree.behaviours.skill_leaf import SkillLeaf
-from skills.api import Cause, Failed, Running, Skill, Succeeded
+from plant.spot.capabilities import spot_capabilities
+from skills.api import Cause, Failed, Part, Running, Skill, Succeeded
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ def leaf_of(
         outputs=outputs or {},
         limit_s=limit_s,
         context=context,
+        first=more.get("first"),
     )
     return leaf, log
 
@@ -201,3 +203,81 @@ def test_a_skill_that_raises_what_is_no_exception_fails_with_its_name(context, c
     leaf, _ = leaf_of(context, [defect])
     assert tick(leaf, clock) == [Status.FAILURE]
     assert (leaf.cause, leaf.message) == (Cause.ERROR, f"listed raised {type(defect).__name__}: {defect}")
+
+
+def stow_of(log, *steps):
+    """A skill for the arm alone that gives these steps in turn."""
+
+    class Stowing(Skill[Inputs]):
+        name = "stow"
+        Inputs: ClassVar[type] = Inputs
+        uses = frozenset({Part.ARM})
+
+        def begin(self, inputs: Inputs) -> None:
+            log.append("begin stow")
+            self.steps = list(steps)
+
+        def step(self) -> Any:
+            return self.steps.pop(0)
+
+        def end(self) -> None:
+            log.append("end stow")
+
+    return Stowing
+
+
+@pytest.fixture
+def armed(context, robot, monkeypatch):
+    """A robot with an arm that may be anywhere."""
+    monkeypatch.setattr(robot, "capabilities", spot_capabilities)
+    context.arm_order.anywhere = True
+    return context
+
+
+@pytest.mark.parametrize("last", [Succeeded("stowed"), Failed(Cause.PLANNING, "no way")])
+def test_an_arm_that_may_be_anywhere_is_brought_in_before_the_skill_begins(armed, clock, last):
+    calls: list[str] = []
+    leaf, log = leaf_of(armed, [Succeeded("gone")], first=stow_of(calls, Running("stowing"), last))
+    assert tick(leaf, clock, 2) == [Status.RUNNING] * 2
+    assert (calls, log) == (["begin stow", "end stow"], ["begin 0"])
+    assert tick(leaf, clock) == [Status.SUCCESS]
+
+
+def test_an_arm_that_is_where_it_is_to_be_stays_there(armed, clock):
+    armed.arm_order.anywhere = False
+    calls: list[str] = []
+    leaf, _ = leaf_of(armed, [Succeeded("gone")], first=stow_of(calls))
+    assert tick(leaf, clock) == [Status.SUCCESS]
+    assert calls == []
+
+
+def test_a_halt_while_the_arm_is_brought_in_ends_that(armed, clock):
+    calls: list[str] = []
+    leaf, log = leaf_of(armed, [], first=stow_of(calls, *[Running("stowing")] * 9))
+    tick(leaf, clock, 2)
+    leaf.stop(Status.INVALID)
+    assert (calls, log, leaf.active) == (["begin stow", "end stow"], [], False)
+    assert armed.arm_order.anywhere
+
+
+@pytest.mark.parametrize(
+    ("uses", "step", "anywhere"),
+    [
+        ({Part.ARM}, Succeeded("posed"), False),  # it leaves the arm as it is to be
+        ({Part.ARM}, Failed(Cause.EXECUTION, "stuck"), True),
+        ({Part.ARM, Part.BASE}, Succeeded("seen"), True),
+        ({Part.BASE}, Failed(Cause.EXECUTION, "blocked"), False),  # it does not use the arm
+    ],
+)
+def test_a_leaf_notes_whether_the_arm_may_be_anywhere(context, clock, uses, step, anywhere):
+    leaf, _ = leaf_of(context, [step])
+    leaf.skill.uses = frozenset(uses)
+    tick(leaf, clock)
+    assert context.arm_order.anywhere is anywhere
+
+
+def test_a_halted_skill_that_uses_the_arm_may_leave_it_anywhere(context, clock):
+    leaf, _ = leaf_of(context, [Running("reaching")] * 3)
+    tick(leaf, clock)
+    leaf.stop(Status.INVALID)
+    assert context.arm_order.anywhere

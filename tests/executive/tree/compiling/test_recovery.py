@@ -14,7 +14,7 @@ from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiler import compile_mission
 from executive.tree.compiling.search import surfaces_elsewhere
 from executive.tree.registry import built_in_skills
-from skills.api import Cause, Failed, Succeeded
+from skills.api import Cause, Failed, Succeeded, Thing
 from skills.robot import Pose2D
 
 GO = "Take [Nothing] to [hall] and do [Nothing] to [Nothing]"
@@ -500,3 +500,41 @@ def test_thresholds_come_from_the_knowledge(compiled, knowledge, registry):
     battery, lost = (node.options["condition"] for node in compiled(GO).root.walk() if node.kind == "interrupt")
     assert (battery.charge, battery.dock) == (0.15, Pose2D(0.0, -1.0, 0.0))
     assert lost.patience_s < RunSettings().time_limit_s
+
+
+# ---- the hand is felt before anything is searched for
+
+
+def test_what_a_failed_grasp_holds_is_used_and_not_searched_for_again(compiled, run_tree, script, robot):
+    def closes(skill):
+        robot.holding, skill.context.payload.thing = True, Thing("coke")
+        return Failed(Cause.EXECUTION, "the arm was stopped while carrying the coke")
+
+    script.ends["grasp"] = closes
+    worst = run_tree(compiled(GRASP)).worst
+    assert worst.outcome is Outcome.SUCCESS, worst.message
+    assert script.begun == ["navigate", "detect", "approach", "grasp", "stow"]
+
+
+def test_what_an_earlier_step_took_is_not_searched_for(compiled, run_tree, script, robot, context):
+    def holds_it(skill):
+        robot.holding, skill.context.payload.thing = True, Thing("coke")
+        return Succeeded("gone")
+
+    script.ends["navigate"] = holds_it
+    assert run_tree(compiled(GO, GRASP)).worst.outcome is Outcome.SUCCESS
+    assert script.begun == ["navigate", "stow"]
+
+
+def test_what_was_not_handed_over_is_picked_up_and_handed_over_again(compiled, run_tree, script, robot, make, fails):
+    def drops(skill):
+        robot.let_go()
+        if script.begun.count("hand_over") == 1:
+            return Failed(Cause.POSTCONDITION, "the coke fell to the floor before Robin")
+        return Succeeded("given")
+
+    fails("grasp")
+    script.ends["hand_over"], script.seen_on = drops, ("counter", "floor")
+    worst = run_tree(compiled(*make.FETCH)).worst
+    assert worst.outcome is Outcome.SUCCESS, worst.message
+    assert (script.begun.count("hand_over"), script.begun.count("grasp")) == (2, 2)

@@ -1,12 +1,16 @@
 """What the place skill does when it cannot put the thing down."""
 
+import math
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 from scripted_robot import ScriptedRobot, context_of, failed
+from table_scene import RED, Can
+from table_scene import TABLE as TOP
 
 from plant.spot.capabilities import spot_capabilities
-from skills.api import Cause, Failed, Running, Surface
+from skills.api import Cause, Failed, Running, Succeeded, Surface
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model
 from skills.arm.motion import RrtConnect
@@ -38,11 +42,11 @@ def test_a_surface_without_a_spot_out_of_the_way_is_a_failed_planning_before_any
     assert (robot.arm_commands, robot.holding) == ([], True)
 
 
-def resumed(robot, checkpoint):
+def resumed(robot, checkpoint, surface=TABLE):
     """Go on to the end of putting down, which a restart broke off."""
     skill = Place(context_of(robot))
     skill.checkpoint = checkpoint
-    skill.resume(PlaceInputs(TABLE))
+    skill.resume(PlaceInputs(surface))
     while isinstance(step := skill.step(), Running):
         robot.advance(0.05)
     skill.end()
@@ -61,6 +65,27 @@ def test_after_a_restart_an_empty_gripper_makes_the_robot_look_whether_the_thing
     assert isinstance(step, Failed)  # the scripted camera is dark
     assert "not seen" in step.message
     assert robot.arm_commands
+
+
+class _Rolling(ScriptedRobot):
+    """A can stands on the table, and rolls to and fro until a time."""
+
+    rests_s = 0.0
+
+    def image(self, source, *, visual=True, depth=True):
+        off_m = 0.02 * math.sin(7.0 * min(self.now_s, self.rests_s))
+        self.things = (Can(0.95, off_m, 0.033, 0.115, RED),)
+        return super().image(source, visual=visual, depth=depth)
+
+
+@pytest.mark.parametrize(("rests_s", "why"), [(0.0, None), (3.0, None), (math.inf, "the object still moves on the")])
+def test_what_was_put_down_is_to_be_at_rest(rests_s, why):
+    robot = _Rolling()
+    robot.rests_s = rests_s
+    step = resumed(robot, {"spot_W": [0.95, 0.0]}, TOP)
+    assert isinstance(step, Succeeded) is (why is None), step
+    assert robot.now_s > rests_s or why is not None
+    assert why is None or (step.cause is Cause.POSTCONDITION and why in step.message)
 
 
 def test_a_thing_still_held_after_a_restart_is_put_down_as_it_was_brought():

@@ -81,7 +81,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
         prepared.tree,
         knowledge=prepared.knowledge,
         start=world.start,
-        abilities=abilities_in(world, prepared.kind),
+        abilities=_by_sight(abilities_in(world, prepared.kind), prepared.stack_file, prepared.kind),
         planner=planner or route_planner_of(world, prepared.stack_file, prepared.kind),
         estimates=load_estimates(),
     )
@@ -105,7 +105,25 @@ def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
         only = own.class_name not in others or own.class_name not in masses
         masses[own.class_name] = own.mass_kg if only else min(own.mass_kg, masses[own.class_name])
         others.add(own.class_name)
-    return replace(abilities, masses_kg=masses)
+    rules = world.seed_rules
+    takers = frozenset(person.name for person in rules.people if person.receives)
+    taken_m2: dict[str, float] = {}
+    for rule in rules.objects:
+        if len(rule.surfaces) == 1:
+            width_m = abilities.widths_m.get(rule.model, 0.0)
+            taken_m2[rule.surfaces[0]] = taken_m2.get(rule.surfaces[0], 0.0) + (width_m + rules.rules.clear_m) ** 2
+    return replace(abilities, masses_kg=masses, takers=takers, taken_m2=taken_m2, apart_m=rules.rules.clear_m)
+
+
+def _by_sight(abilities: Abilities, stack_file: Path | None, kind: str) -> Abilities:
+    """The abilities with only those classes that the detector of a stack knows. Raises InputError."""
+    file = stack_file or robot_kind(kind).stack
+    stack = None if file is None else load_stack(file)
+    if stack is None or stack.detector == default_component("detector"):
+        return abilities
+    from executive.cli.assembly import shared_detector
+
+    return replace(abilities, classes=abilities.classes & frozenset(shared_detector(stack).class_names))
 
 
 @cache
@@ -122,6 +140,7 @@ def abilities_of(kind: str) -> Abilities:
         reached_heights_m(capabilities),
         {name: form.width_m[0] for name, form in class_forms().items()},
         math.inf if capabilities.gripper is None else capabilities.gripper.max_grasp_m,
+        capabilities.gripper is not None and capabilities.arm is not None,
     )
 
 

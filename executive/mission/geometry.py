@@ -27,6 +27,11 @@ def inside(polygon: Sequence[Point], point: Point) -> bool:
     return bool(shapely.contains_xy(_outline(tuple(polygon)), *point))
 
 
+def area_m2(polygon: Sequence[Point]) -> float:
+    """The area within the outline."""
+    return float(_outline(tuple(polygon)).area)
+
+
 def distance_m(polygon: Sequence[Point], point: Point) -> float:
     """How far (x, y) lies outside the outline; 0 within it."""
     return float(shapely.distance(_outline(tuple(polygon)), shapely.Point(point)))

@@ -7,7 +7,8 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from executive.mission.command import Task
+from executive.mission.command import START, Task
+from executive.mission.geometry import area_m2
 from executive.mission.gripper import InGripper, cannot_take, objection
 from executive.mission.knowledge import Knowledge
 from executive.tree.compiler import CompiledTree, StepPart
@@ -29,7 +30,9 @@ class Abilities:
     A class that is not in `masses_kg` has no model: no world has such an object. `classes` and `attributes` are those
     that the robot knows by sight; one that it does not know spoils a search for several. `reaches_m` are the lowest and
     the highest surface that the arm reaches, over the floor; `widths_m` is the least width of each class, and `opens_m`
-    is how wide an object the gripper takes.
+    is how wide an object the gripper takes; `gripper` says whether it has one. `takers` are the people who take what is
+    handed to them (None: not known). `taken_m2` is the area of each surface that its objects surely cover, and
+    `apart_m` what is left free around an object.
     """
 
     masses_kg: Mapping[str, float]
@@ -39,6 +42,10 @@ class Abilities:
     reaches_m: tuple[float, float] = (-math.inf, math.inf)
     widths_m: Mapping[str, float] = field(default_factory=dict)
     opens_m: float = math.inf
+    gripper: bool = True
+    takers: frozenset[str] | None = None
+    taken_m2: Mapping[str, float] = field(default_factory=dict)
+    apart_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -89,7 +96,8 @@ def check_tree(
     impossible = tuple(error for part in tree.parts for error in _impossible(part, tree, knowledge, abilities))
     grasps = tuple(_gripper_errors(tree, knowledge, held))
     estimate, unreachable, warnings = estimate_tree(tree.root, start=start, planner=planner, estimates=estimates)
-    return Checked((*impossible, *grasps, *unreachable), estimate, warnings)
+    full = tuple(_full_surfaces(tree, knowledge, abilities))
+    return Checked((*impossible, *grasps, *unreachable), estimate, (*full, *warnings))
 
 
 def _gripper_errors(tree: CompiledTree, knowledge: Knowledge, held: InGripper | None) -> Iterator[InputError]:
@@ -119,6 +127,14 @@ def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilit
     command = part.command
     if command is None:
         return
+    handles = command.item is not None or command.task in (Task.GRASP, Task.PLACE)
+    if handles and not abilities.gripper:
+        what = command.item or command.object
+        yield _at(
+            part, tree, f"this kind of robot has no gripper to take the {what} with", "choose another kind of robot"
+        )
+        return
+    yield from _nobody_takes(part, tree, knowledge, abilities)
     if (command.item is not None or command.task is Task.GRASP) and command.goal is not None:
         yield from _out_of_reach(part, tree, command.goal, knowledge, abilities)
     if command.task not in (Task.GRASP, Task.FIND) or command.object is None:
@@ -141,6 +157,45 @@ def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilit
         known = [one for one in knowledge.things if one in abilities.classes]
         message = f"the robot does not know what {listing(unseen)} looks like"
         yield _at(part, tree, message, f"it knows {listing(known)} by sight")
+
+
+def _nobody_takes(
+    part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilities: Abilities
+) -> Iterator[InputError]:
+    """That something is to be handed over where nobody is who takes it."""
+    command = part.command
+    if command is None or command.item is None or command.task is Task.PLACE or abilities.takers is None:
+        return
+    person = None if command.goal is None else knowledge.person(command.goal)
+    if command.goal == START and not abilities.takers:
+        hint = "name a surface to put it on, or add somebody under 'people'"
+        yield _at(part, tree, f"nobody is in this world who could take the {command.item}", hint)
+    elif person is not None and person not in abilities.takers:
+        others = (
+            f"name {listing(sorted(abilities.takers), last='or')}" if abilities.takers else "add them under 'people'"
+        )
+        message = f"{person} is not in this world, or takes nothing, so nobody takes the {command.item}"
+        yield _at(part, tree, message, f"{others}, or name a surface to put it on")
+
+
+def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[InputError]:
+    """The steps that put more on a surface than there is room for, as far as sizes and objects are known."""
+    brought_m2: dict[str, float] = {}
+    for part in tree.parts:
+        command = part.command
+        item = None if command is None else command.item or (command.object if command.task is Task.PLACE else None)
+        place = None if command is None or command.goal is None else knowledge.place(command.goal)
+        if command is None or item is None or place is None or not knowledge.surfaces_in(place):
+            continue
+        classes = knowledge.classes(knowledge.thing(item.name) or item.name)
+        width_m = min((abilities.widths_m.get(one, 0.0) for one in classes), default=0.0)
+        brought_m2[place] = brought_m2.get(place, 0.0) + max(1, command.item_count) * (width_m + abilities.apart_m) ** 2
+        surfaces = knowledge.surfaces_in(place)
+        room_m2 = sum(area_m2(knowledge.surfaces[one].polygon) for one in surfaces)
+        taken_m2 = sum(abilities.taken_m2.get(one, 0.0) for one in surfaces)
+        if width_m and brought_m2[place] > room_m2 - taken_m2:
+            message = f"the {place} is probably full before the {item} is put there"
+            yield _at(part, tree, message, "name another surface, or clear it first")
 
 
 def _narrowest_m(classes: Collection[str], abilities: Abilities) -> float:

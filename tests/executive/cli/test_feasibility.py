@@ -1,8 +1,10 @@
 """What the kinds of robots are able to, as far as is known before a mission."""
 
+from dataclasses import replace
+
 import pytest
 
-from executive.cli.feasibility import abilities_of, reached_heights_m, route_planner_of
+from executive.cli.feasibility import abilities_in, abilities_of, reached_heights_m, route_planner_of
 from plant.kinds import robot_kind
 from plant.worlds.world import load_world
 from skills.robot import Pose2D
@@ -37,3 +39,13 @@ def test_a_fetch_gets_through_the_narrowest_door_of_a_world_wherever_it_begins(a
     planner = route_planner_of(load_world("lab"), kind="fetch", kept=False)
     route = planner.route(Pose2D(14.38 + aside_m, 10.52, -2.671), Pose2D(15.0, 9.1, 0.0))
     assert 3.0 < route.length_m < 5.0
+
+
+def test_who_takes_things_and_what_covers_the_surfaces_are_those_of_the_world():
+    world = load_world("flat")
+    able = abilities_in(world)
+    assert able.takers == {person.name for person in world.seed_rules.people}
+    assert able.apart_m == world.seed_rules.rules.clear_m
+    assert all(name in world.surfaces and taken_m2 > 0.0 for name, taken_m2 in able.taken_m2.items())
+    nobody = replace(world, seed_rules=world.seed_rules.model_copy(update={"people": ()}))
+    assert abilities_in(nobody).takers == frozenset()

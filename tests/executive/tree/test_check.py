@@ -253,3 +253,40 @@ def test_what_is_wider_than_the_gripper_opens_is_told_unless_another_is_meant_as
     (told_of_beer,) = told(check(GET.format("beer"), abilities=narrow))
     assert told_of_beer == (1, "'beer' is too wide: 0.1 m, and the gripper takes 0.09 m")
     assert told(check(GET.format("drink"), abilities=narrow)) == []
+
+
+HAND_OVER = "Take [coke] to [start] and do [Nothing] to [Nothing]"
+TO_ROBIN = "Take [coke] to [Robin] and do [Nothing] to [Nothing]"
+PUT_DOWN = "Take [coke] to [bedroom] and do [Nothing] to [Nothing]"
+
+
+def test_a_hand_over_in_a_world_without_people_is_refused_with_its_line(check):
+    nobody = replace(ABLE, takers=frozenset())
+    checked = check(GET.format("coke"), HAND_OVER, abilities=nobody)
+    assert told(checked) == [(2, "nobody is in this world who could take the coke")]
+    assert "surface" in checked.errors[0].hint
+    assert told(check(GET.format("coke"), PUT_DOWN, abilities=nobody)) == []
+
+
+def test_a_person_who_is_not_in_the_world_is_told_by_name_with_those_who_are(check):
+    (error,) = check(GET.format("coke"), TO_ROBIN, abilities=replace(ABLE, takers=frozenset({"Anna"}))).errors
+    assert error.message.startswith("Robin is not in this world, or takes nothing")
+    assert "name Anna" in error.hint
+    assert told(check(GET.format("coke"), TO_ROBIN, abilities=replace(ABLE, takers=frozenset({"Robin"})))) == []
+
+
+def test_a_robot_without_a_gripper_is_told_for_each_step_that_needs_one(check):
+    checked = check(GO.format("kitchen"), GET.format("coke"), abilities=replace(ABLE, gripper=False))
+    assert told(checked) == [(2, "this kind of robot has no gripper to take the coke with")]
+
+
+def test_a_surface_that_is_full_by_what_surely_lies_there_is_warned_of(check, knowledge):
+    (name,) = knowledge.surfaces_in("bedroom")
+    sizes = {"widths_m": {"coke": 0.066}, "apart_m": 0.1}
+    full, half = (replace(ABLE, taken_m2={name: taken}, **sizes) for taken in (99.0, 0.01))
+    checked = check(GET.format("coke"), PUT_DOWN, abilities=full)
+    assert [(one.line, one.message) for one in checked.warnings] == [
+        (2, "the bedroom is probably full before the coke is put there")
+    ]
+    assert checked.errors == ()
+    assert check(GET.format("coke"), PUT_DOWN, abilities=half).warnings == ()

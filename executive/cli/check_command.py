@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from graphlib import TopologicalSorter
@@ -90,13 +91,16 @@ def _of_all(prepared: Prepared, estimates: Mapping[str, Estimate]) -> Estimate:
     """What several robots take together: until the last is done, all that is driven, the most that one charge gives."""
     after = {each.mission.robot_name: each.after for each in prepared.all}
     done_s: dict[str, float] = {}
+    latest_s: dict[str, float] = {}
     for name in TopologicalSorter(after).static_order():
         done_s[name] = estimates[name].duration_s + max((done_s[first] for first in after[name]), default=0.0)
-    return Estimate(
+        latest_s[name] = estimates[name].most_s + max((latest_s[first] for first in after[name]), default=0.0)
+    whole = Estimate(
         max(done_s.values()),
         sum(each.distance_m for each in estimates.values()),
         max(each.charge for each in estimates.values()),
     )
+    return whole.up_to(max(latest_s.values()), *(reason for each in estimates.values() for reason in each.reasons))
 
 
 def check(
@@ -129,7 +133,8 @@ def check(
 
 
 def to_json(checked: Sequence[CheckedFile]) -> dict[str, Any]:
-    """All files as one object: whether all are well, errors, warnings, how many nodes, and the commands in order."""
+    """All files as one object: whether all are well, errors, warnings, how many nodes, the commands in order, and what
+    each file that is well takes."""
     trees = [tree for one in checked for tree in one.trees]
     return {
         "ok": all(one.ok for one in checked),
@@ -137,6 +142,20 @@ def to_json(checked: Sequence[CheckedFile]) -> dict[str, Any]:
         "warnings": [_error_json(warning) for one in checked for warning in one.warnings],
         "nodes": sum(len(tree.path_ids) for tree in trees),
         "commands": [str(command) for tree in trees for command in tree.commands],
+        "estimates": [_estimate_json(one) for one in checked if one.ok],
+    }
+
+
+def _estimate_json(one: CheckedFile) -> dict[str, Any]:
+    """What a file takes; `most_s` is null where nobody knows how long it may take."""
+    taken = one.estimate
+    return {
+        "file": str(one.file),
+        "least_s": round(taken.duration_s, 1),
+        "most_s": None if math.isinf(taken.most_s) else round(taken.most_s, 1),
+        "reasons": list(taken.reasons),
+        "distance_m": round(taken.distance_m, 2),
+        "charge": round(taken.charge, 4),
     }
 
 
@@ -170,8 +189,20 @@ def _show(one: CheckedFile, console: Console, *, verbose: bool) -> None:
 
 
 def _in_words(estimate: Estimate) -> str:
-    minutes, seconds = divmod(round(estimate.duration_s), 60)
     charge = f"{estimate.charge:.1%} of the battery" if estimate.charge <= 1.0 else "more than one charge"
-    return (
-        f"about {minutes} min {seconds:02d} s, {estimate.distance_m:.0f} m of driving and {charge} when all goes well"
-    )
+    return f"{_range_in_words(estimate)}, {estimate.distance_m:.0f} m of driving and {charge} when all goes well"
+
+
+def _range_in_words(estimate: Estimate) -> str:
+    """How long it takes: "about 2 min 05 s", "2 min 05 s to 5 min 10 s (1 to 3 rounds)"."""
+    least = _minutes(estimate.duration_s)
+    if round(estimate.spare_s if math.isfinite(estimate.spare_s) else 1.0) == 0:
+        return f"about {least}"
+    most = "or more" if math.isinf(estimate.spare_s) else f"to {_minutes(estimate.most_s)}"
+    return f"{least} {most} ({'; '.join(estimate.reasons)})"
+
+
+def _minutes(duration_s: float) -> str:
+    minutes, seconds = divmod(round(duration_s), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {seconds:02d} s"

@@ -6,8 +6,9 @@ A tree's nodes are followed in the order in which they run without failures: of 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Final, Protocol
 
@@ -24,6 +25,7 @@ __all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "e
 Positive = Annotated[float, Field(gt=0.0)]
 NAVIGATE: Final = "navigate"
 CHARGE: Final = "charge"
+DAY_S: Final = 86400.0
 USUALLY_FOUND: Final = 3
 """How many objects a look usually finds, one after the other; how many there are is not known before."""
 
@@ -73,16 +75,35 @@ class RoutePlanner(Protocol):
 
 @dataclass(frozen=True)
 class Estimate:
-    """Time on the robot's clock (s), distance driven (m), and charge used (share of a full battery)."""
+    """Time on the robot's clock (s), distance driven (m), and charge used (share of a full battery), at least.
+
+    It may take `spare_s` longer (infinite: nobody knows how long), for the `reasons`: "1 to 3 rounds", "until 18:00".
+    """
 
     duration_s: float = 0.0
     distance_m: float = 0.0
     charge: float = 0.0
+    spare_s: float = 0.0
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def most_s(self) -> float:
+        """The longest time (s) that it may take when all goes well."""
+        return self.duration_s + self.spare_s
 
     def __add__(self, other: Estimate) -> Estimate:
         return Estimate(
-            self.duration_s + other.duration_s, self.distance_m + other.distance_m, self.charge + other.charge
+            self.duration_s + other.duration_s,
+            self.distance_m + other.distance_m,
+            self.charge + other.charge,
+            self.spare_s + other.spare_s,
+            tuple(dict.fromkeys((*self.reasons, *other.reasons))),
         )
+
+    def up_to(self, most_s: float, *reasons: str) -> Estimate:
+        """The same, that may last so long for these reasons, before its own."""
+        kept = tuple(dict.fromkeys((*reasons, *self.reasons)))
+        return replace(self, spare_s=max(0.0, most_s - self.duration_s), reasons=kept)
 
 
 class _CannotError(Exception):
@@ -246,7 +267,12 @@ def _together(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     distance_m = sum(share * taken.distance_m for share, (taken, _) in zip(shares, branches, strict=True))
     charge = sum(share * taken.charge for share, (taken, _) in zip(shares, branches, strict=True))
     walk.pose, walk.noted, walk.drawn = max(branches, key=lambda each: each[0].distance_m)[1]
-    return Estimate(ends_s, distance_m, charge)
+    reasons = tuple(dict.fromkeys(reason for taken, _ in branches for reason in taken.reasons))
+    most_s, needed = max(taken.most_s for taken, _ in branches), node.options["needed"]
+    if needed < len(branches) and most_s > ends_s:
+        done = "the first" if needed == 1 else f"the first {needed}"
+        reasons = (f"until {done} of {len(branches)} steps is done", *reasons)
+    return Estimate(ends_s, distance_m, charge).up_to(most_s, *reasons)
 
 
 def _longest(branches: Sequence[NodeSpec], walk: _Walk, *, first: bool) -> Estimate:
@@ -263,16 +289,47 @@ def _longest(branches: Sequence[NodeSpec], walk: _Walk, *, first: bool) -> Estim
 
 
 def _rounds(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """So many rounds as are known before, else one; the second stands for all that follow it."""
-    times = node.options["times"] if node.options["mode"] == "times" and node.options["times"] else 1
-    estimate = _all_of(node, walk, first)
-    if times > 1:
-        again = _all_of(node, walk, first)
-        more = times - 1
-        estimate += Estimate(more * again.duration_s, more * again.distance_m, more * again.charge)
-        pauses_s = max(0.0, more * node.options["every_s"] - estimate.duration_s * more / times)
-        estimate += Estimate(pauses_s, 0.0, pauses_s * walk.estimates.battery.standing_per_s)
-    return estimate
+    """So many rounds as are known before, else from one on; the second stands for all that follow it."""
+    times, fixed = node.options["times"], node.options["mode"] == "times"
+    begun = _all_of(node, walk, first)
+    if fixed and times:
+        return _repeated(node, walk, first, begun, times)
+    if not times:
+        endless = "for ever" if fixed else f"{node.options['mode']} {node.options['words']}"
+        return begun.up_to(math.inf, endless)
+    if times == 1:
+        return begun
+    here, noted, drawn = walk.pose, dict(walk.noted), walk.drawn
+    most_s = _repeated(node, walk, first, begun, times).most_s
+    walk.pose, walk.noted, walk.drawn = here, noted, drawn
+    return begun.up_to(most_s, f"1 to {times} rounds")
+
+
+def _repeated(node: NodeSpec, walk: _Walk, first: bool, begun: Estimate, times: int) -> Estimate:
+    """All rounds, of which the first has `begun`."""
+    if times == 1:
+        return begun
+    again, more = _all_of(node, walk, first), times - 1
+    rest = Estimate(more * again.duration_s, more * again.distance_m, more * again.charge, more * again.spare_s)
+    rounds = begun + rest
+    pauses_s = max(0.0, more * node.options["every_s"] - rounds.duration_s * more / times)
+    return rounds + Estimate(pauses_s, 0.0, pauses_s * walk.estimates.battery.standing_per_s)
+
+
+def _wait_until(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
+    """Until a time of day: how long that is depends on when the mission comes to it."""
+    return Estimate().up_to(DAY_S, f"until {node.options['words']}")
+
+
+def _wait_for(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
+    """Until something holds: nobody knows when."""
+    return _all_of(node, walk, first).up_to(math.inf, f"until {node.options['words']}")
+
+
+def _in_time(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
+    """What a time limit leaves of the range."""
+    taken, limit_s = _all_of(node, walk, first), node.options["limit_s"]
+    return taken if taken.most_s <= limit_s else taken.up_to(limit_s, f"{limit_s:g} s at most")
 
 
 _VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
@@ -286,6 +343,9 @@ _VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
     "choose": _longest_of,
     "together": _together,
     "repeat": _rounds,
+    "wait until": _wait_until,
+    "wait for": _wait_for,
+    "timeout": _in_time,
 }
 
 

@@ -92,7 +92,8 @@ def test_json_is_one_object_for_all_files(write):
     result = invoke(GOOD, bad, "--json")
     assert result.exit_code == 2
     told = json.loads(result.stdout.splitlines()[-1])
-    assert set(told) == {"ok", "errors", "warnings", "nodes", "commands"}
+    assert set(told) == {"ok", "errors", "warnings", "nodes", "commands", "estimates"}
+    assert [one["file"] for one in told["estimates"]] == [str(GOOD)]
     assert told["ok"] is False
     assert told["nodes"] > 3
     assert told["commands"] == ["Take [Nothing] to [living room] and do [Nothing] to [Nothing]"]
@@ -210,3 +211,10 @@ def test_a_world_that_the_simulation_cannot_use_is_refused(tmp_path, write, radi
     write("start: {x: 0, y: 0, yaw: 0}\n", "home/knowledge.yaml")
     result = invoke(write("name: x\nsteps: [{speak: hello}]\n"), "--world", home)
     assert (result.exit_code, said in result.stderr) == (2 if said else 0, True), result.stderr
+
+
+def test_a_range_of_time_is_printed_with_its_reason_and_stands_in_the_json(write):
+    file = write('name: wait\nworld: flat\nsteps:\n  - wait: {until_clock: "18:00"}\n')
+    (estimate,) = json.loads(invoke(file, "--json").stdout)["estimates"]
+    assert (estimate["least_s"], estimate["most_s"], estimate["reasons"]) == (0.0, 86400.0, ["until 18:00"])
+    assert "0 min 00 s to 24 h 00 min (until 18:00)" in " ".join(invoke(file).stdout.split())

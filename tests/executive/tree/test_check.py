@@ -1,13 +1,15 @@
 """What speaks against a mission before it runs, and what it will take."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from executive.mission.command import parse_command
-from executive.mission.file.blocks import Together, Wait
-from executive.mission.file.model import Mission, MissionStep, SkillCall
+from executive.mission.condition import Look
+from executive.mission.file.blocks import Repeat, Together, Wait
+from executive.mission.file.model import Mission, MissionStep, SkillCall, StepPolicy
 from executive.tree.check import Abilities, PlannedRoutes, check_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.estimate import Route, load_estimates
@@ -23,6 +25,7 @@ MASSES = {"coke": 0.35, "beer": 0.55, "hammer": 0.5}
 ABLE = Abilities(MASSES, 5.0, frozenset(MASSES), frozenset({"red"}))
 GET = "Take [Nothing] to [kitchen] and do [grasp] to [{}]"
 GO = "Take [Nothing] to [{}] and do [Nothing] to [Nothing]"
+FIND = "Take [Nothing] to [kitchen] and do [find] to [coke]"
 ONLY_COKE = {"classes": frozenset({"coke"})}
 
 
@@ -74,6 +77,7 @@ def test_steps_together_take_as_long_as_those_that_must_be_done(check):
     alone, either, both = (check(one).estimate for one in (drive, *(_together(drive, wait, n) for n in (1, 2))))
     assert alone.duration_s < 60
     assert either.duration_s == pytest.approx(alone.duration_s)
+    assert (either.most_s, either.reasons) == (300.0, ("until the first of 2 steps is done",))
     assert (both.duration_s, both.distance_m) == (300.0, pytest.approx(alone.distance_m))
 
 
@@ -290,3 +294,27 @@ def test_a_surface_that_is_full_by_what_surely_lies_there_is_warned_of(check, kn
     ]
     assert checked.errors == ()
     assert check(GET.format("coke"), PUT_DOWN, abilities=half).warnings == ()
+
+
+def test_rounds_until_something_holds_are_a_range_up_to_the_most_of_them(check):
+    go, look = MissionStep((parse_command(GO.format("kitchen")),)), Look(parse_command(FIND))
+    once = check(MissionStep(block=Repeat((go,), times=1))).estimate
+    some = check(MissionStep(block=Repeat((go,), times=3, until=look))).estimate
+    endless = check(MissionStep(block=Repeat((go,), until=look))).estimate
+    fixed = check(MissionStep(block=Repeat((go,), times=3))).estimate
+    assert once.spare_s == fixed.spare_s == 0.0
+    assert some.reasons == ("1 to 3 rounds",)
+    assert some.duration_s < some.most_s < math.inf
+    assert endless.most_s == math.inf
+    assert endless.reasons[0].startswith("until ")
+
+
+def test_a_wait_for_a_time_of_day_is_a_range_with_that_time_as_its_reason(check):
+    waited = check(MissionStep(block=Wait(until_clock_s=64800.0))).estimate
+    assert (waited.duration_s, waited.most_s, waited.reasons) == (0.0, 86400.0, ("until 18:00",))
+
+
+def test_a_time_limit_bounds_the_range(check):
+    limit = StepPolicy(timeout_s=600.0)
+    waited = check(MissionStep(block=Wait(until_clock_s=64800.0), policy=limit)).estimate
+    assert (waited.most_s, waited.reasons[0]) == (600.0, "600 s at most")

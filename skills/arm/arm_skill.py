@@ -21,7 +21,9 @@ from skills.arm.poses import UP_B, look_configuration, towards_shoulder
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.arm.solid_cells import solid_boxes, with_picture, with_view
 from skills.estimate.self_filter import segment_distance
+from skills.patience import PATIENCE_S, Patience
 from skills.perception.at_rest import APART_S, at_rest
+from skills.perception.detector.camera_images import is_dark, without_depth
 from skills.robot import (
     ArmCapabilities,
     ArmTrajectory,
@@ -56,6 +58,7 @@ _BACK_M = (0.16, 0.12, 0.08, 0.05)
 _AT_ARM_M = 0.12
 _BEYOND_M = 0.5
 _HEAD_EXPIRY_S, _HELD_RADIUS_M = 5.0, 0.2
+_ASK_AGAIN_S = 0.3
 
 
 def held_mass_kg(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> float:
@@ -129,10 +132,12 @@ class ArmSkill(RoutineSkill[InputsT]):
         super().resume(inputs)
 
     def _forget(self) -> None:
+        self._doubted_s = 0.0
         self.boxes, self.held, self.known_W, self._scene = (), (), (), None
         self._rng = np.random.default_rng(self.context.seed)
 
     _watch: HoldWatch | None = None
+    _doubted_s: float = 0.0
 
     def lost(self, message: str) -> SkillFailure | None:
         """A failure of that message when what `_watch` watches is lost; what begins to slip is gripped again."""
@@ -450,9 +455,14 @@ class ArmSkill(RoutineSkill[InputsT]):
             pan_rad, tilt_rad = head_angles(head, camera, self.X_WB().inverse() @ p_WT)
         except PlanningError as error:
             raise SkillFailure(Cause.PLANNING, str(error)) from error
-        until_s = self.context.clock.now() + _HEAD_EXPIRY_S
-        command = self.context.robot.point_head(pan_rad, tilt_rad, until_s=until_s, lease=self.context.lease)
-        yield from self.finish(self.issue(command), message, "the head")
+        context = self.context
+
+        def attempt() -> Routine[None]:
+            until_s = context.clock.now() + _HEAD_EXPIRY_S
+            command = self.issue(context.robot.point_head(pan_rad, tilt_rad, until_s=until_s, lease=context.lease))
+            yield from self.finish(command, message, "the head", until_s=until_s)
+
+        yield from self.persist(attempt, message)
 
     def look_from(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[None]:
         """Go where `goal` says to take a picture; an empty gripper, which else stands before the camera, opens."""
@@ -473,18 +483,25 @@ class ArmSkill(RoutineSkill[InputsT]):
     def picture(self, message: str, settle_s: float = SETTLE_S) -> Routine[Image]:
         """A new picture of the camera that looks for objects, once it is still; one on the head leaves out the arm.
 
-        Raises SkillFailure with cause EXECUTION when the camera gives none, or an old one.
+        A camera that gives none, an old one, a dark one, or one without depth is asked again for a while; in all, an
+        attempt waits `PATIENCE_S` for light and depth, which may be missing for good. Raises SkillFailure with cause
+        EXECUTION when the camera gives none, or an old one.
         """
         yield from self.pause(settle_s, message)
-        robot, asked_s = self.context.robot, self.context.clock.now()
-        camera = self.object_camera
-        source, name = camera.source, camera.mount.value
-        image = yield from self.sense(
-            lambda: robot.image(source), latency_s=PICTURE_LATENCY_S, name=f"{name} picture", message=message
-        )
-        if image.stamp_s < asked_s - OLDEST_PICTURE_S:
-            age_s = asked_s - image.stamp_s
-            raise SkillFailure(Cause.EXECUTION, f"the {name} camera gives only a picture that is {age_s:.1f} s old")
+        robot, camera, patience = self.context.robot, self.object_camera, Patience(self.context.clock)
+        while True:
+            begun_s = self.context.clock.now()
+            try:
+                image = yield from self._picture_now(camera, message)
+            except SkillFailure as failure:
+                if not patience.is_left():
+                    raise
+                yield from self.pause(_ASK_AGAIN_S, f"{failure.message}; {message}")
+                continue
+            if self._doubted_s > PATIENCE_S or not (is_dark(image) or without_depth(image)):
+                break
+            yield from self.pause(_ASK_AGAIN_S, f"the {camera.mount.value} camera shows nothing; {message}")
+            self._doubted_s += self.context.clock.now() - begun_s
         if not camera.on_hand:
             held_m = _HELD_RADIUS_M if robot.gripper().holding else None
             image = without_arm(image, self.arm_points_B(), held_m)
@@ -511,6 +528,17 @@ class ArmSkill(RoutineSkill[InputsT]):
                 return False
             before = later
         return True
+
+    def _picture_now(self, camera: CameraCapabilities, message: str) -> Routine[Image]:
+        """What a camera gives now. Raises SkillFailure with cause EXECUTION when it gives none, or an old one."""
+        robot, asked_s, source, name = self.context.robot, self.context.clock.now(), camera.source, camera.mount.value
+        image = yield from self.sense(
+            lambda: robot.image(source), latency_s=PICTURE_LATENCY_S, name=f"{name} picture", message=message
+        )
+        if image.stamp_s < asked_s - OLDEST_PICTURE_S:
+            age_s = asked_s - image.stamp_s
+            raise SkillFailure(Cause.EXECUTION, f"the {name} camera gives only a picture that is {age_s:.1f} s old")
+        return image
 
     def try_stow(self) -> Routine[None]:
         """Stow where a way is found; used on the way out of failures."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from skills.api import Cause, Failed, InputsT, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
 from skills.geometry import wrap
+from skills.patience import Patience
 from skills.robot import ArmTrajectory, Clock, CommandId, CommandState, FloatArray, NoImageError, Pose2D
 
 ResultT = TypeVar("ResultT")
@@ -21,13 +22,19 @@ Routine = Generator[Running, None, ResultT]
 
 ARM_EXPIRY_MARGIN_S = 3.0
 GRIPPER_EXPIRY_S = 4.0
-STAND_EXPIRY_S = 8.0
+STAND_EXPIRY_S = 6.0
 HEIGHT_TOLERANCE_M = 0.02
 _PAUSE_S = 10.0
 _STAYED_M = 0.15
 _STAYED_RAD = 0.2
 _RESTART_RAD_S = 0.8
 _LEAST_S = 0.05
+_AGAIN_S = 0.4
+"""What was refused, stopped or lost is given again so much later."""
+_LOST_S = 0.5
+"""A command that is still under way so long after its expiry is lost."""
+_OFF_PATH_RAD = 0.2
+"""An arm that is farther than this from a trajectory does not go on with it."""
 
 
 class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program error
@@ -38,6 +45,17 @@ class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program er
         self.cause = cause
         self.message = message
         self.outputs: Mapping[str, Any] = outputs or {}
+
+
+class OffPathError(Exception):
+    """The arm is not where a motion that was broken off can go on."""
+
+
+class CommandFailure(SkillFailure):
+    """A command was refused, stopped or lost; cause EXECUTION. It may go well when it is given again."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(Cause.EXECUTION, message)
 
 
 @dataclass(frozen=True)
@@ -189,26 +207,67 @@ class RoutineSkill(Skill[InputsT]):
     ) -> Routine[bool]:
         """Move the arm along a trajectory; whether `guard` stopped it before its end.
 
-        `guard` is asked at each tick with the joint angles that the arm should have then. Raises SkillFailure with
-        cause EXECUTION when the arm does not get there.
+        `guard` is asked at each tick with the joint angles that the arm should have then. After a command that was
+        stopped or lost the arm goes on from where it is. Raises SkillFailure with cause EXECUTION when the arm does
+        not get there.
         """
-        context = self.context
+        context, begun_s = self.context, -math.inf
+
+        def attempt() -> Routine[bool]:
+            nonlocal trajectory, begun_s
+            if begun_s > -math.inf:
+                trajectory = self._left_of(trajectory, context.clock.now() - begun_s)
+            while True:
+                begun_s = context.clock.now()
+                until_s = begun_s + float(trajectory.times_s[-1]) + ARM_EXPIRY_MARGIN_S
+                command = self.issue(context.robot.move_arm(trajectory, until_s=until_s, lease=context.lease))
+                guarded = None if guard is None else partial(_meets, guard, trajectory, context.clock, begun_s)
+                stopped_s = yield from self.finish(command, message, "the arm", guarded, until_s=until_s)
+                if stopped_s is None or (guard is not None and command not in self._interrupted):
+                    return stopped_s is not None
+                trajectory = rest_of(trajectory, stopped_s - begun_s, self._stance_now().arm_rad)
+
+        return (yield from self.persist(attempt, message))
+
+    def _left_of(self, trajectory: ArmTrajectory, elapsed_s: float) -> ArmTrajectory:
+        """What is left of a trajectory after a command that went wrong, from where the arm is by now.
+
+        Raises OffPathError: the arm is not on it.
+        """
+        q_rad = self._stance_now().arm_rad
+        passed_s, off_rad = passed(trajectory, elapsed_s, q_rad)
+        if off_rad > _OFF_PATH_RAD:
+            raise OffPathError
+        return rest_of(trajectory, passed_s, q_rad)
+
+    def persist(self, attempt: Callable[[], Routine[ResultT]], message: str) -> Routine[ResultT]:
+        """What an attempt gives; one whose command is refused, stopped or lost is made again while patience lasts.
+
+        Patience begins with the first of them. Raises SkillFailure.
+        """
+        patience, before = Patience(self.context.clock), SkillFailure(Cause.EXECUTION, message)
         while True:
-            begun_s = context.clock.now()
-            until_s = begun_s + float(trajectory.times_s[-1]) + ARM_EXPIRY_MARGIN_S
-            command = self.issue(context.robot.move_arm(trajectory, until_s=until_s, lease=context.lease))
-            guarded = None if guard is None else partial(_meets, guard, trajectory, context.clock, begun_s)
-            stopped_s = yield from self.finish(command, message, "the arm", guarded)
-            if stopped_s is None or (guard is not None and command not in self._interrupted):
-                return stopped_s is not None
-            trajectory = rest_of(trajectory, stopped_s - begun_s, self._stance_now().arm_rad)
+            try:
+                return (yield from attempt())
+            except OffPathError as off:
+                raise before from off
+            except CommandFailure as failure:
+                if not patience.is_left() or self.context.robot.lease_holder() != self.context.lease:
+                    raise
+                before = failure
+                yield from self.pause(_AGAIN_S, f"{failure.message}; {message} again")
 
     def move_gripper(self, opening: float, force_n: float, message: str) -> Routine[None]:
         """Move the gripper with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
-        stopped_s: float | None = 0.0
-        while stopped_s is not None:
-            command = self.gripper_command(opening, force_n)
-            stopped_s = yield from self.finish(self.issue(command), message, "the gripper")
+
+        def attempt() -> Routine[None]:
+            stopped_s: float | None = 0.0
+            while stopped_s is not None:
+                until_s = self.context.clock.now() + GRIPPER_EXPIRY_S
+                command = self.issue(self.gripper_command(opening, force_n))
+                stopped_s = yield from self.finish(command, message, "the gripper", until_s=until_s)
+
+        yield from self.persist(attempt, message)
 
     def gripper_command(self, opening: float, force_n: float) -> CommandId:
         """Give the gripper its command, and do not wait for it."""
@@ -219,13 +278,20 @@ class RoutineSkill(Skill[InputsT]):
         return context.robot.set_gripper(opening, force_n, until_s=until_s, lease=context.lease)
 
     def stand_at(self, height_m: float, message: str) -> Routine[None]:
-        """Bring the body to a height, level; nothing is done where it is there already."""
+        """Bring the body to a height, level; nothing is done where it is there already.
+
+        Raises SkillFailure with cause EXECUTION when the body does not get there.
+        """
         context = self.context
-        while abs(float(context.robot.odometry().X_OB.translation()[2]) - height_m) > HEIGHT_TOLERANCE_M:
-            until_s = context.clock.now() + STAND_EXPIRY_S
-            command = context.robot.stand(height_m, 0.0, until_s=until_s, lease=context.lease)
-            if (yield from self.finish(self.issue(command), message, "the body")) is None:
-                return
+
+        def attempt() -> Routine[None]:
+            while abs(float(context.robot.odometry().X_OB.translation()[2]) - height_m) > HEIGHT_TOLERANCE_M:
+                until_s = context.clock.now() + STAND_EXPIRY_S
+                command = self.issue(context.robot.stand(height_m, 0.0, until_s=until_s, lease=context.lease))
+                if (yield from self.finish(command, message, "the body", until_s=until_s)) is None:
+                    return
+
+        yield from self.persist(attempt, message)
 
     def perform(self, skill: Skill[OtherT], inputs: OtherT) -> Routine[Succeeded]:
         """Let another skill do its work as part of this one. Raises SkillFailure with its cause and message."""
@@ -242,12 +308,19 @@ class RoutineSkill(Skill[InputsT]):
         return step
 
     def finish(
-        self, command: CommandId, message: str, what: str, enough: Callable[[], bool] | None = None
+        self,
+        command: CommandId,
+        message: str,
+        what: str,
+        enough: Callable[[], bool] | None = None,
+        *,
+        until_s: float,
     ) -> Routine[float | None]:
         """Wait until a command is done, and give None; or, when a pause stopped it, the time (s) of its last tick.
 
         Once `enough` holds the command is stopped, and the time is given as well. Raises SkillFailure with cause
-        EXECUTION when it was stopped otherwise, or refused.
+        EXECUTION when it expired at `until_s`; CommandFailure when it was stopped otherwise, was refused, or is lost:
+        a robot ends what has expired.
         """
         last_s = self.context.clock.now()
         while (status := self.context.robot.command_status(command)).state is CommandState.RUNNING:
@@ -255,13 +328,19 @@ class RoutineSkill(Skill[InputsT]):
             if enough is not None and enough():
                 self.context.robot.stop(lease=self.context.lease, only=command)
                 return last_s
+            if last_s > until_s + _LOST_S and command not in self._interrupted:
+                self.context.robot.stop(lease=self.context.lease, only=command)
+                raise CommandFailure(f"{what} did not answer while {message}")
             yield Running(message)
         if status.state is CommandState.DONE:
             return None
         if command in self._interrupted:
             return last_s
         why = f": {status.reason}" if status.reason else ""
-        raise SkillFailure(Cause.EXECUTION, f"{what} was {status.state.value} while {message}{why}")
+        told = f"{what} was {status.state.value} while {message}{why}"
+        if status.state is CommandState.STOPPED and self.context.clock.now() >= until_s:
+            raise SkillFailure(Cause.EXECUTION, told)
+        raise CommandFailure(told)
 
     def pause(self, duration_s: float, message: str) -> Routine[None]:
         """Wait on the robot's clock."""
@@ -274,6 +353,15 @@ def _meets(guard: Callable[[FloatArray], bool], trajectory: ArmTrajectory, clock
     """Whether a guard wants the arm stopped, given where a trajectory has it now."""
     elapsed_s, times = clock.now() - begun_s, trajectory.times_s
     return guard(np.array([np.interp(elapsed_s, times, joint) for joint in trajectory.positions_rad.T]))
+
+
+def passed(trajectory: ArmTrajectory, within_s: float, q_rad: FloatArray) -> tuple[float, float]:
+    """How far (s) along a trajectory an arm is that has followed it for `within_s`, and how far off it (rad)."""
+    times_s = np.append(trajectory.times_s[trajectory.times_s < within_s], min(within_s, trajectory.times_s[-1]))
+    wanted = np.stack([np.interp(times_s, trajectory.times_s, joint) for joint in trajectory.positions_rad.T], axis=1)
+    off_rad = np.max(np.abs(wanted - q_rad), axis=1)
+    nearest = int(np.argmin(off_rad))
+    return float(times_s[nearest]), float(off_rad[nearest])
 
 
 def rest_of(trajectory: ArmTrajectory, elapsed_s: float, q_rad: FloatArray) -> ArmTrajectory:

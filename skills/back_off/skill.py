@@ -15,6 +15,7 @@ from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
 from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.navigate.scan_health import ScanHealth
+from skills.patience import PATIENCE_S
 from skills.quantities import Delay, Length, Speed
 from skills.robot import BaseKind, Pose2D
 
@@ -76,6 +77,9 @@ class BackOff(Skill[BackOffInputs]):
     def step(self) -> Step:
         """Choose a direction at the first step, then go."""
         refusal = self._base.refusal()
+        if refusal is not None and self._base.asks_again():
+            self._best_s = self.context.clock.now()
+            return Running(f"standing: the robot refuses to drive: {refusal}")
         if refusal is not None:
             return Failed(Cause.EXECUTION, f"The robot refused to drive: {refusal}.")
         trouble = self._scans.trouble()
@@ -123,7 +127,7 @@ class BackOff(Skill[BackOffInputs]):
         if left_m < self.options.arrived_m:
             self._settled_s = now_s + self.options.settle_s
             return self._settling()
-        if now_s - self._best_s > 3.0:
+        if now_s - self._best_s > PATIENCE_S:
             return Failed(Cause.EXECUTION, f"The robot does not get on; {left_m:.2f} m are left of backing off.")
         speed = min(self.options.speed_m_s, max(0.08, 1.5 * left_m))
         aside = speed * off.y_m / left_m if self._sideways else 0.0

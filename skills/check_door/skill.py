@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from skills.api import Cause, Part, Running, Succeeded
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
+from skills.patience import PATIENCE_S
 from skills.perception.doorway import Doorway, Opening, opening
 from skills.quantities import Angle, Coordinate, Count, Delay, Length, Margin, Turn
 from skills.robot import Scan
@@ -15,7 +16,7 @@ from skills.robot import Scan
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform
 
-_SCAN_PATIENCE_S = 1.0
+_SCAN_PATIENCE_S = PATIENCE_S
 _CLOSED_M = 0.1
 _FEW_RAYS = 50
 

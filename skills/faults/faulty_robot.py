@@ -18,7 +18,7 @@ class _Armed:
     """A fault at work: its memory and how many calls it has seen."""
 
     fault: Fault
-    memory: dict[str, Any] = field(default_factory=dict)
+    memory: dict[Any, Any] = field(default_factory=dict)
     seen: int = 0
 
     def through(self, call: Call, now_s: float) -> Any:
@@ -65,8 +65,9 @@ class FaultyRobot:
 
         def faulty(*arguments: Any, **options: Any) -> Any:
             """The verb as the faults let it happen."""
-            given = tuple(bind(*arguments, **options).arguments.values())
-            return self._call(name, lambda: value(*arguments, **options), given)
+            bound = bind(*arguments, **options)
+            bound.apply_defaults()
+            return self._call(name, lambda: value(*arguments, **options), tuple(bound.arguments.values()))
 
         self.__dict__[name] = faulty
         return faulty

@@ -44,12 +44,12 @@ class Call:
     verb: str
     proceed: Callable[[], Any]
     arguments: tuple[Any, ...]
-    memory: dict[str, Any]
+    memory: dict[Any, Any]
 
     @property
-    def source(self) -> str:
-        """What is asked: the verb, and for pictures the camera."""
-        return f"{self.verb} {self.arguments[0]}" if self.verb == "image" else self.verb
+    def asked(self) -> tuple[Any, ...]:
+        """What is asked: the verb, and for pictures the camera and what the picture is to hold."""
+        return (self.verb, *self.arguments) if self.verb == "image" else (self.verb,)
 
 
 @dataclass(frozen=True)
@@ -108,12 +108,12 @@ def _freezes(match: re.Match[str]) -> Effect:
     """The last reading stays."""
 
     def watch(result: Any, call: Call) -> None:
-        call.memory[call.source] = result
+        call.memory[call.asked] = result
 
     def act(call: Call) -> Any:
-        if call.source not in call.memory:
-            call.memory[call.source] = call.proceed()
-        return call.memory[call.source]
+        if call.asked not in call.memory:
+            call.memory[call.asked] = call.proceed()
+        return call.memory[call.asked]
 
     return Effect(_sensors(match), act, watch)
 

@@ -9,10 +9,11 @@ from typing import ClassVar
 
 import shapely
 
-from skills.api import Cause, ObjectObservation, Part, Succeeded, Thing
+from skills.api import Cause, ObjectObservation, Part, Running, Succeeded, Thing
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.words import counted
 from skills.navigate.moving import MovingSkill
+from skills.patience import Patience
 from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark
 from skills.perception.people import SeenPerson, merged, people_in_scan
@@ -20,7 +21,7 @@ from skills.perception.people_watch import people_in_images
 from skills.quantities import Coordinate, Count, Delay, Length, Share, Tries, Turn, TurnRate
 from skills.robot import Image
 
-_SCAN_PATIENCE_S = 1.0
+_SCAN_AGE_S = 1.0
 _SIZE_M = (0.5, 0.5, 1.7)
 
 
@@ -80,7 +81,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
         for look in range(self.options.looks):
             if look:
                 yield from self.move(turn, for_s, "turning to see more", settle_s=self.options.settle_s)
-            by_lidar = self._in_scan()
+            by_lidar = yield from self._in_scan(f"looking for people in the {inputs.place}")
             by_camera = yield from self._in_pictures(f"looking for people in the {inputs.place}")
             echoes += [] if by_camera is None else by_lidar
             for one in by_lidar if by_camera is None else by_camera:
@@ -122,12 +123,13 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
             )
         )
 
-    def _in_scan(self) -> Sequence[SeenPerson]:
+    def _in_scan(self, message: str) -> Routine[Sequence[SeenPerson]]:
         """Who may be in the newest scan. Raises SkillFailure: there is none."""
-        robot = self.context.robot
-        scan = robot.scan()
-        if scan is None or scan.stamp_s < self.context.clock.now() - _SCAN_PATIENCE_S:
-            raise SkillFailure(Cause.PRECONDITION, "there is no new scan to see people in")
+        robot, patience = self.context.robot, Patience(self.context.clock)
+        while (scan := robot.scan()) is None or scan.stamp_s < self.context.clock.now() - _SCAN_AGE_S:
+            if not patience.is_left():
+                raise SkillFailure(Cause.PRECONDITION, "there is no new scan to see people in")
+            yield Running(f"{message}; waits for a scan")
         X_WB = self.context.localiser.estimate().X_WO @ robot.odometry().X_OB
         return people_in_scan(scan, X_WB, robot.capabilities().footprint_m)
 

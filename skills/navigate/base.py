@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import SkillContext
+from skills.patience import Patience
 from skills.robot import CommandId, CommandState
 
 EXPIRY_S = 0.3
@@ -13,12 +14,16 @@ EXPIRY_S = 0.3
 
 
 class Base:
-    """Sends drive commands under a context's lease and remembers the last; `accepted` once the robot took one."""
+    """Sends drive commands under a context's lease and remembers the last; `accepted` once the robot took one.
+
+    `patience` is with a robot that refuses them.
+    """
 
     def __init__(self, context: SkillContext) -> None:
         self._context = context
         self._command: CommandId | None = None
         self.accepted = False
+        self.patience = Patience(context.clock)
         self.last_velocity: NDArray[np.float64] = np.zeros(3)
 
     def drive(self, velocity: tuple[float, float, float]) -> None:
@@ -32,8 +37,18 @@ class Base:
         if self._command is None:
             return None
         status = self._context.robot.command_status(self._command)
-        self.accepted |= status.state is not CommandState.REFUSED
-        return (status.reason or "no reason given") if status.state is CommandState.REFUSED else None
+        if status.state is CommandState.REFUSED:
+            return status.reason or "no reason given"
+        self.accepted = True
+        self.patience.over()
+        return None
+
+    def asks_again(self) -> bool:
+        """Ask a robot that refused once more, by a command to stand; False when patience or the lease is gone."""
+        if self._context.robot.lease_holder() != self._context.lease or not self.patience.is_left():
+            return False
+        self.drive((0.0, 0.0, 0.0))
+        return True
 
     def stop(self) -> None:
         """Stop the last command, if it still runs, and nothing else."""

@@ -42,8 +42,12 @@ class MovingSkill(RoutineSkill[InputsT]):
         end_s = self.context.clock.now() + for_s
         while self.context.clock.now() < end_s and not enough():
             self._base.drive(velocity)
+            begun_s = self.context.clock.now()
             yield Running(message)
-            if (refusal := self._base.refusal()) is not None:
-                raise SkillFailure(Cause.EXECUTION, f"the robot refused to move: {refusal}")
+            while (refusal := self._base.refusal()) is not None:
+                if not self._base.asks_again():
+                    raise SkillFailure(Cause.EXECUTION, f"the robot refused to move: {refusal}")
+                yield Running(f"{message}; the robot refuses to move: {refusal}")
+                end_s, begun_s = end_s + self.context.clock.now() - begun_s, self.context.clock.now()
         self._base.stop()
         yield from self.pause(settle_s, "coming to rest")

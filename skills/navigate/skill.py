@@ -34,6 +34,7 @@ from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
 from skills.navigate.scan_health import ScanHealth, ScanHealthOptions
+from skills.patience import PATIENCE_S
 from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_watch import PeopleOptions, PeopleWatch
@@ -71,7 +72,7 @@ class NavigateOptions:
 
     planning_latency_s: Delay = 0.3
     localising_patience_s: Delay = 3.0
-    blind_patience_s: Delay = 3.0
+    blind_patience_s: Delay = PATIENCE_S
     blocked_patience_s: Delay = 1.5
     replan_pause_s: Delay = 2.0
     replans: Tries = 6
@@ -161,6 +162,9 @@ class Navigate(Skill[NavigateInputs]):
             self._base.stop()
             return Failed(Cause.EXECUTION, "The robot lost its place: its scans no longer agree with the map.")
         refusal = self._base.refusal()
+        if refusal is not None and self._base.asks_again():
+            self._best_s = self._now()
+            return Running(f"standing: the robot refuses to drive: {refusal}")
         if refusal is not None:
             cause = Cause.EXECUTION if self._base.accepted else Cause.PRECONDITION
             return Failed(cause, f"The robot refused to drive: {refusal}.")

@@ -13,11 +13,12 @@ from skills.api import Cause, LocalisationEstimate, Localiser, Part, Running, Se
 from skills.arm.routine import Routine, SkillFailure
 from skills.navigate.low_obstacles import WatchOptions, low_points
 from skills.navigate.moving import MovingSkill
+from skills.patience import PATIENCE_S
 from skills.quantities import Delay, Length, Share, Speed, Tries, Turn, TurnRate
 from skills.relocalise.free_space import FreeSpaceOptions, can_turn, free_m, obstacles_B
 from skills.robot import FloatArray, NoImageError, Scan
 
-_SCAN_PATIENCE_S = 2.0
+_SCAN_PATIENCE_S = PATIENCE_S
 _LEAST_STEP_M = 0.15
 
 

@@ -187,6 +187,9 @@ class PlanarRobot:
             raise LeaseError(f"{self._lease.holder} holds the lease")
         return self.take_lease(holder)
 
+    def lease_holder(self) -> Lease:
+        return self._lease
+
     def take_lease(self, holder: str) -> Lease:
         self._finish(CommandState.STOPPED, "lease taken")
         self._lease = Lease(self.name, holder, self._lease.number + 1)

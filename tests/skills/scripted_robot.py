@@ -115,6 +115,9 @@ class ScriptedRobot:
         self.holding = self.opening > opening
         return self._note(CommandStatus(CommandState.RUNNING))
 
+    def lease_holder(self):
+        return Lease("Alice", "test")
+
     def stop(self, *, lease, only=None):
         self.stopped.append(only)
         return self._note(CommandStatus(CommandState.DONE))

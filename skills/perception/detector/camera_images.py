@@ -49,6 +49,11 @@ def is_dark(image: Image) -> bool:
     return bool(image.grey.mean() < _DARK_MEAN and image.grey.std() < _DARK_SPREAD)
 
 
+def without_depth(image: Image) -> bool:
+    """Whether an image for which depth was asked has none anywhere."""
+    return image.depth_m.size > 0 and not bool(np.any(image.depth_m > 0.0))
+
+
 def on_its_head(image: Image) -> bool:
     """Whether what is below in the picture is above in the world."""
     R_OC = image.frames.pose(image.camera_frame).rotation().matrix()

@@ -71,6 +71,23 @@ def test_each_camera_freezes_on_its_own_picture(faulty, clock):
     assert robot.image("left").source == "left"
 
 
+def test_a_frozen_camera_freezes_each_kind_of_picture_that_is_asked_for(clock):
+    asked = []
+
+    class Cameras(ScriptedRobot):
+        def image(self, source, *, visual=True, depth=True):
+            asked.append((visual, depth))
+            return super().image(source, visual=visual, depth=depth), visual, depth
+
+    robot = with_faults(Cameras(clock, blocks=ROOM), clock, ("camera freezes at 1 s",))
+    robot.image("frontleft", depth=False)
+    clock.advance(2.0)
+    for visual, depth in ((True, False), (False, True), (True, True), (False, True)):
+        assert robot.image("frontleft", visual=visual, depth=depth)[1:] == (visual, depth)
+    assert robot.image("frontleft", depth=False)[0].stamp_s == 0.0
+    assert asked == [(True, False), (False, True), (True, True)]
+
+
 def test_a_verb_raises_from_its_nth_call_on(faulty):
     robot, _ = faulty("joints verb raises after 2 calls")
     robot.joints()

@@ -25,8 +25,9 @@ def test_a_thing_that_is_gone_is_a_failed_precondition_and_the_arm_is_stowed():
 
 
 def test_a_refused_arm_is_a_failed_execution_with_the_robots_reason():
-    robot = ScriptedRobot(arm_answers={1: CommandStatus(CommandState.REFUSED, "the lease is held by another")})
-    failed(Grasp(context_of(robot)), SEEN, Cause.EXECUTION, "the lease is held by another")
+    refused = CommandStatus(CommandState.REFUSED, "the arm is out of order")
+    robot = ScriptedRobot(arm_answers=dict.fromkeys(range(1, 99), refused))
+    failed(Grasp(context_of(robot)), SEEN, Cause.EXECUTION, "the arm is out of order")
 
 
 def test_a_second_attempt_starts_anew():

@@ -65,7 +65,7 @@ def driven_after(places, time_s):
 def test_a_lidar_that_fails_on_the_way_is_told_and_the_robot_stands(fault, message):
     step, places = drive(fault)
     assert isinstance(step, Failed) and step.cause is Cause.EXECUTION and message in step.message
-    assert places[-1][0] < 6.0
+    assert places[-1][0] < 9.0
     assert driven_after(places, 2.4) < 0.02
 
 

@@ -41,8 +41,13 @@ def test_a_held_thing_is_drawn_in_and_kept():
 
 
 def test_an_arm_that_is_stopped_is_a_failed_execution():
-    robot = ScriptedRobot(q=OUT.copy(), arm_answers={1: CommandStatus(CommandState.STOPPED, "expired")})
-    failed(Stow(context_of(robot)), StowInputs(), Cause.EXECUTION, "expired")
+    stopped = dict.fromkeys(range(1, 99), CommandStatus(CommandState.STOPPED, "held fast"))
+    failed(Stow(context_of(ScriptedRobot(q=OUT.copy(), arm_answers=stopped))), StowInputs(), Cause.EXECUTION, "held")
+
+
+def test_an_arm_that_is_stopped_once_goes_on():
+    robot = ScriptedRobot(q=OUT.copy(), arm_answers={1: CommandStatus(CommandState.STOPPED, "an emergency stop")})
+    assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
 
 
 @dataclass

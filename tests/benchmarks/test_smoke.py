@@ -13,14 +13,14 @@ from tests.benchmarks import robots_sentences, structured_sentences
 
 ROOT = Path(__file__).parents[2]
 NO_VOICE = 3
+LIMIT_S = 600.0
 
 
 def output_of(*command):
     """What a measure prints."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    ended = subprocess.run(
-        [sys.executable, *command], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
-    )
+    process = {"cwd": ROOT, "env": environment, "capture_output": True, "text": True, "timeout": LIMIT_S}
+    ended = subprocess.run([sys.executable, *command], check=False, **process)
     if ended.returncode == NO_VOICE:
         pytest.skip(ended.stderr.strip())
     assert ended.returncode == 0, ended.stderr[-2000:]
@@ -154,7 +154,7 @@ def test_a_spoken_sentence_is_scored():
 @pytest.mark.nightly
 def test_a_killed_dask_worker_loses_no_run():
     pytest.importorskip("distributed")
-    output_of("-m", "tests.benchmarks.evaluation", "kill", "--runs", "4")
+    output_of("-m", "tests.benchmarks.evaluation", "kill", "--runs", "40")
 
 
 @pytest.mark.nightly

@@ -168,8 +168,8 @@ def _answered(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]
         )
     classes, areas = _classes(command.object, knowledge), _areas(command, knowledge, elsewhere)
     place = None if command.goal is None else knowledge.place(command.goal)
-    rooms = [name for name in knowledge.places if place in (None, name)]
-    floors = tuple(Area(f"the floor of the {name}", knowledge.places[name].polygon, FLOOR_M) for name in rooms)
+    around = [name for name in knowledge.places if place in (None, name)]
+    floors = tuple(Area(f"the floor of the {name}", knowledge.places[name].polygon, FLOOR_M) for name in around)
     asked = str(command.object)
     return GoalCondition(GoalKind.ANSWERED, classes, command.object_count, areas, wanted=asked, maybe=floors)
 

@@ -21,7 +21,7 @@ from skills.arm.poses import UP_B, look_configuration, towards_shoulder
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.arm.solid_cells import solid_boxes, with_picture, with_view
 from skills.estimate.self_filter import segment_distance
-from skills.patience import PATIENCE_S, Patience
+from skills.patience import PATIENCE_S
 from skills.perception.at_rest import APART_S, at_rest
 from skills.perception.detector.camera_images import is_dark, without_depth
 from skills.robot import (
@@ -33,6 +33,7 @@ from skills.robot import (
     GripperCapabilities,
     GripperKind,
     Image,
+    NoImageError,
 )
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
@@ -488,16 +489,10 @@ class ArmSkill(RoutineSkill[InputsT]):
         EXECUTION when the camera gives none, or an old one.
         """
         yield from self.pause(settle_s, message)
-        robot, camera, patience = self.context.robot, self.object_camera, Patience(self.context.clock)
+        robot, camera = self.context.robot, self.object_camera
         while True:
             begun_s = self.context.clock.now()
-            try:
-                image = yield from self._picture_now(camera, message)
-            except SkillFailure as failure:
-                if not patience.is_left():
-                    raise
-                yield from self.pause(_ASK_AGAIN_S, f"{failure.message}; {message}")
-                continue
+            image = yield from self._picture_now(camera, message)
             if self._doubted_s > PATIENCE_S or not (is_dark(image) or without_depth(image)):
                 break
             yield from self.pause(_ASK_AGAIN_S, f"the {camera.mount.value} camera shows nothing; {message}")
@@ -531,14 +526,16 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def _picture_now(self, camera: CameraCapabilities, message: str) -> Routine[Image]:
         """What a camera gives now. Raises SkillFailure with cause EXECUTION when it gives none, or an old one."""
-        robot, asked_s, source, name = self.context.robot, self.context.clock.now(), camera.source, camera.mount.value
-        image = yield from self.sense(
-            lambda: robot.image(source), latency_s=PICTURE_LATENCY_S, name=f"{name} picture", message=message
-        )
-        if image.stamp_s < asked_s - OLDEST_PICTURE_S:
-            age_s = asked_s - image.stamp_s
-            raise SkillFailure(Cause.EXECUTION, f"the {name} camera gives only a picture that is {age_s:.1f} s old")
-        return image
+        robot, clock, source, name = self.context.robot, self.context.clock, camera.source, camera.mount.value
+
+        def taken() -> Image:
+            asked_s, image = clock.now(), robot.image(source)
+            if image.stamp_s < asked_s - OLDEST_PICTURE_S:
+                age_s = asked_s - image.stamp_s
+                raise NoImageError(f"the {name} camera gives only a picture that is {age_s:.1f} s old")
+            return image
+
+        return (yield from self.sense(taken, latency_s=PICTURE_LATENCY_S, name=f"{name} picture", message=message))
 
     def try_stow(self) -> Routine[None]:
         """Stow where a way is found; used on the way out of failures."""

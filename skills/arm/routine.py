@@ -195,12 +195,19 @@ class RoutineSkill(Skill[InputsT]):
             job.withdraw()
 
     def sense(self, read: Callable[[], ResultT], *, latency_s: float, name: str, message: str) -> Routine[ResultT]:
-        """What `read` gives, which may block. Raises SkillFailure with cause EXECUTION: a camera gives no picture."""
-        job = self.context.worker.sense(read, lambda given: given, latency_s=latency_s, name=name)
-        try:
-            return (yield from self._awaited(job, message))
-        except NoImageError as error:
-            raise SkillFailure(Cause.EXECUTION, str(error)) from error
+        """What `read` gives, which may block; while it raises NoImageError it is called again, as patience lasts.
+
+        Raises SkillFailure with cause EXECUTION: a camera gives no picture.
+        """
+        patience = Patience(self.context.clock)
+        while True:
+            job = self.context.worker.sense(read, lambda given: given, latency_s=latency_s, name=name)
+            try:
+                return (yield from self._awaited(job, message))
+            except NoImageError as error:
+                if not patience.is_left():
+                    raise SkillFailure(Cause.EXECUTION, str(error)) from error
+                yield from self.pause(_AGAIN_S, f"{error}; {message}")
 
     def follow(
         self, trajectory: ArmTrajectory, message: str, guard: Callable[[FloatArray], bool] | None = None

@@ -110,7 +110,10 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
             return None
         X_WO, here_W = self.context.localiser.estimate().X_WO, self.context.pose()
         images: list[Image] = yield from self.sense(
-            lambda: [robot.image(camera.source) for camera in cameras], latency_s=0.0, name="pictures", message=message
+            lambda: [robot.image(camera.source) for camera in cameras],
+            latency_s=0.0,
+            name="pictures",
+            message=message,
         )
         if all(map(is_dark, images)):
             raise SkillFailure(Cause.EXECUTION, "it is too dark to see anybody")

@@ -51,8 +51,13 @@ TABLE = {
     "speak": {},
     "stow": ARM,
 }
+HANDS = {RAISES: Cause.ERROR, "joints returns garbage": Cause.EXECUTION, DIES: Cause.ERROR, LEASE: Cause.EXECUTION}
+LOST = {"gripper reports": Cause.POSTCONDITION, "gripper loses": Cause.POSTCONDITION}
 NIGHTLY = {
-    "detect": {**ARM, FREEZES: Cause.EXECUTION, "joints returns garbage": Cause.EXECUTION},
+    "approach": HANDS,
+    "detect": {**HANDS, FREEZES: Cause.EXECUTION},
+    "grasp": {**HANDS, FREEZES: Cause.EXECUTION, "gripper loses": Cause.POSTCONDITION},
+    "place": {**HANDS, **LOST},
     "find_people": {DIES: Cause.ERROR, LEASE: Cause.EXECUTION},
 }
 

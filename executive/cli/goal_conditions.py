@@ -6,10 +6,11 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from executive.mission.expression import Expression, Template
 from executive.mission.goal import Area, GoalCondition, GoalKind, When
 from executive.run.executions import Execution, is_speech
 from executive.run.outcome import Outcome, RobotResult
-from executive.tree.behaviours.board import Constant
+from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiler import CompiledTree, StepPart
 from plant import referee
 from skills.files.errors import listing
@@ -170,16 +171,23 @@ def _node_of(part: StepPart) -> str:
 
 def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str]]:
     """For each time that a step was to say a text: whether the robot said it, and a sentence."""
-    texts = {node.path_id: node.options["inputs"]["text"] for node in tree.root.walk() if is_speech(node)}
-    for one in result.executions:
-        if one.done and one.path_id in texts:
-            binding = texts[one.path_id]
-            text = " ".join(str(binding.value).split()) if isinstance(binding, Constant) else None
-            end_s = _end(one)
-            heard = [said.text for said in result.said if one.began_s - 1e-3 <= said.t_s <= end_s + 1e-3]
-            found = next((each for each in heard if text in (None, each)), None)
-            told = (found or text or "")[:SHOWN_CHARS]
-            yield found is not None, f'It said "{told}".' if found is not None else f'It did not say "{told}".'
+    nodes = list(tree.root.walk())
+    filled = {key: text for node in nodes if node.kind == "set" for key, text in node.options["values"].items()}
+    for node in filter(is_speech, nodes):
+        binding = node.options["inputs"]["text"]
+        text = filled.get(binding.key) if isinstance(binding, FromBoard) else " ".join(str(binding.value).split())
+        for one in result.executions:
+            if one.done and one.path_id == node.path_id:
+                begun_s, end_s = one.began_s - 1e-3, _end(one) + 1e-3
+                heard = (said.text for said in result.said if begun_s <= said.t_s <= end_s)
+                found = next((each for each in heard if _is_text(each, text)), None)
+                told = (text if found is None and isinstance(text, str) else found or "")[:SHOWN_CHARS]
+                yield found is not None, f'It {"said" if found is not None else "did not say"} "{told}".'
+
+
+def _is_text(heard: str, text: str | Template | Expression | None) -> bool:
+    """Whether what was heard is the text of a step; the values in it may be any."""
+    return text.could_be(heard) if isinstance(text, Template) else not isinstance(text, str) or heard == text
 
 
 def _joined(*sentences: str) -> str:

@@ -139,6 +139,13 @@ class Template:
         """The text with the values put in. Raises ExpressionError."""
         return "".join(piece if isinstance(piece, str) else _shown(piece.value(values)) for piece in _pieces(self.text))
 
+    def could_be(self, text: str) -> bool:
+        """Whether a text is this one with some values put in, but for its spaces."""
+        pieces = [
+            re.escape(piece) if isinstance(piece, str) else ".*" for piece in _pieces(" ".join(self.text.split()))
+        ]
+        return re.fullmatch("".join(pieces), " ".join(text.split())) is not None
+
 
 def literal(value: Value) -> Expression:
     """The expression of a plain value. Raises ExpressionError: it is too long or too large."""

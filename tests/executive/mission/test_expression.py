@@ -336,3 +336,11 @@ def test_literal_of_any_value_is_itself_or_refused(plain):
     except ExpressionError:
         return
     assert expression.value({}) == plain
+
+
+@pytest.mark.parametrize(
+    ("template", "text", "could"),
+    [("{n} beers", "3 beers", True), ("{n} beers", "which?", False), ("a  {{x}}", "a {x}", True), ("a.", "ab", False)],
+)
+def test_a_text_could_be_a_template_with_some_values(template, text, could):
+    assert Template(template).could_be(text) is could

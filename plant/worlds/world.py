@@ -38,6 +38,7 @@ Polygon = tuple[Point, ...]
 Pull = Annotated[float, quantities.Quantity(gt=0.0, le=100.0, unit="N")]
 Reaction = Annotated[float, quantities.Quantity(ge=0.0, le=60.0, unit="s")]
 Lengths = tuple[quantities.Margin, quantities.Margin]
+Distances = tuple[quantities.Length, quantities.Length]
 Angles = tuple[quantities.Angle, quantities.Angle]
 
 
@@ -97,7 +98,7 @@ class PersonRule(_Strict):
 
     name: str = Field(description="the person's name in knowledge.yaml")
     model: str = Field(default="person", description="a class of `plant/models/catalogue.yaml`")
-    distance_m: Lengths | None = Field(default=None, description="least and greatest distance from the start pose")
+    distance_m: Distances | None = Field(default=None, description="least and greatest distance from the start pose")
     bearing_rad: Angles | None = Field(default=None, description="least and greatest bearing, seen from the start pose")
     turned_rad: Angles | None = Field(default=None, description="least and greatest turn away from facing the robot")
     route: RouteRule | None = Field(default=None, description="where the person walks")
@@ -112,7 +113,7 @@ class PersonRule(_Strict):
         return self
 
     @property
-    def ranges(self) -> tuple[Lengths, Angles, Angles] | None:
+    def ranges(self) -> tuple[Distances, Angles, Angles] | None:
         """Distance, bearing and turn of one who stands."""
         if self.distance_m is None or self.bearing_rad is None or self.turned_rad is None:
             return None

@@ -30,6 +30,8 @@ Name = Annotated[str, Field(min_length=1, pattern=rf"^ *{_FIRST}[^\x00-\x1f\x7f]
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 MAX_BYTES: Final = 1_000_000
+MOST_ERRORS: Final = 500
+"""So many errors of one file are looked at."""
 _SURELY_FLAT: Final = 1_000
 """A text with fewer brackets and letters in a line is not checked for its depth by an own pass."""
 _SECOND: Final = "but found another document"
@@ -130,7 +132,8 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
     try:
         return model.model_validate(source.data)
     except ValidationError as error:
-        first, *others = [_input_error(model, source, faults) for faults in _telling(error.errors(), source)]
+        telling = _telling(error.errors()[:MOST_ERRORS], source)
+        first, *others = [_input_error(model, source, faults) for faults in telling]
         raise InputError(first.message, hint=first.hint, file=first.file, line=first.line, others=others) from error
 
 
@@ -171,7 +174,9 @@ def _path(error: ErrorDetails, source: YamlSource) -> KeyPath:
 
 
 def _is_in(part: str | int, data: Any) -> bool:
-    return part in data if isinstance(data, dict) else isinstance(data, list) and part in range(len(data))
+    if isinstance(data, dict):
+        return part in data
+    return isinstance(data, list) and isinstance(part, int) and 0 <= part < len(data)
 
 
 def _input_error(model: type[BaseModel], source: YamlSource, errors: list[ErrorDetails]) -> InputError:

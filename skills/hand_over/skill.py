@@ -23,13 +23,14 @@ from skills.hand_over.verification import HandOverVerification
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
 from skills.navigate.skill import NavigateInputs
+from skills.patience import Patience
 from skills.perception.people import SeenPerson, people_in_scan
 from skills.quantities import Duration, Force, Height, Length
 from skills.robot import FloatArray, Pose2D
 
 _FACING_RAD = 0.5
 _SCANS = 3
-_SCAN_PATIENCE_S = 2.0
+_SCAN_PATIENCE_S, _SCAN_AGE_S = 2.0, 1.0
 _PERSON_SIZE_M = (0.6, 0.6, 1.8)
 _STILL_S = 0.5
 _FREE_S = 2.0
@@ -73,7 +74,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
     Options: ClassVar[type] = HandOverOptions
     options: HandOverOptions
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "nothing is held, or nobody is seen near",
+        Cause.PRECONDITION: "nothing is held, there is no new scan, or nobody is seen near",
         Cause.PLANNING: "no free place before the person, or no free path for the arm",
         Cause.EXECUTION: "the robot or its arm did not reach its goal",
         Cause.POSTCONDITION: "the object was lost, is still in the gripper, or is not seen at rest with the person",
@@ -212,12 +213,22 @@ class HandOver(HandOverVerification[HandOverInputs]):
         yield from self.pause(_STILL_S, message)
 
     def _find(self, name: str) -> Routine[SeenPerson]:
-        """The nearest person that is seen in several scans, ahead rather than behind."""
-        seen: list[SeenPerson] = []
-        stamp_s, end_s = -math.inf, self.context.clock.now() + _SCAN_PATIENCE_S
-        while len(seen) < _SCANS and self.context.clock.now() < end_s:
+        """The nearest person that is seen in several scans, ahead rather than behind; missing scans are waited for.
+
+        Raises SkillFailure: there are no new scans, or nobody is seen in them.
+        """
+        clock, patience, seen = self.context.clock, Patience(self.context.clock), list[SeenPerson]()
+        stamp_s, end_s = -math.inf, clock.now() + _SCAN_PATIENCE_S
+        while len(seen) < _SCANS and clock.now() < end_s:
             scan = self.context.robot.scan()
-            if scan is not None and scan.stamp_s > stamp_s:
+            if scan is None or scan.stamp_s < clock.now() - _SCAN_AGE_S:
+                if not patience.is_left():
+                    raise SkillFailure(Cause.PRECONDITION, f"there is no new scan to see {name} in")
+                end_s = clock.now() + _SCAN_PATIENCE_S
+                yield Running(f"looking for {name}; waits for a scan")
+                continue
+            patience.over()
+            if scan.stamp_s > stamp_s:
                 stamp_s = scan.stamp_s
                 people = people_in_scan(scan, self.X_WB(), self.context.robot.capabilities().footprint_m)
                 seen += people[:1] if not seen else _same(people, seen[0])

@@ -171,6 +171,36 @@ class Holds(Condition):
 
 
 @dataclass
+class HoldsNothingElse(Condition):
+    """The gripper holds no other object when `thing` is to be taken, one of the classes `known_as` with `attributes`.
+
+    PRECONDITION at the start when what it holds was taken for something else; what nobody knows, as after a restart, is
+    left to the skill that grasps.
+    """
+
+    reading = "the gripper"
+    thing: str
+    known_as: tuple[str, ...]
+    attributes: tuple[str, ...] = ()
+    _begins: bool = field(default=True, init=False, repr=False, compare=False)
+
+    def begin(self, context: RunContext) -> None:
+        """The subtree starts anew: the gripper is felt once more."""
+        super().begin(context)
+        self._begins = True
+
+    def judged(self, context: RunContext) -> Verdict:
+        """A failure when it begins with another object."""
+        begins, self._begins = self._begins, False
+        held = context.payload.thing
+        if not begins or held is None or not context.robot.gripper().holding:
+            return None
+        if is_known_as(held, self.known_as, self.attributes):
+            return None
+        return Failed(Cause.PRECONDITION, f"the gripper holds the {held} already; put it down first")
+
+
+@dataclass
 class KnowsPlace(Condition):
     """The robot knows where it is. Not knowing for up to `patience_s` (robot's clock) is let pass; PRECONDITION."""
 

@@ -11,7 +11,7 @@ from executive.mission.command import START, TIME_UNITS_S, Task, Thing
 from executive.mission.geometry import inside
 from executive.mission.knowledge import ANYBODY, ANYTHING
 from executive.tree.behaviours.board import FromBoard
-from executive.tree.behaviours.conditions import Holds
+from executive.tree.behaviours.conditions import Holds, HoldsNothingElse
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.compiling.fallen import unless_fallen
 from executive.tree.compiling.handling import go_near_plan, held_plan, known_held_plan, pick_up_plan, tidied
@@ -45,7 +45,8 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
 
     When standing or taking fails, what fits the failure is done and the robot looks again and tries anew; when nothing
     is to be found that is final. With `anywhere`, it is looked for elsewhere, too, when it is not in its place. What an
-    earlier step grasped, be it that this step failed, is not looked for, unless the gripper is empty.
+    earlier step grasped, be it that this step failed, is not looked for, unless the gripper is empty. While it holds
+    another object, nothing is looked for: PRECONDITION.
     """
     thing = _required(builder, builder.command.object)
     if builder.command.item is not None:
@@ -61,6 +62,8 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     get = pick_up_plan(builder, thing, search, key, around)
     if not builder.in_gripper:
         held = known_held_plan(builder.at("have"), thing)
+        alone = HoldsNothingElse(str(thing), builder.sought(thing.name), thing.attributes)
+        get = builder.node("guard", f"get {thing} with an empty gripper", get, part="empty-handed", condition=alone)
         have = builder.node("selector", f"have {thing}, or get it", held, get, part="have")
         return builder.sequence(f"get {thing} {where(builder.knowledge, place)}", have)
     return builder.node(

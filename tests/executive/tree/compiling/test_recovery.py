@@ -526,6 +526,20 @@ def test_what_an_earlier_step_took_is_not_searched_for(compiled, run_tree, scrip
     assert script.begun == ["navigate", "stow"]
 
 
+def test_with_another_object_in_the_gripper_nothing_is_searched_for(compiled, run_tree, script, robot):
+    def holds_another(skill):
+        robot.holding, skill.context.payload.thing = True, Thing("beer")
+        return Succeeded("gone")
+
+    script.ends["navigate"] = holds_another
+    worst = run_tree(compiled(GO, GRASP)).worst
+    assert (worst.cause, worst.message) == (
+        Cause.PRECONDITION,
+        "the gripper holds the beer already; put it down first",
+    )
+    assert script.begun == ["navigate"]
+
+
 def test_what_was_not_handed_over_is_picked_up_and_handed_over_again(compiled, run_tree, script, robot, make, fails):
     def drops(skill):
         robot.let_go()

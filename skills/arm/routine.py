@@ -31,6 +31,8 @@ _RESTART_RAD_S = 0.8
 _LEAST_S = 0.05
 _AGAIN_S = 0.4
 """What was refused, stopped or lost is given again so much later."""
+_OLD_S = 0.45
+"""Readings of the arm that are older are not gone by."""
 _LOST_S = 0.5
 """A command that is still under way so long after its expiry is lost."""
 _OFF_PATH_RAD = 0.2
@@ -208,6 +210,15 @@ class RoutineSkill(Skill[InputsT]):
                 if not patience.is_left():
                     raise SkillFailure(Cause.EXECUTION, str(error)) from error
                 yield from self.pause(_AGAIN_S, f"{error}; {message}")
+
+    def feel_arm(self, message: str) -> Routine[None]:
+        """Wait, as patience lasts, until the readings of the arm's joints and of the gripper are new enough to go by.
+
+        What stays old afterwards is left to the limit on the age of data on which a success rests.
+        """
+        robot, clock, patience = self.context.robot, self.context.clock, Patience(self.context.clock)
+        while min(robot.joints().stamp_s, robot.gripper().stamp_s) < clock.now() - _OLD_S and patience.is_left():
+            yield Running(f"{message}; waits for a reading of the arm")
 
     def follow(
         self, trajectory: ArmTrajectory, message: str, guard: Callable[[FloatArray], bool] | None = None

@@ -46,10 +46,12 @@ class PoseArm(ArmSkill[PoseArmInputs]):
             raise SkillFailure(Cause.PRECONDITION, text)
         if not self.model.within_limits(goal, -1e-3):
             raise SkillFailure(Cause.PRECONDITION, "the pose is beyond the limits of the arm's joints")
+        yield from self.feel_arm("moving the arm to the pose")
         opens = inputs.opening is not None and not self.context.robot.gripper().holding
         if np.max(np.abs(self.q_rad() - goal)) > _THERE_RAD:
             yield from self.move_to(lambda scene, q: goal, "moving the arm to the pose")
         if opens and inputs.opening is not None:
             opening = min(inputs.opening, self.widest)
             yield from self.move_gripper(opening, GRIPPER_FORCE_N, "moving the gripper")
+        yield from self.feel_arm("moving the arm to the pose")
         return Succeeded("the arm is in the pose")

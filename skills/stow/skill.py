@@ -39,6 +39,7 @@ class Stow(ArmSkill[StowInputs]):
 
     def run(self, inputs: StowInputs) -> Routine[Succeeded]:
         """Stow, or carry. From a raised body the arm comes near first: lowered, it would press on what is under it."""
+        yield from self.feel_arm("stowing the arm")
         usual_m = self.context.robot.capabilities().standing_height_m
         if self.context.robot.odometry().X_OB.translation()[2] > usual_m + _RAISED_M:
             try:
@@ -47,7 +48,9 @@ class Stow(ArmSkill[StowInputs]):
                 if failure.cause is not Cause.PLANNING:
                     raise
         yield from self.stand_at(usual_m, "standing as usual")
-        return Succeeded((yield from self._come_near()))
+        how = yield from self._come_near()
+        yield from self.feel_arm("stowing the arm")
+        return Succeeded(how)
 
     def _come_near(self) -> Routine[str]:
         """Fold the empty arm, or draw in what it holds where that is far from the body; says how it is then."""

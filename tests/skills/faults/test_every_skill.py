@@ -39,7 +39,7 @@ FAULTS = (
 
 # What each skill does not live through, by the first words of the fault; all else ends well.
 FREEZES, RAISES, DIES, LEASE = "sensors freezes", "joints raises", "robot dies", "lease taken"
-ARM = {FREEZES: Cause.POSTCONDITION, RAISES: Cause.ERROR, DIES: Cause.ERROR, LEASE: Cause.EXECUTION}
+ARM = {RAISES: Cause.ERROR, DIES: Cause.ERROR, LEASE: Cause.EXECUTION}
 TABLE = {
     "back_off": {DIES: Cause.ERROR, LEASE: Cause.EXECUTION},
     "charge": {DIES: Cause.ERROR, "battery falls": Cause.POSTCONDITION},

@@ -14,7 +14,8 @@ from executive.evaluation.seeds import seed_range
 from executive.mission.variation import Variation
 from skills.files.errors import InputError
 from skills.files.outside import read_text
-from skills.files.yaml_source import KeyPath, YamlSource, read_yaml, validate
+from skills.files.schema import validate
+from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
 
 __all__ = ["FileFinder", "is_evaluation", "load_evaluation"]
 

@@ -14,7 +14,7 @@ from executive.mission.variation import (
     Friction,
     MorePeople,
 )
-from skills.files.yaml_source import Name, Text
+from skills.files.schema import Name, Text
 from skills.quantities import LongDuration, Seed
 
 __all__ = ["EvaluationFile", "FaultsFile", "MissionEntry", "VariationsFile"]

@@ -11,7 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from executive.mission.command import Task
 from executive.mission.robots import RobotsFile
 from skills.files.errors import InputError, suggestion
-from skills.files.yaml_source import Name, YamlSource, read_yaml, validate
+from skills.files.schema import Name, validate
+from skills.files.yaml_source import YamlSource, read_yaml
 from skills.perception.class_forms import PERSON, THING, class_forms
 from skills.quantities import Angle, Coordinate, Opening, Quantity, TopHeight
 

@@ -12,7 +12,8 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from skills.files.errors import InputError, SourceLine, known_names, suggestion
-from skills.files.yaml_source import Name, YamlSource
+from skills.files.schema import Name
+from skills.files.yaml_source import YamlSource
 from skills.quantities import Angle, Coordinate, QuantityError, number_in
 from skills.robot import Pose2D
 

@@ -16,7 +16,8 @@ from executive.mission.knowledge import Corner, Knowledge
 from executive.mission.scenario import RandomFaults, Scenario
 from skills.faults.words import parse_fault
 from skills.files.errors import InputError, Problems, suggestion
-from skills.files.yaml_source import KeyPath, Name, Text, YamlSource, read_yaml, validate
+from skills.files.schema import Name, Text, validate
+from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import Coordinate, Delay, Height, Speed
 
 __all__ = ["EventFile", "ScenarioFile", "checked_fault", "load_scenario", "scenario_of"]

@@ -21,7 +21,8 @@ from skills.api import Cause, Skill
 from skills.faults.kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.words import parse_fault
 from skills.files.errors import InputError
-from skills.files.yaml_source import YamlSource, read_yaml, validate
+from skills.files.schema import validate
+from skills.files.yaml_source import YamlSource, read_yaml
 from skills.quantities import Angle, Coordinate, Delay, Duration, Height, Length, Quantity, Share, Turn
 
 SUFFIX = ".skilltest.yaml"

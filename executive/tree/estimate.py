@@ -17,7 +17,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from executive.tree.behaviours.board import Constant, FromBoard
 from executive.tree.node import NodeSpec
 from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml, validate
+from skills.files.schema import validate
+from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
 
 __all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "expected", "load_estimates"]

@@ -10,7 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from plant.models.catalogue import ModelForm
 from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml, validate
+from skills.files.schema import validate
+from skills.files.yaml_source import read_yaml
 from skills.robot import quantities
 
 FACTS_FILE: Final = "object.yaml"

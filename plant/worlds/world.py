@@ -19,7 +19,8 @@ from plant.models.catalogue import load_catalogue
 from plant.models.imported import ImportedObject, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
 from skills.files.errors import InputError
-from skills.files.yaml_source import KeyPath, YamlSource, read_yaml, validate
+from skills.files.schema import validate
+from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.robot import Pose2D, quantities
 
 if TYPE_CHECKING:

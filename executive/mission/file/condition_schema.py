@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from skills.files.errors import listing
-from skills.files.yaml_source import Name, Text
+from skills.files.schema import Name, Text
 from skills.quantities import Count, Delay, Duration, Share, clock_text
 
 __all__ = ["CONDITION", "DockFile", "RepeatFile", "Strict", "WaitFile", "WhileFile"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from skills.files.yaml_source import Name
+from skills.files.schema import Name
 
 if TYPE_CHECKING:
     from executive.mission.file.schema import MissionFile

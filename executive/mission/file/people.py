@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from executive.mission.knowledge import Corner, Knowledge
 from skills.files.errors import Problems, suggestion
-from skills.files.yaml_source import Name
+from skills.files.schema import Name
 from skills.quantities import Delay, Speed
 
 if TYPE_CHECKING:

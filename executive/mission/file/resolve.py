@@ -25,7 +25,8 @@ from executive.mission.file.schema import HandlerFile, MissionFile, ParameterFil
 from executive.mission.file.scope import Scope
 from executive.mission.knowledge import Knowledge
 from skills.files.errors import InputError, Problems, suggestion
-from skills.files.yaml_source import read_yaml, validate
+from skills.files.schema import validate
+from skills.files.yaml_source import read_yaml
 
 __all__ = ["for_robot", "load_mission", "mission_from_file"]
 

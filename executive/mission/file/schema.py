@@ -41,7 +41,8 @@ from executive.mission.file.objects import ObjectFile
 from executive.mission.file.people import RouteFile
 from executive.mission.robots import RobotsFile
 from skills.files.errors import InputError, listing
-from skills.files.yaml_source import Name, Text, YamlSource
+from skills.files.schema import Name, Text
+from skills.files.yaml_source import YamlSource
 from skills.quantities import (
     Count,
     Duration,

@@ -9,8 +9,9 @@ import pytest
 from pydantic import BaseModel, ConfigDict
 
 from skills.files.errors import InputError
+from skills.files.schema import Name, validate
 from skills.files.yaml_scalars import scalar_of
-from skills.files.yaml_source import Name, read_yaml, validate
+from skills.files.yaml_source import read_yaml
 from skills.quantities import Count, Share
 
 

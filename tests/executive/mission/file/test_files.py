@@ -86,7 +86,7 @@ def test_a_wrong_use_is_refused_at_its_line(compile_text, text, line, says):
         ('to: "${room}", timeout', "to: moon, timeout", 4, "unknown place or person 'moon'"),
         ("limit: 30", "limit: soon", 4, "timeout: should be a number"),
         ("limit: 30", "1x: 30", 2, "cannot be a parameter's name"),
-        ("limit: 30", "limit: [1]", 2, "cannot hold list"),
+        ("limit: 30", "limit: [1]", 2, "cannot hold a list"),
         ("name: visit ${room}", "name: v\nworld: moon", 2, "'world' of a file that is used cannot differ"),
     ],
 )

@@ -21,11 +21,12 @@ OURS_ALONE = (
     "plant/sensors/camera_spec.py",
     "plant/worlds/builder/materials.py",
     "plant/worlds/builder/plan.py",
+    "skills/mapping/map_folder.py",
     "skills/perception/attributes.py",
     "skills/perception/class_forms.py",
     "skills/perception/training/coco.py",
 )
-"""Modules whose models describe files that come with the project, or that other programs write."""
+"""Modules whose models describe files that come with the project, that Errand writes, or that other programs write."""
 
 
 def files() -> list[str]:

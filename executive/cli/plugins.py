@@ -12,12 +12,14 @@ from typing import Annotated, Final
 
 import typer
 
+from executive.cli.number_options import quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.store import trigger_source
 from executive.tree import registry
 from plant import kinds
 from skills.files.errors import InputError
 from skills.files.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
+from skills.quantities import Duration
 from skills.stack import SLOTS
 
 __all__ = ["groups", "plugins"]
@@ -40,7 +42,7 @@ class Plugin:
 
 def plugins(
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
-    limit: Annotated[float, typer.Option(min=0.1, metavar="SECONDS", help="So long may each take to load.")] = LIMIT_S,
+    limit: Annotated[float, quantity_option(Duration, "--limit", help="How long each may take to load.")] = LIMIT_S,
     load: Annotated[str | None, typer.Option(hidden=True)] = None,
 ) -> None:
     """List what other distributions add, each loaded in a process of its own, and why some cannot be used."""

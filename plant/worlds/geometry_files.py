@@ -17,7 +17,6 @@ from xml.parsers import expat
 
 from skills.files.errors import InputError
 from skills.files.outside import file_beside, plain_file, read_text
-from skills.files.pictures import check_picture
 from skills.files.yaml_source import read_yaml
 
 __all__ = ["check_directives", "check_model"]
@@ -89,6 +88,8 @@ class _Walk:
         """Check a model, mesh or picture that the files of `chain` led to."""
         kind = file.suffix.lower()
         if kind in _PICTURES:
+            from skills.files.pictures import check_picture  # brings OpenCV, which most commands do not need
+
             check_picture(file)
             return
         named = _NAMED.get(kind)

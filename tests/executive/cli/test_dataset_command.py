@@ -20,10 +20,10 @@ def errand(*arguments: str) -> Result:
     ("arguments", "told"),
     [
         (("--out", "x"), "--images"),
-        (("--out", "x", "--images", "0"), "'--images'"),
-        (("--out", "x", "--images", "8", "--seed", "-1"), "'--seed'"),
-        (("--out", "x", "--images", "many"), "'--images'"),
-        (("--out", "x", "--images", "8", "--jobs", "0"), "'--jobs'"),
+        (("--out", "x", "--images", "0"), "--images: should"),
+        (("--out", "x", "--images", "8", "--seed", "-1"), "--seed: should"),
+        (("--out", "x", "--images", "many"), "--images: should"),
+        (("--out", "x", "--images", "8", "--jobs", "0"), "--jobs: should"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments: tuple[str, ...], told: str) -> None:

@@ -59,13 +59,13 @@ demo: $(VENV)/.run
 	$(BIN)/errand run --say "Hey Alice, can you fetch me a drink from the kitchen" --world flat --seed 1
 
 test: env voices
-	$(BIN)/pytest -n $(JOBS) --dist worksteal --benchmark-skip
+	$(BIN)/pytest -n $(JOBS) --dist worksteal --ignore-glob='*_benchmarks.py'
 
 fast: env
-	$(BIN)/pytest -n $(JOBS) --benchmark-skip -m "not mission and not nightly"
+	$(BIN)/pytest -n $(JOBS) --ignore-glob='*_benchmarks.py' -m "not mission and not nightly"
 
 nightly: env voices
-	$(BIN)/pytest -n $(JOBS) --dist worksteal --benchmark-skip -m nightly
+	$(BIN)/pytest -n $(JOBS) --dist worksteal --ignore-glob='*_benchmarks.py' -m nightly
 
 check: env
 	$(BIN)/ruff check .

@@ -35,7 +35,7 @@ def shelf(tmp_path, monkeypatch):
     """A room with the three on an open shelf."""
     room(tmp_path, "coke", ("beer", "cylinder"), "shelf", SEED)
     rules = yaml.safe_load((tmp_path / "objects.yaml").read_text(encoding="utf-8"))
-    rules["rules"]["clear_m"] = -1.0  # the spots are set below
+    rules["rules"]["clear_m"] = 0.0  # the spots are set below
     (tmp_path / "objects.yaml").write_text(yaml.safe_dump(rules), encoding="utf-8")
     front_y = rules["fronts"][TAKEN][0][0][1]
 

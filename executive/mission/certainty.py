@@ -10,15 +10,13 @@ from __future__ import annotations
 import ast
 import itertools
 import math
-import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from types import MappingProxyType
 from typing import Any, Final
 
 from executive.mission.condition import AllOf, AnyOf, Condition, Not, ValueIs, parts_of
-from executive.mission.expression import CLOCK, TIME_OF_DAY, Expression, ExpressionError
+from executive.mission.expression import CLOCK, COMPARISONS, TIME_OF_DAY, Expression, ExpressionError
 from skills.quantities import bounds, likely, range_text
 
 __all__ = ["refuse_certain", "refuse_certain_comparisons"]
@@ -27,16 +25,6 @@ Ranges = Mapping[str, Any]
 """The quantities of names that have one."""
 MOST_CASES: Final = 4096
 _DAY_MIN: Final = 24 * 60
-_COMPARED: Final[Mapping[type[ast.cmpop], Callable[[Any, Any], bool]]] = MappingProxyType(
-    {
-        ast.Eq: operator.eq,
-        ast.NotEq: operator.ne,
-        ast.Lt: operator.lt,
-        ast.LtE: operator.le,
-        ast.Gt: operator.gt,
-        ast.GtE: operator.ge,
-    }
-)
 
 
 def refuse_certain_comparisons(expression: Expression, ranges: Ranges) -> None:
@@ -89,7 +77,7 @@ class _Line:
 
     def holds(self, value: Fraction) -> bool:
         """The answer at a value of the name."""
-        return _COMPARED[type(self.compare)](self.slope * value + self.shift, 0)
+        return bool(COMPARISONS[type(self.compare)](self.slope * value + self.shift, 0))
 
     @property
     def turn(self) -> Fraction | None:

@@ -238,7 +238,7 @@ def _parts(node: ast.expr) -> tuple[ast.expr, ...]:
             return (operand,)
         case ast.BoolOp(_, values):
             return tuple(values)
-        case ast.Compare(left, ops, comparators) if all(type(op) in _COMPARISONS for op in ops):
+        case ast.Compare(left, ops, comparators) if all(type(op) in COMPARISONS for op in ops):
             return left, *comparators
         case ast.IfExp(test, body, orelse):
             return test, body, orelse
@@ -358,9 +358,7 @@ def _value(node: ast.expr, values: Mapping[str, Value]) -> Any:
             return every(_value(part, values) for part in parts)
         case ast.Compare(left, ops, comparators):
             sides = [_value(each, values) for each in (left, *comparators)]
-            return all(
-                _COMPARISONS[type(op)](one, other) for one, op, other in zip(sides, ops, sides[1:], strict=False)
-            )
+            return all(COMPARISONS[type(op)](one, other) for one, op, other in zip(sides, ops, sides[1:], strict=False))
         case ast.IfExp(test, body, orelse):
             return _value(body if _value(test, values) else orelse, values)
         case ast.Call(ast.Name(name), arguments):
@@ -409,7 +407,7 @@ _ARITHMETIC: Final[Mapping[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
 }
-_COMPARISONS: Final[Mapping[type[ast.cmpop], Callable[[Any, Any], Any]]] = {
+COMPARISONS: Final[Mapping[type[ast.cmpop], Callable[[Any, Any], Any]]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
     ast.Lt: operator.lt,

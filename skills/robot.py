@@ -83,7 +83,7 @@ class ArmCapabilities:
     max_payload_kg: float
     inverse: InverseKinematics | None = None
     standing_m: tuple[float, ...] = (0.90, 0.94, 0.87, 0.84, 0.98, 0.81, 1.02, 1.06)
-    nearer_m: tuple[float, ...] = (0.76, 0.72, 0.68, 0.64)
+    nearer_m: tuple[float, ...] = (0.76, 0.79, 0.72, 0.68, 0.64)
     carry_x_m: tuple[float, ...] = (0.3, 0.35, 0.4, 0.45, 0.5)
     carry_z_m: tuple[float, ...] = (0.26, 0.29, 0.32, 0.36, 0.41, 0.46, 0.54)
     carry_best_x_m: float = 0.35

@@ -78,6 +78,10 @@ class Offers:
         at_hand = float(np.linalg.norm(p_WO - self.grip_W(offer.robot))) < _AT_HAND_M
         return at_hand and self._before_outline(offer.robot) and self._hand_m_s(offer.robot) < MOVES_M_S
 
+    def grips(self, offer: Offer) -> bool:
+        """Whether the gripper still touches an object that touches nothing else."""
+        return self._free_in(offer.robot) == offer.thing
+
     def grip_W(self, robot: str) -> FloatArray:
         """Where a robot's fingers grip."""
         return np.asarray(self._plant.EvalBodyPoseInWorld(self._context, self._links[robot][0]) @ self._p_HT[robot])

@@ -73,8 +73,8 @@ class Receiver:
                 self._grip(self.offer)
                 self._turn_to(Phase.BRINGING, now_s)
         elif self.phase is Phase.RECEIVING:
-            if not self._on_tray(self.offer) and now_s - self._since_s > SETTLE_S:
-                self._go_home(now_s)
+            if now_s - self._since_s > SETTLE_S:
+                self._end_receiving(self.offer, now_s)
         elif self._gives(self.offer, moved_m=DROPS_M if self.phase is Phase.BRINGING else GIVES_M):
             self._turn_to(Phase.RECEIVING, now_s)
         elif not self._offers.holds(self.offer):
@@ -91,6 +91,13 @@ class Receiver:
         elif (self.phase is Phase.BRINGING and off_m < _NEAR_M) or (self.phase is Phase.PAUSING and for_s > PAUSE_S):
             self._grip(offer)
             self._turn_to(Phase.PULLING, now_s)
+
+    def _end_receiving(self, offer: Offer, now_s: float) -> None:
+        """Keep what is on the tray, pull again at what only slid in the gripper, and else put the tray away."""
+        if self._offers.grips(offer) and self._offers.holds(offer):
+            self._turn_to(Phase.PAUSING, now_s)
+        elif not self._on_tray(offer):
+            self._go_home(now_s)
 
     def _grip(self, offer: Offer) -> None:
         """Note how the gripper has the object, against which it is seen to give way."""

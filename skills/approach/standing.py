@@ -15,7 +15,7 @@ from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.robot import ArmCapabilities, Pose2D
+from skills.robot import ArmCapabilities, FloatArray, Pose2D
 
 BEARINGS = 24
 REACH_WEIGHT = 4.0
@@ -73,6 +73,20 @@ def reachable(free: Sequence[Standing], reach_cost: Callable[[Pose2D], float | N
             best.append(Standing(standing.pose, standing.cost + REACH_WEIGHT * cost))
             best = sorted(best, key=lambda each: each.cost)[:_OFFERED]
     return best
+
+
+def first_reachable(
+    before: Sequence[tuple[FloatArray, Sequence[Standing]]],
+    reach_cost: Callable[[FloatArray], Callable[[Pose2D], float | None]],
+) -> tuple[FloatArray, Sequence[Standing]] | None:
+    """The first of some spots that is within reach of a free place before it, with its places; else one out of reach.
+
+    `reach_cost` says for a spot how awkward the reach from a pose is. None: there is no free place before any.
+    """
+    for spot, free in before:
+        if near := reachable(free, reach_cost(spot)):
+            return spot, near
+    return next(((spot, free) for spot, free in before if free), None)
 
 
 def _sure_cost(pose: Pose2D, reach_cost: Callable[[Pose2D], float | None]) -> float | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import shapely
@@ -12,6 +12,8 @@ import shapely
 from skills.api import Cause, ObjectObservation, Part, Running, Succeeded, Thing
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.words import counted
+from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.navigate.moving import MovingSkill
 from skills.patience import Patience
 from skills.perception.class_forms import PERSON
@@ -21,7 +23,7 @@ from skills.perception.people_watch import people_in_images
 from skills.quantities import Coordinate, Count, Delay, Length, Share, Tries, Turn, TurnRate
 from skills.robot import Image
 
-_SCAN_AGE_S = 1.0
+_SCAN_AGE_S, _AHEAD_RAD = 1.0, 0.2
 _SIZE_M = (0.5, 0.5, 1.7)
 
 
@@ -76,11 +78,10 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
     def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
         """Look, turn, look again, until enough people were seen twice."""
         area, same_m = shapely.Polygon(inputs.area_W), self.options.same_m
-        turn, for_s = (0.0, 0.0, self.options.turn_rad_s), self.options.turn_rad / self.options.turn_rad_s
         seen, echoes, found = tuple[SeenPerson, ...](), list[SeenPerson](), list[SeenPerson]()
         for look in range(self.options.looks):
             if look:
-                yield from self.move(turn, for_s, "turning to see more", settle_s=self.options.settle_s)
+                yield from self._turn()
             by_lidar = yield from self._in_scan(f"looking for people in the {inputs.place}")
             by_camera = yield from self._in_pictures(f"looking for people in the {inputs.place}")
             echoes += [] if by_camera is None else by_lidar
@@ -90,6 +91,20 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
             if 0 < inputs.count <= len(found):
                 break
         return self._ended(inputs, tuple(_observation(one, inputs) for one in found))
+
+    def _turn(self) -> Routine[None]:
+        """Turn on the spot to see more, as far as there is room for the body to turn."""
+        turn_rad_s, for_s = self.options.turn_rad_s, self.options.turn_rad / self.options.turn_rad_s
+        costmap, footprint = self.context.costmap, ArmFootprint(self.context).now()
+
+        def no_room() -> bool:
+            here = self.context.pose()
+            ahead = replace(here, yaw_rad=here.yaw_rad + math.copysign(_AHEAD_RAD, turn_rad_s))
+            here_m, ahead_m = footprint_clearance_m(costmap, footprint, pose_array([here, ahead]))
+            return bool(ahead_m < min(here_m, SAFE_MARGIN_M))
+
+        rest_s = self.options.settle_s
+        yield from self.move((0.0, 0.0, turn_rad_s), for_s, "turning to see more", settle_s=rest_s, enough=no_room)
 
     def _ended(self, inputs: FindPeopleInputs, found: tuple[ObjectObservation, ...]) -> Succeeded:
         """The answer. Raises SkillFailure when there is none, or not enough."""

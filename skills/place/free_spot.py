@@ -15,7 +15,7 @@ from skills.robot import FloatArray
 
 CLEARANCE_M = 0.12
 EDGE_M = 0.09
-_GRID_M = 0.04
+_GRID_M, _ROUNDING_M = 0.04, 1e-6
 _ROOM_M = 0.3
 """So much room around a spot is enough: more does not count."""
 _ANOTHER_M = 0.2
@@ -24,7 +24,7 @@ _SAMPLE_M, _SURVEYED_M = 0.01, 0.01
 
 def spots(surface: Surface) -> FloatArray:
     """Points (N, 2) of a surface at least EDGE_M from its edges, or its middle when it is small."""
-    kept = grid_inside(surface.polygon_W, _GRID_M, margin_m=-EDGE_M)
+    kept = grid_inside(surface.polygon_W, _GRID_M, first_m=EDGE_M, margin_m=_ROUNDING_M - EDGE_M)
     return kept if len(kept) else np.asarray([np.mean(surface.polygon_W, axis=0)])
 
 
@@ -77,3 +77,12 @@ def roomiest_first(free: FloatArray, view: SurfaceView, but: Sequence[FloatArray
         return free
     room_m = [float(np.min(np.linalg.norm(np.concatenate(things) - spot, axis=1))) for spot in free]
     return free[np.argsort(-np.minimum(room_m, _ROOM_M), kind="stable")]
+
+
+def apart(free: FloatArray) -> list[FloatArray]:
+    """Those of some spots (N, 2), in their order, that are not near one before."""
+    kept = list[FloatArray]()
+    for spot in free:
+        if all(float(np.linalg.norm(spot - other)) > _ANOTHER_M for other in kept):
+            kept.append(spot)
+    return kept

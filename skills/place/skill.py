@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
@@ -12,10 +13,9 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
-from skills.approach.standing import free_places, reachable
+from skills.approach.standing import first_reachable, free_places, go_to_one
 from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill, Goal
 from skills.arm.collision import ArmScene, Box, box_corners
-from skills.arm.kinematics import ArmModel
 from skills.arm.poses import carry_configuration, overview_viewpoints, tucked_configuration
 from skills.arm.routine import Routine, SkillFailure
 from skills.arm.solid_cells import CELL_M
@@ -25,31 +25,25 @@ from skills.geometry import inside_polygon, wrap
 from skills.grasp.candidates import hand_rotation
 from skills.grasp.reach import body_heights_m
 from skills.navigate.arm_footprint import ArmFootprint
-from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.skill import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
-from skills.place.free_spot import clear_spots, free_spots, roomiest_first, spots, unseen_view
+from skills.place.free_spot import apart, clear_spots, free_spots, roomiest_first, spots, unseen_view
+from skills.place.putting_down import LEVEL, Above, HeldObject, Release, above_goal, clear_heights, reaches, with_held
 from skills.quantities import Coordinate, Length, Tries, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, Image, Pose2D
-from skills.stack import ArmPlanner
 
-ABOVE_M = 0.10
-"""So high over the surface the object's lowest point is brought, before it goes down."""
 _SURELY_FREE_M = 0.03
 _PRESS_M = 0.03
 _LAG_IN_CONTACT_M = 0.02
 """A hand that goes down fast lags by so much only in contact: what it holds hangs lower than was thought."""
 _SIDE_DROP_M, _LIFT_AGAIN_M = 0.12, 0.135
-_LEAST_BACK_M = 0.08
-"""How far the hand is drawn back, the best first; a spot counts only where the hand gets back by the former."""
-_MARGIN_RAD = 0.05
-_MOST_SPOTS = 80
+_MOST_SPOTS, _OTHER_SPOTS, _PLACES = 80, 6, 3
 _OTHER_HEIGHT_COST = 0.05
-_LEVEL = 0.5
 _RELAX_M = 0.003
 _FEEL_S = 0.4
 _FLOOR_M = 0.06
-_STANDS_OUT_M, _HIGHEST_M, _OFF_SURFACE_M = 0.03, 0.5, 0.01
-_BESIDE, _TUCKED_M, _EDGE_M = 0.6, 0.03, 0.1
+_STANDS_OUT_M, _HIGHEST_M = 0.03, 0.5
+_BESIDE, _TUCKED_M = 0.6, 0.03
 _AT_HAND_M, _HIDDEN = 0.4, 0.5
 """A picture of which half is nearer than that, or too near to tell, shows what is held and not what lies behind it."""
 _OVER_SPOT_M = 0.45
@@ -110,7 +104,7 @@ class Place(ArmSkill[PlaceInputs]):
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} has no room out of the way")
         carried = self._carried()
         held = self._held(carried)
-        yield from self._go_near(self._nearest_spot(surface), surface, held)
+        yield from self._go_near(surface, held)
         try:
             yield from self._put_down(surface, held, carried)
         except SkillFailure:
@@ -121,10 +115,10 @@ class Place(ArmSkill[PlaceInputs]):
 
     def _put_down(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[None]:
         """Find a spot, lower the object, let go, check, stow."""
-        q_above_rad = yield from self._find_spot(surface, held, carried)
+        above = yield from self._find_spot(surface, held, carried)
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
-        yield from self._lower(surface, q_above_rad)
+        yield from self._lower(surface, above)
         put_down = held.box(self.model.X_BH(self.q_rad()))
         yield from self._let_go()
         yield from self._check(surface, spot_W, [put_down])
@@ -160,11 +154,8 @@ class Place(ArmSkill[PlaceInputs]):
         self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist()}
         return rotation
 
-    def _find_spot(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[FloatArray]:
-        """Look, and bring the object over a free spot; where none is in reach, from before another one that was seen.
-
-        Gives the joint angles that the arm is to have there.
-        """
+    def _find_spot(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[Above]:
+        """Look, and bring the object over a free spot; out of reach, go before another one that was seen."""
         spot_W, gone_to, arm = self._nearest_spot(surface), list[FloatArray](), self.arm
         heights_m, standing = self._heights_m(surface), f"standing up to the {surface.name}"
         while True:
@@ -185,14 +176,13 @@ class Place(ArmSkill[PlaceInputs]):
                 if failure.cause is not Cause.PLANNING or len(others) == 0 or len(gone_to) >= self.options.moves:
                     raise
             gone_to.append(spot_W)
-            spot_W = others[0]
             if not (yield from self._draw_in(held)):
                 message = "carrying the object on along the surface"
                 yield from self.move_to(
                     lambda scene, q: carry_configuration(scene, arm, carried, q), message, speed_rad_s=0.9
                 )
             yield from self._stand_as_usual()
-            yield from self._go_before(spot_W, surface, held)
+            spot_W = yield from self._go_before(apart(others)[:_OTHER_SPOTS], surface, held)
 
     _clear_of: tuple[tuple[float, float, float], ...] = ()
 
@@ -228,32 +218,37 @@ class Place(ArmSkill[PlaceInputs]):
         """How high the body may stand to put something down, the usual height first."""
         return body_heights_m(surface.height_m, self.context.robot.capabilities())
 
-    def _go_near(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Routine[None]:
-        """Drive nearer when a spot is out of the arm's reach."""
-        pose = self.context.pose()
+    def _go_near(self, surface: Surface, held: HeldObject) -> Routine[None]:
+        """Drive nearer when the nearest spot is out of the arm's reach."""
+        near = apart(_by_distance(self._spots(surface), self.X_WB()))
+        spot, pose = near[0], self.context.pose()
         offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
         bearing = wrap(math.atan2(offset[1], offset[0]) - pose.yaw_rad)
         comfortable = np.linalg.norm(offset) < self.arm.comfortable_m[1] and abs(bearing) < 0.6
-        if comfortable and self._reach_cost(spot, surface, held)(pose) is not None:
+        if comfortable and self._reach_cost(surface, held, spot)(pose) is not None:
             return
-        yield from self._go_before(spot, surface, held)
+        yield from self._go_before(near[:_OTHER_SPOTS], surface, held)
 
-    def _go_before(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Routine[None]:
-        """Drive to where a spot is within the arm's reach, or as near as may be."""
+    def _go_before(self, candidates: Sequence[FloatArray], surface: Surface, held: HeldObject) -> Routine[FloatArray]:
+        """Drive to where the first of some spots that can be is within the arm's reach, or as near as may be.
+
+        Gives that spot. Raises SkillFailure with cause PLANNING: there is no free place before any of them.
+        """
         yield from self._draw_in(held)
-        context, pose, point_W = self.context, self.context.pose(), (float(spot[0]), float(spot[1]))
-        footprint, reach_cost = ArmFootprint(context).now(), self._reach_cost(spot, surface, held)
-        distances, best_m = (self.arm.standing_m, self.arm.nearer_m), self.arm.standing_m[0]
-        free = [free_places(point_W, pose, context.costmap, footprint, each, best_m) for each in distances]
-        places = yield from self.compute(
-            lambda: next((near for each in free if (near := reachable(each, reach_cost))), free[0]),
-            latency_s=0.2,
-            name="choose a place",
-            message=f"choosing where to stand at the {surface.name}",
-        )
-        if not places:
+        context, pose, arm = self.context, self.context.pose(), self.arm
+        footprint, best_m = ArmFootprint(context).now(), arm.standing_m[0]
+        before = [
+            (spot, free_places((float(spot[0]), float(spot[1])), pose, context.costmap, footprint, each, best_m))
+            for spot, each in itertools.product(candidates, (arm.standing_m, arm.nearer_m))
+        ]
+        choose = partial(first_reachable, before, partial(self._reach_cost, surface, held))
+        message = f"choosing where to stand at the {surface.name}"
+        chosen = yield from self.compute(choose, latency_s=0.2, name="choose a place", message=message)
+        if chosen is None:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {surface.name}")
-        yield from self.perform(Navigate(context), NavigateInputs(places[0].pose, 0.08, 0.1, 0.5))
+        spot, places = chosen
+        yield from go_to_one(self, [NavigateInputs(place.pose, 0.08, 0.1, 0.5) for place in places[:_PLACES]])
+        return spot
 
     def _tucked(self) -> bool:
         """Whether the hand is drawn in to the body."""
@@ -287,16 +282,16 @@ class Place(ArmSkill[PlaceInputs]):
         message = f"holding the object before the {surface.name}"
         yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, carried, q), message, speed_rad_s=0.9)
 
-    def _reach_cost(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Callable[[Pose2D], float | None]:
+    def _reach_cost(self, surface: Surface, held: HeldObject, spot: FloatArray) -> Callable[[Pose2D], float | None]:
         """How awkwardly the arm puts the object down on a spot from a pose of the body; None where it does not."""
         model, heights_m = self.model, self._heights_m(surface)
         p_WT = np.array([spot[0], spot[1], surface.height_m])
 
         def cost(pose: Pose2D) -> float | None:
-            for number, height_m in enumerate(heights_m):
+            for (number, height_m), way in itertools.product(enumerate(heights_m), held.ways()[1:]):
                 p_BT = pose.transform(height_m).inverse() @ p_WT
-                if any(_reaches(model, X_BH) for X_BH in held.above(p_BT, model.p_BS)):
-                    return _OTHER_HEIGHT_COST * number
+                if any(reaches(model, X_BH) for X_BH in held.above(p_BT, model.p_BS, *way)):
+                    return _OTHER_HEIGHT_COST * number + way[1]
             return None
 
         return cost
@@ -344,8 +339,8 @@ class Place(ArmSkill[PlaceInputs]):
             views += [] if view is None else [view]
         return max(views, key=lambda view: len(view.plane_points), default=None)
 
-    def _go_above(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[FloatArray]:
-        """Bring the object above the best free spot; gives the joint angles that the arm is to have there."""
+    def _go_above(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[Above]:
+        """Bring the object above the best free spot."""
         X_WB = self.X_WB()
         free = free_spots(view, self._spots(surface))
         if len(free) == 0:
@@ -357,7 +352,9 @@ class Place(ArmSkill[PlaceInputs]):
         self.boxes = [*surface_boxes([surface], X_WB), *beside]
         letting_go = Release(beside, self.release_rad())
         goal = above_goal(on_top, held, self.context.stack.arm_planner, letting_go)
-        return (yield from self._bring(goal, held, f"bringing the object over the {surface.name}"))
+        q_rad = yield from self._bring(goal, held, f"bringing the object over the {surface.name}")
+        X_BH = self.model.X_BH(q_rad)
+        return Above(q_rad, float(X_BH.translation()[2] - on_top[0][2]) - held.drop_m(X_BH.rotation()))
 
     def _bring(self, goal: Goal, held: HeldObject, message: str) -> Routine[FloatArray]:
         """Go to a goal on a path on which what is held touches nothing; where there is none, the arm at least."""
@@ -374,7 +371,7 @@ class Place(ArmSkill[PlaceInputs]):
                 raise
         return (yield from self.move_to(lambda scene, q: found[0], message, speed_rad_s=0.8))
 
-    def _lower(self, surface: Surface, q_above_rad: FloatArray) -> Routine[None]:
+    def _lower(self, surface: Surface, above: Above) -> Routine[None]:
         """Go down slowly until the hand is held up, by contact, or the height is that of the surface.
 
         The path down begins at the angles for which it was found to be possible, and not at those of the arm: they
@@ -382,10 +379,10 @@ class Place(ArmSkill[PlaceInputs]):
         After contact the arm no longer presses, or it would dip onto the surface as the gripper lets go.
         """
         message = f"putting the object down on the {surface.name}"
-        p_BH = self.model.X_BH(q_above_rad).translation() - [0.0, 0.0, ABOVE_M - _SURELY_FREE_M]
+        p_BH = self.model.X_BH(above.q_rad).translation() - [0.0, 0.0, above.height_m - _SURELY_FREE_M]
         down_B = np.array([0.0, 0.0, -1.0])
         early = self.held_up(down_B, _LAG_IN_CONTACT_M)
-        stopped = yield from self.move_straight(p_BH, message, q_from_rad=q_above_rad, guard=early)
+        stopped = yield from self.move_straight(p_BH, message, q_from_rad=above.q_rad, guard=early)
         if not stopped:
             stopped = yield from self.follow(self._way_down(), message, self.held_up(down_B))
         if stopped:
@@ -441,135 +438,11 @@ class Place(ArmSkill[PlaceInputs]):
         payload, gripper = self.context.payload, self.gripper
         if payload.corners_H is not None and payload.R_BH is not None:
             return HeldObject(payload.R_BH, payload.corners_H)
-        if abs(carried.matrix()[2, 2]) < _LEVEL:
+        if abs(carried.matrix()[2, 2]) < LEVEL:
             low_H = carried.matrix().T @ np.array([0.0, 0.0, -_SIDE_DROP_M])
             return HeldObject(carried, np.array([gripper.grip_x_m, 0.0, 0.0]) + np.array([low_H, -low_H]))
         tip_H = np.array([gripper.tip_x_m, 0.0, 0.0])
         return HeldObject(hand_rotation(0.5 * math.pi, 0.0, 1.0), np.array([tip_H, tip_H - [0.06, 0.0, 0.0]]))
-
-
-def clear_heights(heights_m: Sequence[float], now_m: float, held_W: FloatArray, surface: Surface) -> Sequence[float]:
-    """Those heights of the body (m), the first in any case, at which what is held does not press on a surface.
-
-    `held_W` are its corners (N, 3) while the body is `now_m` high, with the arm as it stays. Only what is above the
-    surface or its edge can come to press on it.
-    """
-    room_m = float(held_W[:, 2].min()) - surface.height_m
-    if room_m < 0.0 or not inside_polygon(held_W[:, :2], surface.polygon_W, _EDGE_M).any():
-        return heights_m
-    lowest_m = now_m - room_m + _OFF_SURFACE_M
-    return [*heights_m[:1], *(height_m for height_m in heights_m[1:] if height_m > lowest_m)]
-
-
-@dataclass(frozen=True)
-class HeldObject:
-    """What the hand holds: how the hand was turned when the object stood, and its corners (N, 3) in the hand frame."""
-
-    R_BH: RotationMatrix
-    corners_H: FloatArray
-
-    @property
-    def p_HO(self) -> FloatArray:
-        """The object's middle in the hand frame (3,), m."""
-        return np.asarray(0.5 * (self.corners_H.min(axis=0) + self.corners_H.max(axis=0)))
-
-    @property
-    def box_H(self) -> Box:
-        """The box about it in the hand frame."""
-        x, y, z = np.maximum(self.corners_H.max(axis=0) - self.corners_H.min(axis=0), 0.01)
-        return Box(RigidTransform(self.p_HO), (float(x), float(y), float(z)))
-
-    def box(self, X_BH: RigidTransform) -> Box:
-        """The upright box about it where the hand holds it at X_BH (B), a little lifted off what it stands on."""
-        corners_B = self.corners_H @ X_BH.rotation().matrix().T + X_BH.translation()
-        low, high = corners_B.min(axis=0) + [0.0, 0.0, _OFF_SURFACE_M], corners_B.max(axis=0)
-        x, y, z = np.maximum(high - low, 0.01)
-        return Box(RigidTransform(0.5 * (low + high)), (float(x), float(y), float(z)))
-
-    def drop_m(self, rotation: RotationMatrix) -> float:
-        """How far below the hand's origin the object reaches, with the hand turned so."""
-        return -float(np.min(self.corners_H @ rotation.matrix()[2]))
-
-    def rotations(self, azimuth_rad: float) -> list[RotationMatrix]:
-        """How the hand may be turned for the object to stand as it stood.
-
-        Fingers that do not point down point towards an azimuth, or somewhat aside.
-        """
-        x_axis = self.R_BH.matrix()[:, 0]
-        level = math.hypot(x_axis[0], x_axis[1]) > _LEVEL
-        ahead = azimuth_rad - math.atan2(x_axis[1], x_axis[0]) if level else azimuth_rad
-        turns = (0.0, 0.4, -0.4) if level else tuple(k * math.pi / 4 for k in range(8))
-        return [RotationMatrix.MakeZRotation(ahead + turn) @ self.R_BH for turn in turns]
-
-    def above(self, p_BT: FloatArray, p_BS: FloatArray) -> Iterator[RigidTransform]:
-        """Poses of the hand with the object over a point of a surface, as it stood; p_BS is the shoulder."""
-        azimuth = math.atan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0])
-        for rotation in self.rotations(azimuth):
-            middle = rotation @ self.p_HO
-            p_BH = np.array([*(p_BT - middle)[:2], p_BT[2] + ABOVE_M + self.drop_m(rotation)])
-            yield RigidTransform(rotation, p_BH)
-
-
-@dataclass(frozen=True)
-class Release:
-    """How the hand lets go: what stands beside, as boxes (B), and how far the gripper is open then (rad)."""
-
-    beside: Sequence[Box]
-    opening: float
-
-
-def above_goal(
-    on_top_B: list[FloatArray], held: HeldObject, planner: ArmPlanner, release: Release
-) -> Callable[[ArmScene, FloatArray], FloatArray]:
-    """A goal with the object over the first of some points of a surface that the arm can reach, as it stood before.
-
-    The open hand must find its way out again without touching what stands beside.
-    """
-
-    def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-        """Arm angles above the first spot that can be reached and gone down to. Raises PlanningError."""
-        for p_BT in on_top_B:
-            for X_BH in held.above(p_BT, scene.model.p_BS):
-                for solution in scene.model.inverse(X_BH, margin_rad=_MARGIN_RAD):
-                    q_above = scene.model.turned_near(solution, q)
-                    if scene.free(q_above) and _can_put_down(scene, q_above, planner, release):
-                        return q_above
-        raise PlanningError("no free spot is within the arm's reach")
-
-    return goal
-
-
-def with_held(goal: Goal, box_H: Box) -> Goal:
-    """That goal; on the path to it the box is in the hand, unless that touches something at the path's very ends."""
-
-    def chosen(scene: ArmScene, q: FloatArray) -> FloatArray:
-        q_goal = goal(scene, q)
-        scene.hold([box_H])
-        if not (scene.free(q) and scene.free(q_goal)):
-            scene.hold(())
-        return q_goal
-
-    return chosen
-
-
-def _reaches(model: ArmModel, X_BH: RigidTransform) -> bool:
-    """Whether the arm reaches a pose of the hand and the one below at which the object stands."""
-    lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, ABOVE_M])
-    return model.reaches(X_BH, _MARGIN_RAD) and model.reaches(lowered, _MARGIN_RAD)
-
-
-def _can_put_down(scene: ArmScene, q_rad: FloatArray, planner: ArmPlanner, release: Release) -> bool:
-    """Whether the hand can go down from there and, with its finger open, back again."""
-    X_BH = scene.model.X_BH(q_rad)
-    lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, ABOVE_M])
-    back = lowered @ RigidTransform([-_LEAST_BACK_M, 0.0, 0.0])
-    try:
-        down = planner.line(scene.model, q_rad, lowered)
-        with scene.with_only(release.beside, release.opening):
-            planner.line(scene.model, down[-1], back, scene)
-    except PlanningError:
-        return False
-    return True
 
 
 def _by_distance(points_W: FloatArray, X_WB: RigidTransform) -> FloatArray:

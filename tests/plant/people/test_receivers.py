@@ -145,6 +145,15 @@ def test_a_gripper_that_holds_on_is_pulled_at_again_after_a_pause(tmp_path):
     assert hall.robot.gripper().holding
 
 
+def test_what_only_slides_in_the_gripper_under_the_pull_is_pulled_at_again(tmp_path):
+    hall = Hall(tmp_path).until(Phase.PULLING)
+    state = hall.kim.state()
+    x, y, z = state["p_HO"]
+    hall.kim.restore({**state, "p_HO": [x + 0.011, y, z]})  # as if it had moved 11 mm in the hand
+    hall.until(Phase.RECEIVING).until(Phase.PAUSING).until(Phase.PULLING)
+    assert hall.robot.gripper().holding
+
+
 def test_the_arms_joints_feel_the_pull(tmp_path):
     hall = Hall(tmp_path, Receiving(pull_n=20.0)).until(Phase.BRINGING)
     name = hall.robot.capabilities().arm.joint_names[1]

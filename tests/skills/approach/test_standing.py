@@ -8,7 +8,7 @@ import pytest
 from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 
 from skills.api import ObjectObservation, Thing
-from skills.approach.standing import free_places, is_comfortable, reachable
+from skills.approach.standing import Standing, first_reachable, free_places, is_comfortable, reachable
 from skills.grasp.planning import GeometricGraspPlanner
 from skills.grasp.reach import observed_target, reached_grasps
 from skills.navigate.footprint import Footprint
@@ -102,3 +102,21 @@ def test_a_place_with_a_better_grasp_is_preferred():
 def test_a_place_is_left_for_a_nearer_one_where_stopping_short_of_it_is_out_of_reach():
     best = _poses(lambda pose: 0.0 if math.hypot(pose.x_m - 2.15, pose.y_m) < 0.91 else None)[0].pose
     assert math.hypot(best.x_m - 2.15, best.y_m) < 0.88
+
+
+# The distances (m) of the free places before spots 0, 1, 2 of which 1 m is within reach -> the spot, how many places
+@pytest.mark.parametrize(
+    ("free_m", "chosen"),
+    [(((1.0,), (1.0,), ()), (0, 1)), (((), (2.0,), (1.0, 2.0)), (2, 1)), (((), (2.0, 3.0), ()), (1, 2))],
+)
+def test_the_robot_goes_before_the_first_spot_that_it_can_reach_from_a_free_place(free_m, chosen):
+    before = [
+        (np.array([spot, 0.0]), [Standing(Pose2D(spot - off_m, 0.0, 0.0), off_m) for off_m in each])
+        for spot, each in enumerate(free_m)
+    ]
+    spot, places = first_reachable(before, lambda spot: lambda pose: 0.0 if spot[0] - pose.x_m < 1.2 else None)
+    assert (spot[0], len(places)) == chosen
+
+
+def test_without_a_free_place_before_any_spot_there_is_none():
+    assert first_reachable([(np.zeros(2), [])], lambda spot: lambda pose: 0.0) is None

@@ -11,6 +11,22 @@ from skills.robot import Pose2D
 ROOM = tuple((x, y) for x, y in ((0.2, 0.2), (4.8, 0.2), (4.8, 3.8), (0.2, 3.8)))
 
 
+CORRIDOR = (Box(-4.0, -0.1, 4.0, 0.0), Box(-4.0, 1.2, 4.0, 1.3), Box(-4.1, -0.1, -4.0, 1.3), Box(4.0, -0.1, 4.1, 1.3))
+
+
+def test_in_a_narrow_corridor_the_robot_turns_no_further_than_it_has_room():
+    bench = Bench(Pose2D(0.0, 0.6, 0.0), surveyed=CORRIDOR, cameras=False)
+    for _ in range(10):
+        bench.tick()
+    skill = FindPeople(bench.context())
+    skill.begin(FindPeopleInputs(((-3.9, 0.1), (3.9, 0.1), (3.9, 1.1), (-3.9, 1.1)), "corridor"))
+    while isinstance(step := skill.step(), Running):
+        bench.tick()
+    skill.end()
+    assert "nobody is seen in the corridor from here" in step.message
+    assert abs(bench.robot.pose.yaw_rad) < 0.9  # 1.1 m long and 0.5 m wide, it would touch the walls at about 1.2
+
+
 def test_the_observation_is_where_somebody_stands():
     # a body 0.4 m wide at (3.0, 2.0), seen by the LiDAR from (1.5, 2.0)
     bench = Bench(Pose2D(1.5, 2.0, 0.0), unmapped=(Box(2.8, 1.8, 3.2, 2.2),), surveyed=TWO_ROOMS, cameras=False)

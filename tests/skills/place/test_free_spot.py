@@ -8,7 +8,16 @@ from skills.perception.plane import LevelPlane
 from skills.perception.point_cloud import PointCloud
 from skills.perception.shape import SeenShape
 from skills.perception.surface_segmentation import Cluster, SurfaceView
-from skills.place.free_spot import CLEARANCE_M, EDGE_M, clear_spots, free_spots, roomiest_first, spots, unseen_view
+from skills.place.free_spot import (
+    CLEARANCE_M,
+    EDGE_M,
+    apart,
+    clear_spots,
+    free_spots,
+    roomiest_first,
+    spots,
+    unseen_view,
+)
 
 TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)
 PLANE = LevelPlane((1.3, 0.0), 0.7, (0.0, 0.0), 0.002)
@@ -32,7 +41,7 @@ def _view(seen_y=(-0.5, 0.5), things=()):
 
 def test_spots_keep_off_the_edges():
     found = spots(TABLE)
-    assert found[:, 0].min() >= 1.0 + EDGE_M - 1e-9
+    assert found[:, 0].min() == pytest.approx(1.0 + EDGE_M)  # no nearer to the robot than need be
     assert found[:, 0].max() <= 1.6 - EDGE_M + 1e-9
 
 
@@ -78,3 +87,8 @@ def test_a_surface_that_is_hidden_is_free_but_for_what_is_known_to_stand_there()
     assert 0 < len(free) < len(spots(TABLE))
     assert np.linalg.norm(free - [1.3, 0.0], axis=1).min() > CLEARANCE_M - 0.04
     assert len(free_spots(unseen_view(TABLE, np.empty((0, 3))), spots(TABLE))) == len(spots(TABLE))
+
+
+def test_spots_that_are_apart_are_in_their_order_and_none_is_near_one_before():
+    free = np.array([[0.0, 0.0], [0.1, 0.0], [0.3, 0.0], [0.4, 0.0], [0.0, 0.25]])
+    assert np.array_equal(apart(free), free[[0, 2, 4]])

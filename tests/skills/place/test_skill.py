@@ -4,17 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RotationMatrix
 from scripted_robot import ScriptedRobot, context_of, failed
 from table_scene import RED, Can
 from table_scene import TABLE as TOP
 
 from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause, Failed, Running, Succeeded, Surface
-from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model
-from skills.arm.motion import RrtConnect
-from skills.place.skill import HeldObject, Place, PlaceInputs, Release, above_goal, clear_heights, with_held
+from skills.place.putting_down import HeldObject
+from skills.place.skill import Place, PlaceInputs
 from skills.robot import Pose2D
 
 MODEL = arm_model(spot_capabilities())
@@ -100,46 +99,6 @@ def test_what_is_still_in_the_gripper_is_not_put_down():
     assert Place(context_of(robot)).undone(PlaceInputs(TABLE)) is not None
 
 
-def test_a_held_object_reaches_below_the_hand_as_far_as_its_lowest_corner():
-    bottle_H = np.array([[0.15, -0.14, -0.03], [0.22, 0.08, 0.03]])
-    held = HeldObject(LEVEL_FORWARD, bottle_H)  # the hand's y axis points up
-    assert held.drop_m(LEVEL_FORWARD) == pytest.approx(0.14)
-    assert [held.drop_m(each) for each in held.rotations(0.7)] == pytest.approx([0.14] * 3)
-    assert held.p_HO == pytest.approx([0.185, -0.03, 0.0])
-
-
-def test_what_was_taken_from_above_is_put_down_with_the_fingers_down_whatever_way_they_are_turned():
-    down = RotationMatrix.MakeYRotation(np.pi / 2)
-    turned = HeldObject(down, np.zeros((2, 3))).rotations(0.3)
-    assert len(turned) == 8
-    assert [each.matrix()[2, 0] for each in turned] == pytest.approx([-1.0] * 8)
-
-
-# What stands beside the first of two spots (m to its side) -> the spot that is taken
-@pytest.mark.parametrize(("beside_m", "taken"), [(None, 0), (0.35, 0), (0.12, 1), (-0.12, 1)])
-def test_a_spot_is_left_out_where_the_open_hand_would_touch_a_tall_thing_beside_it(beside_m, taken):
-    spots_B = [np.array([0.85, y, 0.02]) for y in (0.0, -0.5)]
-    beside = [] if beside_m is None else [Box(RigidTransform([0.8, beside_m, 0.2]), (0.1, 0.1, 0.3))]
-    scene = ArmScene(spot_capabilities(), MODEL, {})
-    can_H = np.array([[0.15, -0.05, -0.03], [0.22, 0.06, 0.03]])
-    goal = above_goal(spots_B, HeldObject(LEVEL_FORWARD, can_H), RrtConnect(), Release(beside, 0.7))
-    above = MODEL.X_BH(goal(scene, CARRYING)).translation()
-    assert int(np.argmin([abs(above[1] - spot[1]) for spot in spots_B])) == taken
-
-
-# How high (m) a surface below the hand at its goal is -> whether the path is planned with the object in the hand
-@pytest.mark.parametrize(("top_m", "held"), [(-0.3, True), (0.1, False)])
-def test_what_is_held_keeps_clear_on_the_way_unless_it_touches_something_at_an_end(top_m, held):
-    scene, can = ArmScene(spot_capabilities(), MODEL, {}), Box(RigidTransform([0.2, -0.08, 0.0]), (0.06, 0.16, 0.06))
-    above_B = RigidTransform(LEVEL_FORWARD, [0.8, 0.0, 0.25])
-    (q_goal, *_) = MODEL.inverse(above_B)
-    scene.set_boxes([Box(RigidTransform([1.0, 0.0, top_m - 0.05]), (0.3, 0.6, 0.1))])
-    with_held(lambda scene, q: q_goal, can)(scene, CARRYING)
-    lower = MODEL.inverse(RigidTransform(LEVEL_FORWARD, [0.8, 0.0, top_m + 0.1]))[0]
-    assert scene.free(q_goal)
-    assert scene.free(lower) is not held
-
-
 BENCH = Surface("bench", ((0.0, -0.5), (0.6, -0.5), (0.6, 0.5), (0.0, 0.5)), 0.82)
 FROM_ABOVE = HeldObject(RotationMatrix.MakeYRotation(np.pi / 2), np.array([[0.19, -0.02, -0.02], [0.24, 0.02, 0.02]]))
 FROM_THE_SIDE = HeldObject(LEVEL_FORWARD, np.array([[0.15, -0.05, -0.03], [0.22, 0.06, 0.03]]))
@@ -152,25 +111,10 @@ FROM_THE_SIDE = HeldObject(LEVEL_FORWARD, np.array([[0.15, -0.05, -0.03], [0.22,
 )
 def test_what_is_held_from_above_is_put_down_nearer(held, off_m, reached):
     skill = Place(context_of(ScriptedRobot(holding=True)))
-    cost = skill._reach_cost(np.array([0.1, 0.0]), BENCH, held)
+    cost = skill._reach_cost(BENCH, held, np.array([0.1, 0.0]))
     assert (cost(Pose2D(0.1 - off_m, 0.0, 0.0)) is not None) is reached
 
 
 def test_before_a_high_surface_the_body_stands_up():
     skill = Place(context_of(ScriptedRobot(holding=True)))
     assert skill._heights_m(BENCH)[0] > spot_capabilities().standing_height_m == skill._heights_m(TABLE)[0]
-
-
-# Where the held object is (x, and its lowest z, with the body 0.76 m high) -> the heights that are tried.
-@pytest.mark.parametrize(
-    ("x_m", "low_m", "tried_m"),
-    [
-        (0.9, 0.9, (0.76, 0.6)),  # over the table of 0.7 m: 0.2 m of room, 1 cm of it is kept
-        (0.7, 0.9, (0.76, 0.6)),  # its edge
-        (0.4, 0.9, (0.76, 0.6, 0.5, 0.4)),  # before it
-        (0.9, 0.5, (0.76, 0.6, 0.5, 0.4)),  # under it
-    ],
-)
-def test_a_body_is_not_lowered_so_far_that_what_it_holds_is_pressed_on_the_surface(x_m, low_m, tried_m):
-    corners_W = np.array([[x_m, y, z] for y in (-0.03, 0.03) for z in (low_m, low_m + 0.1)])
-    assert tuple(clear_heights((0.76, 0.6, 0.5, 0.4), 0.76, corners_W, TABLE)) == tried_m

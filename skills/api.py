@@ -338,11 +338,14 @@ class Payload:
 
     `R_BH` is how the hand was turned as it took the thing, which stood or lay level then; `thing` is what it was taken
     for. None while nobody knows, as after a restart. It counts only while the gripper holds something.
+
+    While it is `offered`, somebody may pull it out of the closed gripper: the skill that offers it looks who has it.
     """
 
     corners_H: NDArray[np.float64] | None = None
     R_BH: RotationMatrix | None = None
     thing: Thing | None = None
+    offered: bool = False
 
 
 @dataclass

@@ -95,7 +95,8 @@ class Receiver:
     def _end_receiving(self, offer: Offer, now_s: float) -> None:
         """Keep what is on the tray, pull again at what only slid in the gripper, and else put the tray away."""
         if self._offers.grips(offer) and self._offers.holds(offer):
-            self._turn_to(Phase.PAUSING, now_s)
+            self._grip(offer)
+            self._turn_to(Phase.PULLING, now_s)
         elif not self._on_tray(offer):
             self._go_home(now_s)
 

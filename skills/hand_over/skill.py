@@ -15,6 +15,7 @@ from skills.api import Cause, PlanningError, Question, Running, Succeeded
 from skills.approach.standing import go_to_one
 from skills.arm.arm_skill import GRIPPER_FORCE_N
 from skills.arm.collision import ArmScene, Box
+from skills.arm.hold import Grip
 from skills.arm.pull import PullWatch
 from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
@@ -96,9 +97,14 @@ class HandOver(HandOverVerification[HandOverInputs]):
         self._watch = None if self._watch is None else self.hold_watch()
         super().resume(inputs)
 
+    def end(self) -> None:
+        """Offer it no longer."""
+        self.context.payload.offered = False
+        super().end()
+
     def trouble(self) -> SkillFailure | None:
-        """That the object is lost while it is held out; what begins to slip is gripped again."""
-        return self.lost("the object was lost while it was held out")
+        """That the object is lost before it is offered; what begins to slip is gripped again."""
+        return self.lost("the object was lost before it was held out")
 
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
         """Find, go, hold out, wait, let go; what the closing gripper feels again is held out once more."""
@@ -113,6 +119,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
 
     def _give(self, inputs: HandOverInputs) -> Routine[Seen]:
         """Hold the object out and let go of it; what became of it."""
+        self._watch = self.hold_watch()
         person = yield from self._find(inputs.person)
         if not _well_placed(self._ahead(person), self.options.stand_off_range_m):
             yield from self._go_before(person, inputs.person)
@@ -120,14 +127,13 @@ class HandOver(HandOverVerification[HandOverInputs]):
         q_carrying_rad = self.q_rad()
         yield from self._hold_out(person, inputs.person)
         self._check(person, inputs.person)
-        self._watch = self.hold_watch()
         yield from self.pause(_STILL_S, f"holding the {inputs.thing} out to {inputs.person}")
         held_kg = yield from self.weigh(self.p_HT, f"weighing the {inputs.thing}")
+        self._watch, self.context.payload.offered = None, True
         if not (yield from self._taken(inputs)):
             yield from self.move_to(lambda scene, q: q_carrying_rad, f"drawing the {inputs.thing} in")
             why = f"{inputs.person} did not take the {inputs.thing} within {self.options.wait_s:g} s"
             raise SkillFailure(Cause.TIMEOUT, why)
-        self._watch = None
         return (yield from self._let_go(inputs, held_kg))
 
     def run_again(self, inputs: HandOverInputs) -> Routine[Succeeded]:
@@ -155,9 +161,12 @@ class HandOver(HandOverVerification[HandOverInputs]):
         return Succeeded(f"gave the {thing} to {person}")
 
     def _taken(self, inputs: HandOverInputs) -> Routine[bool]:
-        """Wait for a pull at the object, or for the operator's word; False when the time is over."""
+        """Wait for a pull at the object, or for the operator's word; False when the time is over.
+
+        What is out of the gripper was pulled out of it, or has fallen.
+        """
         message, robot = f"holding the {inputs.thing} out to {inputs.person}", self.context.robot
-        watch = PullWatch(self.model, self.p_HT, self.options.pull_n)
+        watch, hold = PullWatch(self.model, self.p_HT, self.options.pull_n), self.hold_watch()
         text = f"{robot.name} holds the {inputs.thing} out to {inputs.person}. Let go?"
         question = Question(f"hand-over/{robot.name}", text, (_LETS_GO, _KEEPS), _KEEPS, self.options.wait_s)
         asked, end_s = self.context.ask(question), self.context.clock.now() + self.options.wait_s
@@ -166,7 +175,8 @@ class HandOver(HandOverVerification[HandOverInputs]):
                 joints = robot.joints()
                 efforts_nm = np.array([joints.effort_nm[name] for name in self.model.names])
                 confirmed = asked.done() and asked.result() == _LETS_GO
-                if confirmed or watch.felt(joints.stamp_s, self.q_rad(), efforts_nm):
+                gone = hold.judge(robot.gripper(), self.context.clock.now()) is Grip.LOST
+                if gone or confirmed or watch.felt(joints.stamp_s, self.q_rad(), efforts_nm):
                     return True
                 yield Running(message)
             return False

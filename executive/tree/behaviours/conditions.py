@@ -110,8 +110,8 @@ class Holds(Condition):
 
     PRECONDITION when nothing is held at the start, EXECUTION when it is lost on the way, within 0.3 s. What begins to
     slip is gripped again more firmly, once; EXECUTION when it slips on. With `until_put_down` the gripper may open to
-    let go, what slips on is left to the skill that puts it down, and so is an empty gripper at the start. Without it,
-    the gripper holds it at the end, too.
+    let go, what slips on is left to the skill that puts it down, and so is an empty gripper at the start; what is lost
+    while it is offered is left to the skill that offers it. Without it, the gripper holds it at the end, too.
     """
 
     reading = "the gripper"
@@ -153,6 +153,8 @@ class Holds(Condition):
         if grip is Grip.EMPTY:
             why = f"there is no {self.thing} in the gripper"
             return None if self.until_put_down else Failed(Cause.PRECONDITION, why)
+        if grip is Grip.LOST and self.until_put_down and context.payload.offered:
+            return None
         if grip is Grip.LOST or (grip is Grip.RELEASED and not self.until_put_down):
             return Failed(Cause.EXECUTION, f"the {self.thing} was lost on the way{self._to}")
         if grip is Grip.SLIPS_ON and not self.until_put_down:

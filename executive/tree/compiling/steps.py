@@ -221,8 +221,8 @@ def _goal_pose(builder: PlanBuilder, goal: str) -> Pose2D | FromBoard:
 
 
 def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
-    to = "the start" if isinstance(pose, FromBoard) else person
     """Carry it there and hold it out; the gripper opens when the person takes it."""
+    to = "the start" if isinstance(pose, FromBoard) else person
     ports = {"person": person, **({"thing": str(item)} if builder.has_ports("hand_over", ("thing",)) else {})}
     way = _holding(builder, item, f"to {to}", go_near_plan(builder, pose, to))
     hand_over = builder.skill("hand_over", ports)

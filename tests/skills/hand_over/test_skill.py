@@ -159,9 +159,14 @@ def test_noise_and_a_light_touch_are_no_pull(pull_n):
     assert robot.q == pytest.approx(CARRYING, abs=0.01)
 
 
-def test_what_is_lost_while_it_is_held_out_is_no_hand_over():
+def test_what_is_pulled_out_of_the_closed_gripper_is_given_when_it_is_seen_with_the_person():
     robot = _before_robin(pull_n=0.0, lost_s=PULL_S)
-    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "lost while it was held out")
+    assert isinstance(outcome(HandOver(context_of(robot)), BEER), Succeeded)
+
+
+def test_what_is_lost_while_it_is_held_out_and_not_seen_is_no_hand_over():
+    robot = _before_robin(things=(), pull_n=0.0, lost_s=PULL_S)
+    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "the beer is not seen where it was let go of")
 
 
 def test_what_stays_in_the_open_gripper_is_told():

@@ -196,6 +196,17 @@ def test_a_guard_contradicts_a_success_when_the_gripper_is_empty_then(context, c
     assert root.cause is (None if until_put_down else Cause.EXECUTION)
 
 
+# Whether it is offered when it is gone from the closed gripper -> whether the guard breaks
+@pytest.mark.parametrize(("offered", "breaks"), [(False, True), (True, False)])
+def test_what_is_pulled_out_of_the_gripper_is_left_to_the_skill_that_offers_it(context, clock, robot, offered, breaks):
+    robot.holding = True
+    condition = Holds("coke", "home", until_put_down=True)
+    root = Guard(path_id="a/g", name="g", child=Queue(*[R] * 20), condition=condition, context=context)
+    assert ticked(root, clock, 1) == [R]
+    robot.holding, context.payload.offered = False, offered
+    assert (F in ticked(root, clock, 12)) is breaks
+
+
 def test_a_guard_takes_another_object_in_the_gripper_for_what_it_is(context, clock, robot):
     robot.holding, context.payload.thing = True, Thing("hammer")
     root = Guard(

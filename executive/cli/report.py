@@ -209,8 +209,15 @@ def counts_text(referee: RefereeReport) -> str:
     """The counts; those with people where there were any."""
     with_whom = ((referee.people_hit, "with people"), (referee.robots_hit, "between robots"))
     people = "".join(f" ({count} {whom})" for count, whom in with_whom if count)
-    walked_in = f"{referee.hit_by_people} times somebody walked into the robot" if referee.hit_by_people else ""
-    return ", ".join(filter(None, (f"{referee.collisions} collisions{people}", f"{referee.drops} drops", walked_in)))
+    walked_in = (
+        f"{_times(referee.hit_by_people, 'time')} somebody walked into the robot" if referee.hit_by_people else ""
+    )
+    contacts = f"{_times(referee.collisions, 'collision')}{people}"
+    return ", ".join(filter(None, (contacts, _times(referee.drops, "drop"), walked_in)))
+
+
+def _times(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _mark(good: bool | None) -> str:

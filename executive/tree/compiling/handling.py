@@ -82,7 +82,7 @@ def pick_up_plan(
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
     aside = not seen and can_move_aside(builder)
     grasp = _grasp_plan(builder, near, tried, blocking if aside else None)
-    tuck = builder.node("guard", f"holding {thing}", tuck_plan(builder), part="held", condition=Holds(str(thing)))
+    tuck = _tucked(builder, thing)
     steps = (approach, grasp, tuck) if seen else (search, approach, grasp, tuck)
     attempt = builder.at("pick-up").sequence(f"pick up {thing}", *steps)
     around = builder.at("around")
@@ -143,7 +143,13 @@ def held_plan(builder: PlanBuilder, thing: Thing) -> NodeSpec:
 def known_held_plan(builder: PlanBuilder, thing: Thing) -> NodeSpec:
     """Draw in what a grasp that failed or was broken off took hold of; only if that is the object."""
     known = {"known_as": builder.sought(thing.name), "attributes": thing.attributes}
-    return builder.node("only if holding", f"it took hold of the {thing}", tuck_plan(builder), part="only-if", **known)
+    tuck = _tucked(builder, thing)
+    return builder.node("only if holding", f"it took hold of the {thing}", tuck, part="only-if", **known)
+
+
+def _tucked(builder: PlanBuilder, thing: Thing) -> NodeSpec:
+    """The arm is drawn in, with the object in the gripper all the way."""
+    return builder.node("guard", f"holding {thing}", tuck_plan(builder), part="held", condition=Holds(str(thing)))
 
 
 def tidied(builder: PlanBuilder, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:

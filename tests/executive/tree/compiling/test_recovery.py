@@ -516,6 +516,24 @@ def test_what_a_failed_grasp_holds_is_used_and_not_searched_for_again(compiled, 
     assert script.begun == ["navigate", "detect", "approach", "grasp", "stow"]
 
 
+def test_what_a_failed_grasp_holds_and_then_loses_while_the_arm_is_drawn_in_is_taken_anew(
+    compiled, run_tree, script, robot
+):
+    def closes(skill):
+        robot.holding, skill.context.payload.thing = True, Thing("coke")
+        first = script.begun.count("grasp") == 1
+        return Failed(Cause.EXECUTION, "the gripper closed on nothing") if first else Succeeded("taken", {"tried": ()})
+
+    def loses(skill):
+        robot.holding = script.begun.count("grasp") > 1
+        return Succeeded("the arm is stowed")
+
+    script.ends["grasp"], script.ends["stow"] = closes, loses
+    worst = run_tree(compiled(GRASP)).worst
+    assert worst.outcome is Outcome.SUCCESS, worst.message
+    assert script.begun.count("grasp") == 2
+
+
 def test_what_an_earlier_step_took_is_not_searched_for(compiled, run_tree, script, robot, context):
     def holds_it(skill):
         robot.holding, skill.context.payload.thing = True, Thing("coke")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Final, Protocol
@@ -246,11 +246,18 @@ def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:
     return binding.value if isinstance(binding, Constant) and isinstance(binding.value, Pose2D) else None
 
 
-def _longest_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """What decides, then the branch that takes longest."""
+def _one_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
+    """What decides, then one branch, or none where there is a single one; the walk goes on after the longest."""
     decides, *branches = node.children
-    begun = _followed(decides, walk, first=first)
-    return begun + _longest(branches, walk, first=first)
+    begun, here, noted, drawn = _followed(decides, walk, first=first), walk.pose, dict(walk.noted), walk.drawn
+    taken = [] if len(branches) > 1 else [(Estimate(), (here, noted, drawn))]
+    for branch in branches:
+        walk.pose, walk.noted, walk.drawn = here, dict(noted), drawn
+        taken.append((_followed(branch, walk, first=first), (walk.pose, walk.noted, walk.drawn)))
+    shortest, _ = min(taken, key=lambda each: each[0].duration_s)
+    longest, (walk.pose, walk.noted, walk.drawn) = max(taken, key=lambda each: each[0].duration_s)
+    most_s, why = max(each.most_s for each, _ in taken), (node.name, *longest.reasons)
+    return begun + (shortest if most_s == shortest.most_s else shortest.up_to(most_s, *why))
 
 
 def _together(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
@@ -274,19 +281,6 @@ def _together(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
         done = "the first" if needed == 1 else f"the first {needed}"
         reasons = (f"until {done} of {len(branches)} steps is done", *reasons)
     return Estimate(ends_s, distance_m, charge).up_to(most_s, *reasons)
-
-
-def _longest(branches: Sequence[NodeSpec], walk: _Walk, *, first: bool) -> Estimate:
-    """The longest of some branches that begin at one place; the walk goes on after it."""
-    longest, here, noted, drawn = Estimate(), walk.pose, dict(walk.noted), walk.drawn
-    after = here, noted, drawn
-    for branch in branches:
-        walk.pose, walk.noted, walk.drawn = here, dict(noted), drawn
-        taken = _followed(branch, walk, first=first)
-        if taken.duration_s >= longest.duration_s:
-            longest, after = taken, (walk.pose, walk.noted, walk.drawn)
-    walk.pose, walk.noted, walk.drawn = after
-    return longest
 
 
 def _rounds(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
@@ -341,7 +335,7 @@ _VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
     "round": _all_that_can,
     "only if known": _if_known,
     "try": _first_of,
-    "choose": _longest_of,
+    "choose": _one_of,
     "together": _together,
     "repeat": _rounds,
     "wait until": _wait_until,

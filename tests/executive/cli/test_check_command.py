@@ -218,3 +218,13 @@ def test_a_range_of_time_is_printed_with_its_reason_and_stands_in_the_json(write
     (estimate,) = json.loads(invoke(file, "--json").stdout)["estimates"]
     assert (estimate["least_s"], estimate["most_s"], estimate["reasons"]) == (0.0, 86400.0, ["until 18:00"])
     assert "0 min 00 s to 24 h 00 min (until 18:00)" in " ".join(invoke(file).stdout.split())
+
+
+# The steps of `else` -> the least and the most that it may take (s)
+@pytest.mark.parametrize(("otherwise", "least_s", "most_s"), [("", 0, 60), ("else: [{wait: {seconds: 15}}]", 15, 60)])
+def test_an_if_takes_as_long_as_one_of_its_branches(write, otherwise, least_s, most_s):
+    step = f"- if: battery > 0.5\n    then: [{{wait: {{seconds: 60}}}}]\n    {otherwise}\n"
+    file = write(f"name: x\nworld: flat\nsteps:\n  {step}")
+    (estimate,) = json.loads(invoke(file, "--json").stdout)["estimates"]
+    assert (estimate["least_s"], estimate["most_s"]) == (least_s, most_s)
+    assert estimate["reasons"] == ["battery > 0.5?"]

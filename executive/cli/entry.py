@@ -17,7 +17,7 @@ from typer.main import get_command
 
 from executive.cli.run_options import StartCommand
 from executive.cli.wake_check import refuse_unaddressed
-from skills.files.errors import InputError
+from skills.files.errors import MOST_LETTERS, InputError, one_line
 
 __all__ = ["app", "loaded", "main"]
 
@@ -79,7 +79,7 @@ def loaded(name: str) -> Any:
 
 
 class _LazyGroup(TyperGroup):
-    """Lists all commands by their line of help, and imports the one that is resolved."""
+    """Lists all commands by their line of help, imports the one that is resolved, and shows errors of usage short."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
@@ -91,6 +91,15 @@ class _LazyGroup(TyperGroup):
         if args and args[0] in COMMANDS:
             self.add_command(loaded(args[0]), args[0])
         return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        """As typer's; a message that repeats an endless or unprintable word is shown short and escaped."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            line = one_line(error.message)
+            error.message = line if len(line) <= MOST_LETTERS else f"{line[:MOST_LETTERS]}..."
+            raise
 
 
 app = typer.Typer(
@@ -112,13 +121,23 @@ def _errand() -> None:
 
 def main() -> None:
     """The entry point of the console script."""
-    if any(argument.startswith("--say") for argument in sys.argv):
-        try:
+    try:
+        for argument in sys.argv[1:]:
+            _refuse_undecoded(argument)
+        if any(argument.startswith("--say") for argument in sys.argv):
             refuse_unaddressed(sys.argv[2:])
-        except InputError as error:
-            typer.echo(f"errand: {error}", err=True)
-            sys.exit(2)
+    except InputError as error:
+        typer.echo(f"errand: {error}", err=True)
+        sys.exit(2)
     app()
+
+
+def _refuse_undecoded(argument: str) -> None:
+    """Raise InputError for bytes that are no text: no log, store or JSON could hold them."""
+    try:
+        argument.encode()
+    except UnicodeEncodeError as error:
+        raise InputError(f"'{argument[:60]}' is no UTF-8 text", hint="name it in UTF-8") from error
 
 
 if __name__ == "__main__":

@@ -5,10 +5,12 @@ A port is open, and a plug-in started, only while a standing mission waits for i
 
 from __future__ import annotations
 
+import re
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
+from typing import Final
 
 from executive.cli.call_token import CallToken, call_token
 from executive.cli.trigger_calls import TriggerCalls
@@ -16,24 +18,43 @@ from executive.store.trigger_source import TriggerSource, trigger_source
 from executive.store.triggers import OnCall, OnTopic, Trigger
 from executive.view.calls import CallServer
 from skills.files.errors import InputError
+from skills.files.plugins import PluginDefect, run_aside
 
 __all__ = ["CallAddress", "Listeners"]
+
+LIMIT_S: Final = 10.0
+"""A plug-in may take so long to start, and to stop."""
+_SEE: Final = "see the documentation of that package"
+_HOST: Final = re.compile(r"[A-Za-z0-9.:%_-]{1,253}")
 
 
 @dataclass(frozen=True)
 class CallAddress:
-    """Where HTTP calls are served, and the token that was given for them."""
+    """Where HTTP calls are served, and the token that was given for them.
+
+    Raises:
+        InputError: the host is no name and no address.
+    """
 
     host: str = "127.0.0.1"
     port: int = 8950
     token: str | None = None
 
+    def __post_init__(self) -> None:
+        if not _HOST.fullmatch(self.host):
+            hint = "name this machine or an address of it, as in 127.0.0.1"
+            raise InputError(f"--host '{self.host[:60]}' is no name and no address", hint=hint)
+
 
 class Listeners:
     """The port and the plug-ins of a store's standing missions. Use it as a context manager, or call `close`."""
 
-    def __init__(self, store: Path, address: CallAddress, tell: Callable[[str], None]) -> None:
-        """`tell` prints a line, from any thread."""
+    def __init__(
+        self, store: Path, address: CallAddress, tell: Callable[[str], None], *, limit_s: float = LIMIT_S
+    ) -> None:
+        """`tell` prints a line, from any thread; a plug-in may take `limit_s` to start, and to stop."""
+        self._limit_s = limit_s
+        self._stuck: dict[str, str] = {}
         self._store, self._address, self._tell = store, address, tell
         self._calls = TriggerCalls(store, tell)
         self._server: CallServer | None = None
@@ -76,8 +97,9 @@ class Listeners:
         host, port = self._address.host, self._address.port
         try:
             server = CallServer(self._calls.called, token=token.text, host=host, port=port)
-        except OSError as error:
-            what = f"cannot serve calls at {host} port {port} ({error.strerror or error})"
+        except (OSError, UnicodeError) as error:
+            why = error.strerror if isinstance(error, OSError) else "there is no such name"
+            what = f"cannot serve calls at {host} port {port} ({why or error})"
             raise InputError(what, hint="name another --host or --port") from error
         self._tell(f"Calls: POST {server.url}NAME")
         if token.new:
@@ -105,18 +127,36 @@ class Listeners:
                 self._unheard.pop(kind, None)
 
     def _started(self, kind: str, topics: Sequence[str]) -> TriggerSource:
-        """A plug-in that listens. Raises InputError: there is none, or it does not start."""
-        source = trigger_source(kind)
+        """A plug-in that listens. Raises InputError: there is none, or it does not start.
+
+        One that is not done within the limit is not asked again, and what it hears later is dropped.
+        """
+        if kind in self._stuck:
+            raise InputError(self._stuck[kind], hint=_SEE)
+        source, given_up = trigger_source(kind), threading.Event()
+
+        def fire(topic: str, payload: bytes) -> None:
+            if not given_up.is_set():
+                self._calls.heard(kind, topic, payload)
+
+        def start() -> None:
+            source.start(topics, fire)
+            if given_up.is_set():
+                source.stop()
+
         try:
-            source.start(topics, partial(self._calls.heard, kind))
-        except Exception as defect:
-            message = f"trigger source '{kind}' does not start ({type(defect).__name__}: {defect})"
-            raise InputError(message, hint="see the documentation of that package") from defect
+            run_aside(start, limit_s=self._limit_s)
+        except PluginDefect as defect:
+            given_up.set()
+            message = f"trigger source '{kind}' does not start ({defect})"
+            if isinstance(defect.__cause__, TimeoutError):
+                self._stuck[kind] = message
+            raise InputError(message, hint=_SEE) from defect
         return source
 
     def _stop(self, kind: str, source: TriggerSource) -> None:
         """Stop a plug-in; that it raises is told, and harms nothing else."""
         try:
-            source.stop()
-        except Exception as defect:
-            self._tell(f"trigger source '{kind}' does not stop ({type(defect).__name__}: {defect})")
+            run_aside(source.stop, limit_s=self._limit_s)
+        except PluginDefect as defect:
+            self._tell(f"trigger source '{kind}' does not stop ({defect})")

@@ -10,6 +10,7 @@ import typer
 
 from executive.cli.output import console_for, refusals, show_table
 from skills.files.errors import InputError, did_you_mean
+from skills.files.outside import is_there
 
 __all__ = ["init", "mission_file", "missions", "shipped_missions"]
 
@@ -28,7 +29,7 @@ def mission_file(named: Path) -> Path:
     Raises:
         InputError: a bare name that is neither.
     """
-    if named.exists() or named.parent not in (Path(), Path(FOLDER.name)):
+    if is_there(named) or named.parent not in (Path(), Path(FOLDER.name)):
         return named
     known = shipped_missions()
     if named.stem in known and named.suffix in ("", ".yaml"):

@@ -7,6 +7,7 @@ from typing import IO, Annotated, Any
 
 import typer
 
+from skills.files.errors import one_line
 from skills.quantities import Quantity, QuantityError, number_in, range_text
 
 __all__ = ["LearningRate", "Minutes", "NumberReader", "quantity_argument", "quantity_option"]
@@ -21,7 +22,7 @@ class OutOfRangeError(typer.BadParameter):
     def show(self, file: IO[Any] | None = None) -> None:
         """Writes the line to standard error."""
         name = "" if self.param is None else f"{self.param.get_error_hint()}: ".replace("'", "")
-        typer.echo(f"errand: {name}{self.message}", file=file, err=file is None)
+        typer.echo(one_line(f"errand: {name}{self.message}"), file=file, err=file is None)
 
 
 @dataclass(frozen=True)

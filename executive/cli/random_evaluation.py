@@ -13,6 +13,7 @@ from executive.evaluation.scenario import MOST_RUNS
 from executive.evaluation.seeds import first_seeds
 from executive.mission.file.model import DEFAULT_WORLD
 from skills.files.errors import InputError
+from skills.files.outside import is_file
 
 __all__ = ["evaluate_random_missions", "random_missions"]
 
@@ -56,5 +57,5 @@ def _known_world(name: str) -> KnownWorld:
         and abilities.masses_kg[name] <= abilities.lift_kg
         and abilities.widths_m.get(name, 0.0) <= abilities.opens_m
     )
-    own = str(Path(name).resolve()) if (Path(name) / "world.dmd.yaml").is_file() else name
+    own = str(Path(name).resolve()) if is_file(Path(name) / "world.dmd.yaml") else name
     return KnownWorld(own, knowledge, carried)

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 import yaml
 
 from executive.cli.output import refusals
 from executive.mission.stack_file import load_stack
+from skills.files.outside import is_file, is_there
 from skills.stack import DEFAULT_FILE, plain
 
 __all__ = ["STACK", "stack", "stack_file"]
 
-_LONGEST_NAME: Final = 80
-
 
 def stack_file(given: Path | None) -> Path | None:
     """A stack file as it was given, or the one of that name that comes with Errand."""
-    if given is None or given != Path(given.name) or len(given.name) > _LONGEST_NAME or given.exists():
+    if given is None or given != Path(given.name) or is_there(given):
         return given
     own = DEFAULT_FILE.with_name(f"{given}_stack.yaml")
-    return own if own.is_file() else given
+    return own if is_file(own) else given
 
 
 STACK = Annotated[

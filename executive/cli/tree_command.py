@@ -25,6 +25,7 @@ from executive.view.mermaid import to_mermaid
 from executive.view.svg import to_svg
 from executive.view.text import to_text
 from skills.files.errors import InputError
+from skills.files.outside import is_file
 from skills.quantities import Count, Delay, Tries
 
 LOG_SUFFIX: Final = ".mcap"
@@ -104,20 +105,12 @@ def _view(text: str | None, say: str | None, world: str | None, at_s: float | No
 def _request(text: str | None, say: str | None, world: str | None) -> Request:
     if text is not None and say is not None:
         raise InputError("a sentence and --say were given", hint="leave one of them out")
-    if text is not None and (text.endswith((".yaml", ".yml")) or text in shipped_missions() or _is_file(text)):
+    if text is not None and (text.endswith((".yaml", ".yml")) or text in shipped_missions() or is_file(Path(text))):
         return Request(file=Path(text), world=world)
     sentence = say if text is None else text
     if sentence is None:
         raise InputError("a mission file, a sentence or a log is needed", hint='try: errand tree "go to the kitchen"')
     return Request(sentence, world=world)
-
-
-def _is_file(text: str) -> bool:
-    """Whether a text is the path of a file; no when the system cannot even look there, as for long sentences."""
-    try:
-        return Path(text).is_file()
-    except OSError:
-        return False
 
 
 def _write(path: Path, text: str) -> None:

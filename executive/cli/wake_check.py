@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from skills.files.errors import InputError
+from skills.files.outside import is_file
 from skills.files.yaml_source import read_yaml
 
 __all__ = ["refuse_unaddressed"]
@@ -52,7 +53,7 @@ def _robot_of(world: str) -> dict[str, Any]:
     """What the knowledge file of a world says about its one robot; {} where it says nothing, or has several."""
     worlds = find_spec("plant.worlds")
     folders = [Path(world), *(Path(each) / world for each in (worlds and worlds.submodule_search_locations) or ())]
-    file = next(file for folder in folders if (file := folder / "knowledge.yaml").is_file() or folder is folders[-1])
+    file = next(file for folder in folders if is_file(file := folder / "knowledge.yaml") or folder is folders[-1])
     knowledge = read_yaml(file).data
     robot = knowledge.get("robot") if isinstance(knowledge, dict) and "robots" not in knowledge else None
     return robot if isinstance(robot, dict) else {}

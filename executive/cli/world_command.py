@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -115,7 +114,8 @@ def show(
             save_png(out, picture)
         except OSError as error:
             raise InputError(f"the picture cannot be written ({error.strerror})", file=out) from error
-    typer.echo(f"{out}: {len(facts.places)} rooms, {len(facts.doors)} doors, {len(facts.surfaces)} surfaces")
+    counts = ((facts.places, "room"), (facts.doors, "door"), (facts.surfaces, "surface"))
+    typer.echo(f"{out}: {', '.join(_counted(len(each), noun) for each, noun in counts)}")
 
 
 def _grey(grid: GridMap) -> Picture:
@@ -136,7 +136,8 @@ def _cylinders(path: Path) -> _Cylinders:
         told = "it must have 'cylinders': [[x, y, radius, height], ...]"
         raise InputError(f"{'.'.join(map(str, where)) or 'it'}: {what}; {hint}", hint=told, file=path) from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"it is no JSON ({type(error).__name__})", hint="correct it", file=path) from error
+        what = "it is nested too deep" if isinstance(error, RecursionError) else "a number in it is too long"
+        raise InputError(what, hint="correct it", file=path) from error
 
 
 def _made(source: Path, out: Path, make: Callable[[Path], None]) -> None:
@@ -160,5 +161,10 @@ def _told(out: Path) -> None:
     """Say what was made; it is read once more, so that what is said is so."""
     made = open_world(str(out))
     facts = knowledge_of(made)
-    start = f"{made.start.x_m:.2f} {made.start.y_m:.2f} {math.degrees(made.start.yaw_rad):.0f} degrees"
-    typer.echo(f"{out}: {len(facts.places)} rooms, {len(facts.doors)} doors, start at {start}")
+    start = f"{made.start.x_m:.2f} {made.start.y_m:.2f} {made.start.yaw_rad:.2f}"
+    rooms, doors = _counted(len(facts.places), "room"), _counted(len(facts.doors), "door")
+    typer.echo(f"{out}: {rooms}, {doors}, start at {start} (m, rad)")
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"

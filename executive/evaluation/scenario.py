@@ -13,7 +13,7 @@ from executive.evaluation.scenario_schema import EvaluationFile, FaultsFile, Mis
 from executive.evaluation.seeds import seed_range
 from executive.mission.variation import Variation
 from skills.files.errors import InputError
-from skills.files.outside import read_text
+from skills.files.outside import is_file, read_text
 from skills.files.schema import validate
 from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
 
@@ -27,7 +27,7 @@ FileFinder = Callable[[Path], Path]
 
 def is_evaluation(path: Path) -> bool:
     """Whether a file is a scenario for evaluations, and no mission. Raises InputError: it cannot be read."""
-    if path.suffix not in (".yaml", ".yml") or not path.is_file():
+    if path.suffix not in (".yaml", ".yml") or not is_file(path):
         return False
     data = read_yaml(path).data
     return isinstance(data, dict) and "missions" in data and "steps" not in data
@@ -93,16 +93,16 @@ class _Reader:
 
     def _world(self, name: str) -> str:
         folder = self.source.path.parent / name
-        return str(folder.resolve()) if (folder / "world.dmd.yaml").is_file() else name
+        return str(folder.resolve()) if is_file(folder / "world.dmd.yaml") else name
 
     def _found(self, name: str, path: KeyPath, finder: FileFinder | None = None) -> Path:
         """A file as seen from the scenario file, or one that comes with Errand. Raises InputError with the line."""
         beside = self.source.path.parent / name
         try:
-            found = beside if beside.is_file() or finder is None else finder(Path(name))
+            found = beside if is_file(beside) or finder is None else finder(Path(name))
         except InputError as error:
             raise self.source.error(path, f"{name}: {error.message}", error.hint) from error
-        if not found.is_file():
+        if not is_file(found):
             raise self.source.error(path, f"there is no file '{name}'", "give its path from this file's folder")
         return found.resolve()
 
@@ -170,7 +170,7 @@ def _with_used(file: Path) -> Iterator[tuple[str, str]]:
     todo, known = [file], set[Path]()
     while todo:
         path = todo.pop()
-        if path in known or not path.is_file():
+        if path in known or not is_file(path):
             continue
         known.add(path)
         yield str(path), read_text(path)

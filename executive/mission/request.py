@@ -12,6 +12,7 @@ from executive.mission.robots import RobotSetup, pose_in
 from executive.mission.scenario import NO_SCENARIO, Scenario
 from executive.mission.variation import NO_VARIATION, Variation
 from skills.files.errors import InputError
+from skills.files.outside import is_there
 from skills.quantities import QuantityError
 from skills.robot import Pose2D
 
@@ -97,7 +98,7 @@ class Request:
     def from_anywhere(self) -> Request:
         """The same with whole paths, for a process that works in another folder."""
         file = None if self.file is None else self.file.resolve()
-        world = self.world if self.world is None or not Path(self.world).exists() else str(Path(self.world).resolve())
+        world = self.world if self.world is None or not is_there(Path(self.world)) else str(Path(self.world).resolve())
         stack = None if self.stack is None else self.stack.resolve()
         own_map = None if self.map is None else self.map.resolve()
         robots = {

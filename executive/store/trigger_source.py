@@ -25,7 +25,9 @@ class TriggerSource(Protocol):
     """Hears the topics of one kind."""
 
     def start(self, topics: Sequence[str], fire: Fire) -> None:
-        """Begin to listen, and return; call `fire` for each message that comes.
+        """Begin to listen, and return within 10 s; call `fire` for each message that comes.
+
+        It is called in a thread of its own; so is `stop`, which has 10 s as well.
 
         `fire` may be called from any thread. When it returns, the mission is kept in the store, or the reason why not
         was printed; it raises nothing. It takes a second or more for a payload with values.

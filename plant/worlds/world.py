@@ -19,6 +19,7 @@ from plant.models.catalogue import load_catalogue
 from plant.models.imported import ImportedObject, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
 from skills.files.errors import InputError
+from skills.files.outside import is_file
 from skills.files.schema import validate
 from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.robot import Pose2D, quantities
@@ -413,7 +414,7 @@ def _standing(knowledge: _Knowledge) -> dict[str, Point]:
 def _find_folder(name_or_path: str | Path) -> Path:
     named = WORLDS_FOLDER / name_or_path
     for folder in (named, Path(name_or_path)):
-        if (folder / DIRECTIVES).is_file():
+        if is_file(folder / DIRECTIVES):
             return folder.resolve()
     close = difflib.get_close_matches(str(name_or_path), known_worlds(), n=1)
     hint = f" Did you mean {close[0]!r}?" if close else ""

@@ -19,6 +19,7 @@ __all__ = [
     "few",
     "known_names",
     "listing",
+    "one_line",
     "suggestion",
 ]
 
@@ -73,7 +74,8 @@ class InputError(Exception):
         """One line: "file:line: what; hint"; of an endless name of a file the beginning."""
         file = str(self.file) if len(str(self.file)) <= MOST_LETTERS else f"{str(self.file)[:FEW_LETTERS]}..."
         place = "" if self.file is None else f"{file}: " if self.line is None else f"{file}:{self.line}: "
-        return " ".join(f"{place}{self.message}{'; ' if self.hint else ''}{self.hint}".split())
+        hint = self.hint if len(self.hint) <= MOST_LETTERS else f"{self.hint[:MOST_LETTERS]}..."
+        return one_line(f"{place}{self.message}{'; ' if hint else ''}{hint}")
 
     def within(self, file: Path, line: int) -> InputError:
         """The same error, and the line of the file that brought it about by using the file in which it is.
@@ -87,6 +89,12 @@ class InputError(Exception):
             return self
         text = f"{self.message} ({_USED_BY} {file}:{line})"
         return InputError(text, hint=self.hint, file=self.file, line=self.line, others=others)
+
+
+def one_line(text: str) -> str:
+    """The text on one line; letters that a terminal obeys or cannot show are escaped, as in "\\x1b"."""
+    line = " ".join(text.split())
+    return line if line.isprintable() else "".join(one if one.isprintable() else ascii(one)[1:-1] for one in line)
 
 
 def disk_is_full(error: BaseException) -> bool:

@@ -10,7 +10,7 @@ from typing import Final
 
 from skills.files.errors import InputError
 
-__all__ = ["file_beside", "plain_file", "read_bytes", "read_text"]
+__all__ = ["file_beside", "is_file", "is_there", "plain_file", "read_bytes", "read_text"]
 
 TEXT_BYTES: Final = 1_000_000
 """Larger texts are refused, unless a reader says otherwise."""
@@ -20,6 +20,16 @@ _UTF16: Final = (b"\xff\xfe", b"\xfe\xff")
 _UTF8_MARK: Final = b"\xef\xbb\xbf"
 _HIDDEN: Final = 100
 """So many letters of a name are shown."""
+
+
+def is_file(path: Path) -> bool:
+    """Whether a path leads to a plain file; no where it is no name of a file, or the system cannot look there."""
+    return os.path.isfile(path)  # noqa: PTH113 (Path.is_file raises for a name that is too long)
+
+
+def is_there(path: Path) -> bool:
+    """Whether there is anything at a path; no as for `is_file`."""
+    return os.path.exists(path)  # noqa: PTH110 (Path.exists raises for a name that is too long)
 
 
 def read_bytes(file: Path, *, most_bytes: int, hint: str = "name a file that exists", line: int | None = None) -> bytes:

@@ -6,11 +6,12 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from importlib.metadata import EntryPoint
 from typing import Final, TypeVar
 
-__all__ = ["LIMIT_S", "OURS", "PluginDefect", "distribution_of", "run_plugin"]
+__all__ = ["LIMIT_S", "OURS", "PluginDefect", "distribution_of", "run_aside", "run_plugin"]
 
 OURS: Final = "spot-errand"
 """The distribution of this project, whose modules need no time limit."""
@@ -44,6 +45,27 @@ def run_plugin(entry: EntryPoint, call: Callable[[], ResultT], *, limit_s: float
         if type(defect) is KeyboardInterrupt:
             raise
         raise PluginDefect(_words(defect)) from defect
+
+
+def run_aside(call: Callable[[], ResultT], *, limit_s: float) -> ResultT:
+    """The result of a call into the code of a plug-in, made in a thread of its own.
+
+    Raises PluginDefect: the code raised something, or is not done within the limit (s, on the wall's clock); then its
+    thread is left behind.
+    """
+    result: Future[ResultT] = Future()
+
+    def run() -> None:
+        try:
+            result.set_result(call())
+        except BaseException as defect:
+            result.set_exception(PluginDefect(_words(defect)))
+
+    threading.Thread(target=run, daemon=True).start()
+    try:
+        return result.result(limit_s)
+    except TimeoutError as error:
+        raise PluginDefect(f"it is not done within {limit_s:g} s") from error
 
 
 @contextmanager

@@ -25,6 +25,7 @@ from executive.mission.file.schema import HandlerFile, MissionFile, ParameterFil
 from executive.mission.file.scope import Scope
 from executive.mission.knowledge import Knowledge
 from skills.files.errors import InputError, Problems, suggestion
+from skills.files.outside import is_file
 from skills.files.schema import validate
 from skills.files.yaml_source import read_yaml
 
@@ -280,20 +281,12 @@ def _found(scope: Scope, use: str, path: KeyPath) -> Path:
     if not found.resolve().is_relative_to(home):
         hint = f"put it into {home.name or home} or a folder in it"
         raise scope.error(path, f"'{use[:60]}' leaves the folder of the mission", hint)
-    if _is_file(found):
+    if is_file(found):
         return found
     beside = sorted(one.name for one in scope.folder.glob("*.yaml"))
     near = difflib.get_close_matches(use, beside, n=1)
     hint = f"did you mean '{near[0]}'?" if near else "give its path from this file's folder"
     raise scope.error(path, f"there is no mission file '{use[:60]}'", hint)
-
-
-def _is_file(path: Path) -> bool:
-    """Whether a path leads to a file; no when the system cannot even look there."""
-    try:
-        return path.is_file()
-    except OSError:
-        return False
 
 
 def _refuse_top_keys(used: MissionFile, user: MissionFile) -> None:

@@ -1,6 +1,7 @@
 """Listeners: a port is open and a plug-in started only while a standing mission waits for it."""
 
 import http.client
+import threading
 
 import pytest
 
@@ -118,6 +119,32 @@ def test_a_plug_in_that_does_not_start_is_named(listeners, lines, monkeypatch):
     assert "'bell' does not start (ConnectionError: no broker)" in lines[0]
 
 
+def test_a_plug_in_that_hangs_at_its_start_is_named_and_not_asked_again(tmp_path, sources, lines, monkeypatch):
+    asked, over, stopped = [], threading.Event(), threading.Event()
+
+    def start(self, topics, fire):
+        asked.append(topics)
+        over.wait(10)
+        fire("a", b"")
+
+    monkeypatch.setattr(Source, "start", start)
+    monkeypatch.setattr(Source, "stop", lambda self: stopped.set())
+    with Listeners(tmp_path / "missions.sqlite", CallAddress(port=0), lines.append, limit_s=0.1) as hearing:
+        hearing.follow([OnTopic("bell", "a")])
+        hearing.follow([OnTopic("bell", "a")])
+        assert (len(asked), len(lines)) == (1, 1)
+        assert "'bell' does not start (it is not done within 0.1 s)" in lines[0]
+        over.set()
+        assert stopped.wait(10)
+    assert len(lines) == 1
+
+
+@pytest.mark.parametrize("host", ["", "a b", "x" * 300, "[::1]", "h\u00f6st", "..", "-"])
+def test_what_is_no_host_is_refused_by_its_option(host, tmp_path, lines):
+    with pytest.raises(InputError, match="--host"):
+        Listeners(tmp_path / "m", CallAddress(host, 0, TOKEN), lines.append).follow([OnCall("beer")])
+
+
 def test_a_plug_in_that_does_not_stop_is_named_and_the_others_stop(listeners, notes, lines, monkeypatch):
     stop = Source.stop
 
@@ -132,7 +159,7 @@ def test_a_plug_in_that_does_not_stop_is_named_and_the_others_stop(listeners, no
     assert lines[0] == "trigger source 'bell' does not stop (ConnectionError: gone already)"
 
 
-@pytest.mark.parametrize("host", ["192.0.2.1", "no host at all", "::ffff:zz"])
+@pytest.mark.parametrize("host", ["192.0.2.1", "no-host-at-all", "::ffff:zz"])
 def test_an_address_that_cannot_be_served_is_refused(tmp_path, lines, host):
     with (
         pytest.raises(InputError, match=f"cannot serve calls at {host} port 0 .*; name another --host or --port"),

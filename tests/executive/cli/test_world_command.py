@@ -38,7 +38,7 @@ def map_file(tmp_path: Path) -> Path:
 def test_a_goal_is_reached_in_a_world_made_of_a_map(map_file, tmp_path):
     made = invoke("world", "from-map", map_file, "--out", tmp_path / "hall")
     assert made.exit_code == 0, made.output
-    assert ": 1 rooms, 0 doors, start at" in made.stdout
+    assert ": 1 room, 0 doors, start at" in made.stdout
     shown = invoke("world", "show", tmp_path / "hall", "--out", tmp_path / "hall.png")
     assert shown.exit_code == 0, shown.output
     assert cv2.imread(str(tmp_path / "hall.png")).shape[1] == 1400

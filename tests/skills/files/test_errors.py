@@ -8,3 +8,7 @@ def test_a_message_that_repeats_an_endless_name_is_cut_off():
     assert len(error.message) == MOST_LETTERS + 3
     assert str(error).startswith("m.yaml:3: unknown place 'xxx")
     assert str(error).endswith("...; known are kitchen")
+
+
+def test_a_message_shows_what_a_terminal_would_obey():
+    assert str(InputError("no 'a\x1b[31m\u202eb\nc\udcff'", hint="x\x07")) == r"no 'a\x1b[31m\u202eb c\udcff'; x\x07"

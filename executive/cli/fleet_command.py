@@ -26,6 +26,7 @@ from executive.mission.robots import display_name, robot_called
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from skills.files.errors import InputError
+from skills.files.outside import is_folder
 from skills.quantities import Seed
 
 __all__ = ["fleet"]
@@ -125,7 +126,7 @@ def status(queue: Queue, as_json: AsJson = False) -> None:
 
 
 def _store(queue: Path) -> Path:
-    return queue / STORE if queue.is_dir() else queue
+    return queue / STORE if is_folder(queue) else queue
 
 
 def _to_do(missions: MissionStore) -> Sequence[StoredMission]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from queue import Empty, SimpleQueue
 from typing import Any, Final
 
 from executive.evaluation.installed import installed_code
@@ -16,7 +18,11 @@ __all__ = ["ClusterWorkers", "local_cluster", "scheduler_at"]
 
 ANSWER_S: Final = 10.0
 """How long a scheduler, and the first worker of it, is waited for."""
+GONE_S: Final = 120.0
+"""How long work that is given out waits while no worker is connected: a nanny, or a person, may start another."""
+_LOOK_S: Final = 5.0
 _GO_ON: Final = "what was done is kept; the same command goes on where it stopped"
+_START_ONE: Final = f"start workers again; {_GO_ON}"
 
 
 class _OtherVersionError(Exception):
@@ -37,8 +43,11 @@ class ClusterWorkers:
         return len(self._client.scheduler_info(n_workers=-1)["workers"])
 
     def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:
-        """As `Workers` says. Raises InputError: the scheduler is gone, or a worker of another version has come."""
-        from distributed import as_completed
+        """As `Workers` says.
+
+        Raises:
+            InputError: the scheduler or all workers are gone, or a worker of another version has come.
+        """
         from distributed.scheduler import KilledWorker
 
         work = partial(_checked, installed_code(), function)
@@ -46,7 +55,7 @@ class ClusterWorkers:
         item_of = {future.key: item for future, item in zip(futures, items, strict=True)}
         try:
             with _told_of_loss():
-                for future in as_completed(futures):  # type: ignore[no-untyped-call]
+                for future in self._as_completed(futures):
                     item = item_of[future.key]
                     if future.status == "cancelled":
                         raise InputError("the scheduler has stopped answering", hint=_GO_ON)
@@ -61,6 +70,22 @@ class ClusterWorkers:
         finally:
             if self._client.status == "running":
                 self._client.cancel(futures, force=True)
+
+    def _as_completed(self, futures: Sequence[Any]) -> Iterator[Any]:
+        """Each future as it ends. Raises InputError: for `GONE_S` no worker is connected."""
+        ended: SimpleQueue[Any] = SimpleQueue()
+        for future in futures:
+            future.add_done_callback(ended.put)
+        left, seen_s = len(futures), time.monotonic()
+        while left:
+            try:
+                yield ended.get(timeout=min(_LOOK_S, GONE_S))
+                left, seen_s = left - 1, time.monotonic()
+            except Empty as error:
+                if self.count:
+                    seen_s = time.monotonic()
+                elif time.monotonic() - seen_s >= GONE_S:
+                    raise InputError(f"no worker has been connected for {GONE_S:g} s", hint=_START_ONE) from error
 
     def _check(self) -> None:
         """Refuse what would give other results. Raises InputError."""

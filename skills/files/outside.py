@@ -10,7 +10,7 @@ from typing import Final
 
 from skills.files.errors import InputError
 
-__all__ = ["file_beside", "is_file", "is_there", "plain_file", "read_bytes", "read_text"]
+__all__ = ["file_beside", "is_file", "is_folder", "is_there", "plain_file", "read_bytes", "read_text"]
 
 TEXT_BYTES: Final = 1_000_000
 """Larger texts are refused, unless a reader says otherwise."""
@@ -25,6 +25,11 @@ _HIDDEN: Final = 100
 def is_file(path: Path) -> bool:
     """Whether a path leads to a plain file; no where it is no name of a file, or the system cannot look there."""
     return os.path.isfile(path)  # noqa: PTH113 (Path.is_file raises for a name that is too long)
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a path leads to a folder; no as for `is_file`."""
+    return os.path.isdir(path)  # noqa: PTH112 (Path.is_dir raises for a name that is too long)
 
 
 def is_there(path: Path) -> bool:

@@ -1,24 +1,15 @@
 """Work given out to a Dask cluster of real processes, and what it says when the cluster is not fit for it."""
 
-import importlib.util
 import logging
-import sys
-from pathlib import Path
 
 import pytest
 
 from executive.evaluation import cluster
 from executive.evaluation.cluster import scheduler_at
 from skills.files.errors import InputError
+from tests.executive.evaluation import cheap_run
 
 distributed = pytest.importorskip("distributed")
-
-FOLDER = Path(__file__).parent
-spec = importlib.util.spec_from_file_location("cheap_run", FOLDER / "cheap_run.py")
-assert spec is not None
-assert spec.loader is not None
-cheap_run = sys.modules["cheap_run"] = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(cheap_run)
 
 QUIET = {"dashboard_address": ":0", "memory_limit": 0, "silence_logs": logging.CRITICAL}
 
@@ -26,10 +17,8 @@ QUIET = {"dashboard_address": ":0", "memory_limit": 0, "silence_logs": logging.C
 @pytest.fixture(scope="module")
 def address():
     """A scheduler with two worker processes, each with a nanny."""
-    sys.path.insert(0, str(FOLDER))
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, **QUIET) as started:
         yield started.scheduler_address
-    sys.path.remove(str(FOLDER))
 
 
 def test_each_item_is_worked_on_once(address):
@@ -86,8 +75,24 @@ def test_a_scheduler_that_does_not_answer_is_told(named, monkeypatch):
         pass
 
 
-def test_a_scheduler_that_stops_is_told_and_what_has_landed_is_kept(monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER))
+def test_workers_that_are_all_gone_are_told_and_what_has_landed_is_kept(monkeypatch):
+    monkeypatch.setattr(cluster, "GONE_S", 0.5)
+    started = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, **QUIET)
+    landed = []
+    with (
+        started,
+        pytest.raises(InputError, match=r"no worker has been connected for 0\.5 s; start workers again; what"),
+        scheduler_at(started.scheduler_address) as workers,
+    ):
+        for finished in workers.give_out(cheap_run.slow_square, range(200)):
+            landed.append(finished.item)
+            if len(landed) == 3:
+                started.scale(0)
+                started.sync(started._correct_state)
+    assert 3 <= len(landed) < 200
+
+
+def test_a_scheduler_that_stops_is_told_and_what_has_landed_is_kept():
     started = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, **QUIET)
     landed = []
     with (

@@ -1,24 +1,11 @@
 """Work given out to processes that may die."""
 
-import importlib.util
 import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from executive.evaluation.workers import LocalWorkers
-
-spec = importlib.util.spec_from_file_location("cheap_run", Path(__file__).with_name("cheap_run.py"))
-assert spec is not None
-assert spec.loader is not None
-cheap_run = sys.modules["cheap_run"] = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(cheap_run)
-
-
-@pytest.fixture(autouse=True)
-def importable(monkeypatch):
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+from tests.executive.evaluation import cheap_run
 
 
 def test_each_item_is_worked_on_once():

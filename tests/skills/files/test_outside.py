@@ -5,7 +5,7 @@ import os
 import pytest
 
 from skills.files.errors import InputError
-from skills.files.outside import file_beside, is_file, is_there, plain_file, read_bytes, read_text
+from skills.files.outside import file_beside, is_file, is_folder, is_there, plain_file, read_bytes, read_text
 from tests.hostile_values import TEXTS
 
 
@@ -63,4 +63,4 @@ def test_utf_16_text_is_told(tmp_path):
 @pytest.mark.parametrize("name", ["", "a\0b", "x" * 300, "x" * 5_000, "none"])
 def test_what_the_system_cannot_look_for_is_not_there(tmp_path, name):
     assert not is_file(tmp_path / name)
-    assert is_there(tmp_path / name) == (name == "")
+    assert is_there(tmp_path / name) == is_folder(tmp_path / name) == (name == "")

@@ -6,25 +6,46 @@ import base64
 import json
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, Final
 
 from executive.record.schemas import BOXES
 
 _UNSEEN: Final = frozenset({BOXES})  # the page draws boxes from the detections themselves
 _PICTURES: Final = frozenset({"jpeg", "png"})
+MOST_MESSAGES: Final = 20_000
+MOST_PICTURES: Final = 500
+
+
+@dataclass(frozen=True)
+class _Message:
+    """A message by its number from 1, with the topic, robot and node that it is about, and its picture's number."""
+
+    number: int
+    about: Hashable
+    text: str
+    picture: int | None
 
 
 class Feed:
     """An ordered list of messages as JSON text, written by the run's thread and read by the server's.
 
     Pictures are kept aside, so that a page that opens late gets the list at once and fetches the pictures it shows.
+    Of a long run, and for a slow page, the older half is dropped at times, but for the newest message of each topic,
+    robot and node.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, most: int | None = MOST_MESSAGES, most_pictures: int = MOST_PICTURES) -> None:
+        """About `most` messages and `most_pictures` are kept; all of them where `most` is None."""
         self._lock = threading.Condition()
-        self._messages: list[str] = []
-        self._pictures: list[tuple[str, bytes]] = []
+        self._most, self._most_pictures = most, most_pictures
+        self._full, self._full_pictures = most or 0, most_pictures
+        self._messages: list[_Message] = []
+        self._added = self._shown = 0
+        self._pictures: dict[int, tuple[str, bytes]] = {}
         self._news: dict[str, tuple[int, str]] = {}
         self._told = 0
         self._listeners: tuple[Callable[[], None], ...] = ()
@@ -37,7 +58,11 @@ class Feed:
         with self._lock:
             shown = self._without_picture(message)
             sent_ms = round(time.time() * 1e3, 1)  # lets the page say how far it is behind
-            self._messages.append(_encoded({"topic": topic, "t": round(t, 4), "sent_ms": sent_ms, "data": shown}))
+            text = _encoded({"topic": topic, "t": round(t, 4), "sent_ms": sent_ms, "data": shown})
+            about = (topic, *(str(message.get(key)) for key in ("robot", "node")))
+            self._added += 1
+            self._messages.append(_Message(self._added, about, text, shown.get("picture")))
+            self._drop_old()
         self._call_listeners()
 
     def tell(self, about: str, word: Mapping[str, Any]) -> None:
@@ -55,22 +80,24 @@ class Feed:
     def since(self, cursor: tuple[int, int]) -> tuple[tuple[int, int], Sequence[str]]:
         """What is new since a cursor, (0, 0) at first, and the next cursor."""
         with self._lock:
-            messages, told = cursor
+            added, told = cursor
             words = [text for number, text in sorted(self._news.values()) if number > told]
-            return (len(self._messages), self._told), [*self._messages[messages:], *words]
+            new = self._messages[bisect_right(self._messages, added, key=attrgetter("number")) :]
+            return (self._added, self._told), [*(each.text for each in new), *words]
 
     @property
     def pictures(self) -> int:
-        """How many pictures there are."""
+        """How many pictures there have been."""
         with self._lock:
-            return len(self._pictures)
+            return self._shown
 
     def picture(self, number: int) -> tuple[str, bytes]:
         """A picture's format ("jpeg" or "png") and bytes. Raises LookupError when there is none of that number."""
         with self._lock:
-            if not 0 <= number < len(self._pictures):
-                raise LookupError(f"there is no picture {number}")
-            return self._pictures[number]
+            found = self._pictures.get(number)
+        if found is None:
+            raise LookupError(f"there is no picture {number}")
+        return found
 
     def joined(self) -> None:
         """A page begins to read."""
@@ -96,14 +123,30 @@ class Feed:
         waits where no page reads.
         """
         with self._lock:
-            return self._lock.wait_for(lambda: self._readers == 0 or self._read >= len(self._messages), timeout_s)
+            return self._lock.wait_for(lambda: self._readers == 0 or self._read >= self._added, timeout_s)
 
     def _without_picture(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         if message.get("format") not in _PICTURES or "data" not in message:
             return message
-        self._pictures.append((message["format"], base64.b64decode(message["data"])))
+        number, self._shown = self._shown, self._shown + 1
+        self._pictures[number] = message["format"], base64.b64decode(message["data"])
         rest = {key: value for key, value in message.items() if key != "data"}
-        return {**rest, "picture": len(self._pictures) - 1}
+        return {**rest, "picture": number}
+
+    def _drop_old(self) -> None:
+        """Keep the newer half of messages, or of pictures, where there are too many."""
+        if self._most is None or (len(self._messages) < self._full and len(self._pictures) < self._full_pictures):
+            return
+        newest = {each.about: each for each in self._messages}
+        if len(self._messages) >= self._full:
+            cut = len(self._messages) - self._most // 2
+            older = (each for each in self._messages[:cut] if newest[each.about] is each)
+            self._messages = [*older, *self._messages[cut:]]
+            self._full = max(self._most, len(self._messages) + self._most // 2)
+        needed, half = {each.picture for each in newest.values()}, self._most_pictures // 2
+        kept = {*needed, *range(self._shown - half, self._shown)}
+        self._pictures = {number: picture for number, picture in self._pictures.items() if number in kept}
+        self._full_pictures = len(self._pictures) + half
 
     def _call_listeners(self) -> None:
         for listener in self._listeners:

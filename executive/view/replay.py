@@ -19,7 +19,7 @@ _SCRIPT: Final = re.compile(r'<script src="page/([\w.]+)" defer></script>\n?')
 
 def fed(events: Sequence[Event]) -> Feed:
     """A feed that holds a whole log."""
-    feed = Feed()
+    feed = Feed(most=None)
     for event in events:
         feed(event.topic, event.stamp_s, event.data)
     return feed

@@ -41,6 +41,47 @@ def test_of_words_that_are_not_logged_only_the_newest_is_told():
     assert len(feed.since(cursor)[1]) == 1
 
 
+def test_of_a_long_run_the_newest_messages_are_kept_and_the_last_word_on_each_node():
+    feed = Feed(most=100)
+    feed("tree", 0.0, {"robot": "Alice"})
+    feed("transitions", 0.1, {"robot": "Alice", "node": "a", "to": "RUNNING"})
+    feed("transitions", 0.2, {"robot": "Alice", "node": "a", "to": "SUCCESS"})
+    slow, _ = feed.since(START)
+    for number in range(1000):
+        feed("pose", 1.0 + number, {"robot": "Alice", "x": number})
+    kept = [json.loads(text) for text in feed.since(START)[1]]
+    assert len(kept) <= 150
+    assert [each["t"] for each in kept if each["topic"] != "pose"] == [0.0, 0.2]
+    poses = [each["data"]["x"] for each in kept if each["topic"] == "pose"]
+    assert poses == list(range(1000 - len(poses), 1000))
+    cursor, late = feed.since(slow)
+    assert (len(late), feed.since(cursor)[1]) == (len(poses), [])
+
+
+def test_of_many_pictures_the_newest_are_kept_and_the_last_of_each_kind():
+    feed = Feed(most=100_000, most_pictures=10)
+    feed("map", 0.0, PICTURE)
+    for number in range(100):
+        feed("detections", 1.0 + number, PICTURE)
+    kept = [number for number in range(feed.pictures) if has_picture(feed, number)]
+    assert (kept[0], kept[-1], len(kept) <= 16) == (0, 100, True)
+    assert kept[1:] == list(range(kept[1], 101))
+
+
+def test_a_replay_keeps_all():
+    feed = Feed(most=None)
+    for number in range(30_000):
+        feed("pose", number, {})
+    assert len(feed.since(START)[1]) == 30_000
+
+
+def has_picture(feed, number):
+    try:
+        return feed.picture(number) == ("png", b"bytes")
+    except LookupError:
+        return False
+
+
 def test_nobody_waits_where_no_page_reads():
     feed = Feed()
     feed("pose", 0.0, {})

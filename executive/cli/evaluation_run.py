@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from executive.cli.feasibility import refuse_impossible
+from executive.cli.memory import return_memory
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Prepared, prepare
 from executive.cli.run_options import robots_of
@@ -41,6 +42,7 @@ def run_one(spec: RunSpec, *, checked: bool = False) -> RunOutcome:
     began = time.monotonic()
     with _ONE_AT_A_TIME, tempfile.TemporaryDirectory(prefix="errand-run-", ignore_cleanup_errors=True) as folder:
         outcome = _ran(spec, Path(folder), checked)
+    return_memory()
     worker = f"{platform.node()}:{os.getpid()}"
     return replace(outcome, spent_s=round(time.monotonic() - began, 3), worker=worker)
 

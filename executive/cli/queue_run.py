@@ -12,6 +12,7 @@ from typing import Any, Final, Protocol
 from rich.console import Console
 
 from executive.cli.durable import Durable, as_it_was, kept, new_run, next_run, plant_file, same_world, take_up
+from executive.cli.memory import return_memory
 from executive.cli.requests import Prepared, prepare
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.simulated import run_simulated
@@ -81,6 +82,8 @@ def run_or_set_aside(
     except Exception as defect:
         cause = f"a defect of errand or of a plug-in ended it ({type(defect).__name__}: {defect})"
         console.print(f"The traceback is in {_traceback_file(missions, mission)}", markup=False)
+    finally:
+        return_memory()
     return set_aside(missions, mission, cause, console)
 
 

@@ -74,7 +74,7 @@ def test_an_object_is_taken_held_and_put_down():
 
 @pytest.mark.nightly
 def test_fetch_brings_something(tmp_path):
-    result = result_of("fetch", "--count", 1, "--things", "coke", "--goals", "person", "--out", tmp_path)
+    result = result_of("fetch", "--count", 1, "--things", "coke", "--goals", "Robin", "--out", tmp_path)
     assert result["missions"] == 1
 
 

@@ -282,6 +282,7 @@ class Simulation:
             robots={name: body.kind for name, body in built.robots.items()},
             persons=[each.name for each in people],
             scenery=built.scenery,
+            doors=self.engine.doors.history,
         )
         self.recorder = Recorder(built, self.engine.context) if record else None
         self._watch()

@@ -103,7 +103,7 @@ def _of_share(share: Share, moves: Sequence[_Move], *, last: bool) -> Iterator[r
             continue
         condition = condition_of(part.goal, robot=share.tree.robot_name, answer=None)
         executions = [one for one in result.executions if one.path_id == _node_of(part) and one.done]
-        if part.goal.kind is GoalKind.ANSWERED:
+        if part.goal.kind in (GoalKind.ANSWERED, GoalKind.DOOR_OPEN):
             yield from _answers(part, condition, result, done=bool(executions))
             continue
         if not executions and result.outcome is not Outcome.SUCCESS:
@@ -182,7 +182,8 @@ def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str
                 heard = (said.text for said in result.said if begun_s <= said.t_s <= end_s)
                 found = next((each for each in heard if _is_text(each, text)), None)
                 told = (text if found is None and isinstance(text, str) else found or "")[:SHOWN_CHARS]
-                yield found is not None, f'It {"said" if found is not None else "did not say"} "{told}".'
+                end = "" if told.endswith((".", "!", "?")) else "."
+                yield found is not None, f'It {"said" if found is not None else "did not say"} "{told}"{end}'
 
 
 def _is_text(heard: str, text: str | Template | Expression | None) -> bool:

@@ -32,6 +32,7 @@ ABOVE_TOP_M: Final = 0.30
 FLOOR_M: Final = (-0.05, 0.30)
 NEAR_M: Final = 0.75
 POSE_NEAR_M: Final = 0.25
+DOOR_NEAR_M: Final = 0.3
 
 
 class GoalKind(enum.Enum):
@@ -42,6 +43,7 @@ class GoalKind(enum.Enum):
     PLACED = "placed"  # resting in a goal area, let go
     WENT = "went"  # the robot in a goal area
     ANSWERED = "answered"  # the answer is what is true of the source areas
+    DOOR_OPEN = "door open"  # the answer is whether the door in the source area is open
     CLEARED = "cleared"  # nothing rests in the source areas; with goal areas, all that did rests there
 
 
@@ -96,6 +98,15 @@ def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[
     assert place is not None
     goal = tuple(surface_area(knowledge, name) for name in knowledge.surfaces_in(place))
     return GoalCondition(GoalKind.CLEARED, source=source), GoalCondition(GoalKind.CLEARED, source=source, goal=goal)
+
+
+def door_goal(knowledge: Knowledge, between: tuple[str, str]) -> GoalCondition:
+    """The answer to whether a door is open. Raises StopIteration: the world has no such door."""
+    door = next(each for each in knowledge.doors if set(each.between) == set(between))
+    x, y = door.at
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    square = tuple((x + DOOR_NEAR_M * i, y + DOOR_NEAR_M * j) for i, j in corners)
+    return GoalCondition(GoalKind.DOOR_OPEN, source=(Area(f"door between {between[0]} and {between[1]}", square),))
 
 
 def drive_goal(pose: Pose) -> GoalCondition:

@@ -7,7 +7,7 @@ pushes it. It touches robots and loose objects, and passes through the scenery. 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 import shapely
@@ -88,6 +88,11 @@ class Doors:
         self._instances = {name: plant.GetModelInstanceByName(name) for name in self._doors}
         self._shares = {name: _share_closed(door, 0.0) for name, door in self._doors.items()}
         self._closing = {name: share == 1.0 for name, share in self._shares.items()}
+        self._history: dict[str, list[tuple[float, float]]] = {name: [(0.0, s)] for name, s in self._shares.items()}
+
+    def history(self) -> Mapping[tuple[float, float], Sequence[tuple[float, float]]]:
+        """For the place (x, y) of each door the times (s) from which it was closed to a share; 0.5 while it moves."""
+        return {door.at: tuple(self._history[name]) for name, door in self._doors.items()}
 
     def before_step(self, now_s: float, dt_s: float) -> None:
         """Put each panel where it is, with the velocity that leads to where it will be after dt_s."""
@@ -98,8 +103,15 @@ class Doors:
                 self._tell(f"the {name} {'closes' if closes else 'opens'}")
             before, after = self._shares[name], self._next(door, closes, dt_s)
             self._shares[name] = after
+            self._note(name, now_s)
             pose = _pose(door, before)
             self._set(self._instances[name], pose, (_pose(door, after) - pose) / dt_s)
+
+    def _note(self, name: str, now_s: float) -> None:
+        """Note whether a door is open, closed or moves, where that is new."""
+        share = self._shares[name] if self._shares[name] in (0.0, 1.0) else 0.5
+        if share != self._history[name][-1][1]:
+            self._history[name].append((now_s, share))
 
     def _next(self, door: DoorRule, closes: bool, dt_s: float) -> float:
         """To which share a door is closed after dt_s."""
@@ -123,10 +135,14 @@ class Doors:
             plant.SetVelocities(context, instance, velocity)
 
     def state(self) -> State:
-        """How far each door is closed, and whether it closes."""
-        return {name: [self._shares[name], self._closing[name]] for name in self._doors}
+        """How far each door is closed, whether it closes, and how it was before."""
+        return {
+            name: [self._shares[name], self._closing[name], [list(each) for each in self._history[name]]]
+            for name in self._doors
+        }
 
     def restore(self, state: State) -> None:
         """Go on from such a state. Raises KeyError: a door is not in it."""
         for name in self._doors:
-            self._shares[name], self._closing[name] = state[name]
+            self._shares[name], self._closing[name], history = state[name]
+            self._history[name] = [(begun_s, share) for begun_s, share in history]

@@ -17,6 +17,7 @@ class GoalKind(enum.Enum):
     PLACED = "placed"  # resting in a goal region, let go
     WENT = "went"  # the robot's body in a goal region
     ANSWERED = "answered"  # the answer is what is true of the source regions
+    DOOR_OPEN = "door open"  # the answer is whether the door in the source region is open
     CLEARED = "cleared"  # nothing rests in the source regions; with goal regions, all that did rests there, let go
 
 

@@ -16,6 +16,8 @@ from skills.robot import FloatArray
 NEAR_PERSON_M = 2.0
 NAMED_REGIONS = 3
 PERSON = "person"
+LOOKS_AT_DOOR_S = 2.0
+"""An answer about a door rests on what was seen in so long before it."""
 
 
 @dataclass(frozen=True)
@@ -274,6 +276,19 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
     return Finding(condition.answer is not None and right, f"the answer was {said}, and {found}.")
 
 
+def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
+    """The answer equal to how the door was while the robot looked; of a door that moved, either is right."""
+    then_s = truth.now_s if condition.answered_s is None else condition.answered_s
+    (doorway,) = condition.source
+    changes = next((each for (x, y), each in truth.doors.items() if doorway.contains((x, y, 0.0))), ())
+    before = [share for begun_s, share in changes if begun_s <= then_s - LOOKS_AT_DOOR_S]
+    shares = {*before[-1:], *(share for begun_s, share in changes if then_s - LOOKS_AT_DOOR_S < begun_s <= then_s)}
+    was = {frozenset(): "open", frozenset({0.0}): "open", frozenset({1.0}): "closed"}.get(frozenset(shares), "moving")
+    right = condition.answer is not None and was in ("moving", "open" if condition.answer else "closed")
+    said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
+    return Finding(right, f"the answer was {said}, and {_the(doorway.name)} was {was}.")
+
+
 def _judge_cleared(condition: GoalCondition, truth: Truth) -> Finding:
     """All that rested in the source rests in the goal; without a goal, no longer in the source."""
     source = condition.source
@@ -321,6 +336,7 @@ _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth], Finding]] = {
     GoalKind.PLACED: _judge_placed,
     GoalKind.WENT: _judge_went,
     GoalKind.ANSWERED: _judge_answered,
+    GoalKind.DOOR_OPEN: _judge_door,
     GoalKind.CLEARED: _judge_cleared,
 }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -31,6 +31,9 @@ PATH_VALUES = 4
 BEFORE_SAMPLES = 3
 
 
+DoorHistories = Callable[[], Mapping[tuple[float, float], Sequence[tuple[float, float]]]]
+
+
 class Referee:
     """Watches one plant. `observe` at about 20 Hz while it runs, `judge` whenever wanted."""
 
@@ -42,14 +45,17 @@ class Referee:
         robots: Mapping[str, RobotKind],
         persons: Sequence[str] = (),
         scenery: Mapping[GeometryId, str] = MappingProxyType({}),
+        doors: DoorHistories = dict,
     ) -> None:
         """Build for a finalized plant; `scenery` names the pieces of furniture whose shapes are the world body's.
 
-        `placements` are the loose objects; those named in `persons` are people. `robots` has the kind of each
-        robot by the name of its model instance. Raises ValueError that names what the plant does not have.
+        `placements` are the loose objects; those named in `persons` are people. `robots` has the kind of each robot by
+        the name of its model instance, and `doors` gives `Truth.doors`. Raises ValueError that names what the plant
+        does not have.
         """
         self._plant, self._geometry = plant, plant.get_geometry_query_input_port()
         self._entities = Entities.of(plant, placements, robots, persons, scenery)
+        self._doors = doors
         self._counter = CollisionCounter(self._entities.all)
         self._histories = {name: ObjectHistory(name, self._entities.classes[name]) for name in self._entities.objects}
         self._paths: dict[str, list[FloatArray]] = {name: [] for name in robots}
@@ -124,6 +130,7 @@ class Referee:
             robots={name: TimedPath(self._timed_path(name)) for name in self._paths},
             persons={name: TimedPath(_timed(path)) for name, path in self._person_paths.items()},
             given=dict(self._given),
+            doors=self._doors(),
         )
         return judge(conditions, truth, bumps=self._counter.collisions)
 

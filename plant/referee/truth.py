@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from plant.referee.object_history import ObjectHistory
 from skills.robot import FloatArray
 
 PATH_STEP_M = 0.02
+Point = tuple[float, float]
 ON_TRAY_GAP_S = 0.5
 
 
@@ -38,6 +39,8 @@ class Truth:
     """The record up to `now_s`: histories of the objects, and the paths of robots and people by name.
 
     `given` has for each object and person the times (s) from and to which the object rested on the person's tray.
+    `doors` has for the place (x, y) of each door that moves the times from which it was closed to a share: 0 open, 1
+    closed, between while it moves. A door that is not among them is open.
     """
 
     now_s: float
@@ -45,6 +48,7 @@ class Truth:
     robots: Mapping[str, TimedPath]
     persons: Mapping[str, TimedPath]
     given: Mapping[tuple[str, str], Sequence[tuple[float, float]]]
+    doors: Mapping[Point, Sequence[tuple[float, float]]] = field(default_factory=dict)
 
 
 def extend(path: list[FloatArray], p_W: FloatArray, time_s: float) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -19,7 +19,7 @@ from executive.run.outcome import RobotResult
 from executive.tree.compiler import CompiledTree, StepPart
 from plant.referee import GoalCondition as Asked
 from plant.referee import Verdict
-from plant.referee.judge import judge
+from plant.referee.judge import LOOKS_AT_DOOR_S, judge
 from plant.referee.object_history import ObjectHistory, ObjectSample
 from plant.referee.truth import TimedPath, Truth, extend, note_stay
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
@@ -30,6 +30,9 @@ __all__ = ["WORLD", "Clock", "ScriptedWorld", "expected"]
 SAMPLES: Final = 5
 NEAR_PERSON_M: Final = 2.0
 HAND, FLOOR = "hand", "floor"
+DOOR_W: Final = (2.5, 0.0)
+DOOR_STAYS_S: Final = 17.0
+"""The door is open for so long, then closed for so long, and so on."""
 PEOPLE: Final = {"Sam": (0.5, 4.5), "Robin": (0.5, 0.5)}
 OBJECTS: Final = {
     "coke": ("coke", "counter"),
@@ -60,7 +63,7 @@ WORLD: Final = Knowledge.model_validate(
         **KNOWLEDGE,
         "places": {name: {**facts, "polygon": _PLACES[name]} for name, facts in KNOWLEDGE["places"].items()},  # type: ignore[attr-defined]
         "surfaces": {name: {**facts, "polygon": _SURFACES[name]} for name, facts in KNOWLEDGE["surfaces"].items()},  # type: ignore[attr-defined]
-        "doors": [{"between": ["hall", "kitchen"], "at": [2.5, 0.0], "width": 1.0}],
+        "doors": [{"between": ["hall", "kitchen"], "at": DOOR_W, "width": 1.0}],
     }
 )
 
@@ -74,6 +77,11 @@ class Moved:
     before: str
     after: str
     robot: bool = True
+
+
+def door_is_open(t_s: float) -> bool:
+    """Whether the door is open at a time: it opens and closes all the time."""
+    return int(t_s / DOOR_STAYS_S) % 2 == 0
 
 
 @dataclass
@@ -146,6 +154,10 @@ class ScriptedWorld:
             return Failed(Cause.POSTCONDITION, "nobody is there")
         size = (0.5, 0.5, 1.7)
         return _seen([ObjectObservation(now_s, Thing("person"), (x, y, 0.9), size, 0.0, 0.9) for x, y in there])
+
+    def check_door(self, now_s: float, inputs: Any) -> Succeeded | Failed:
+        """See whether the door is open."""
+        return Succeeded("seen", {"open": door_is_open(now_s) is not self.lie(now_s, "check_door")})
 
     def grasp(self, now_s: float, inputs: Any) -> Succeeded | Failed:
         """Have it in the hand."""
@@ -229,7 +241,9 @@ class ScriptedWorld:
         """The referee's verdict."""
         people = {name: TimedPath(np.array([[*p_W, 0.9, 0.0]])) for name, p_W in PEOPLE.items()}
         robots = {"Alice": TimedPath(np.array(self.path))}
-        truth = Truth(now_s, tuple(self.histories.values()), robots, people, self.given)
+        changes = [(n * DOOR_STAYS_S, 0.0 if n % 2 == 0 else 1.0) for n in range(int(now_s / DOOR_STAYS_S) + 1)]
+        doors = {DOOR_W: changes}
+        truth = Truth(now_s, tuple(self.histories.values()), robots, people, self.given, doors)
         return judge(conditions, truth, bumps=())
 
 
@@ -299,13 +313,19 @@ class _Person:
         goal = part.goal
         if goal is None or goal.when is When.ALWAYS:
             return
-        if goal.kind is GoalKind.ANSWERED:
+        if goal.kind in (GoalKind.ANSWERED, GoalKind.DOOR_OPEN):
             for finding in result.findings:
                 if f"{finding.path_id}/".startswith(f"{part.path_id}/"):
-                    yield finding.answer is (self.count(goal, finding.t_s) >= max(1, goal.count))
+                    yield finding.answer in self.answers(goal, finding.t_s)
             return
         for begun_s, ended_s in self.times(part.node or part.path_id):
             yield self.done(goal, begun_s, ended_s)
+
+    def answers(self, goal: GoalCondition, t_s: float) -> Collection[bool]:
+        """The right answers: both where a door moved while the robot looked."""
+        if goal.kind is GoalKind.DOOR_OPEN:
+            return {door_is_open(max(0.0, t_s - LOOKS_AT_DOOR_S)), door_is_open(t_s)}
+        return {self.count(goal, t_s) >= max(1, goal.count)}
 
     def done(self, goal: GoalCondition, begun_s: float, ended_s: float) -> bool:
         """Whether it was so when it was to be so."""

@@ -14,6 +14,8 @@ from pydrake.systems.framework import DiagramBuilder
 
 from plant.referee import GoalCondition, GoalKind, Referee, Region, When
 from plant.referee.entities import Kind
+from plant.referee.judge import judge
+from plant.referee.truth import TimedPath, Truth
 from plant.spot.kind import SPOT
 
 FRICTION = CoulombFriction(0.8, 0.8)
@@ -558,6 +560,43 @@ def test_an_answer_about_people_is_judged_by_where_they_stand(room, person, coun
     for answer, right in ((fact, True), (not fact, False), (None, False)):
         verdict = stage.referee.judge([dataclasses.replace(asked, answer=answer)])
         assert (verdict.success, told in verdict.why) == (right, True)
+
+
+DOORWAY = square("door between hall and kitchen", 2.5, 0.0, half=0.3)
+OPENS_AND_CLOSES = ((0.0, 1.0), (10.0, 0.5), (12.0, 0.0), (20.0, 0.5), (22.0, 1.0))
+
+
+# When the answer was given (s), after how the door was -> the answers that are right
+@pytest.mark.parametrize(
+    ("answered_s", "right"),
+    [
+        (5.0, {False}),
+        (11.0, {True, False}),
+        (13.0, {True, False}),
+        (15.0, {True}),
+        (21.0, {True, False}),
+        (30.0, {False}),
+    ],
+)
+def test_an_answer_about_a_door_is_judged_by_how_it_was_while_the_robot_looked(answered_s, right):
+    nothing = np.zeros((0, 4))
+    truth = Truth(40.0, (), {"alice": TimedPath(nothing)}, {}, {}, {(2.5, 0.0): OPENS_AND_CLOSES})
+    asked = GoalCondition(GoalKind.DOOR_OPEN, source=(DOORWAY,), answered_s=answered_s)
+    told = {
+        answer: judge([dataclasses.replace(asked, answer=answer)], truth, bumps=()) for answer in (True, False, None)
+    }
+    assert {answer for answer, verdict in told.items() if verdict.success} == right
+
+
+def test_a_door_that_never_moves_is_open():
+    stage = Stage().watch()
+    asked = GoalCondition(GoalKind.DOOR_OPEN, source=(DOORWAY,), answer=True)
+    assert stage.holds(asked)
+    verdict = stage.referee.judge([dataclasses.replace(asked, answer=False)])
+    assert (verdict.success, verdict.why) == (
+        False,
+        "The answer was no, and the door between hall and kitchen was open.",
+    )
 
 
 def test_path_is_kept():

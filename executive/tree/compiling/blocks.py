@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any, Final, Protocol
 
 from executive.mission.command import Command, Task
-from executive.mission.condition import READINGS, AllOf, Condition, Look, ValueIs, parts_of
+from executive.mission.condition import READINGS, AllOf, Condition, DoorOpen, Look, ValueIs, parts_of
 from executive.mission.expression import Expression, Kind, Template, Value, kind_of
 from executive.mission.file.blocks import (
     Ask,
@@ -25,7 +25,7 @@ from executive.mission.file.blocks import (
     Wait,
 )
 from executive.mission.file.model import MissionStep, StepPolicy
-from executive.mission.goal import command_goal, held_goal
+from executive.mission.goal import command_goal, door_goal, held_goal
 from executive.mission.gripper import InGripper, either
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.decisions import AnswerIs, MustHold, MustNotBegin
@@ -39,6 +39,7 @@ from executive.tree.compiling.decisions import (
     keys_of,
     kind_in,
 )
+from executive.tree.compiling.doors import door_plan
 from executive.tree.compiling.interrupts import HANDLING, dock_plan
 from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.node import NodeSpec
@@ -222,6 +223,8 @@ def _decided(
 def _checks(decided: Decided, builder: PlanBuilder) -> tuple[StepPart, ...]:
     return tuple(
         StepPart(path, look.command, goal=command_goal(look.command, builder.knowledge))
+        if isinstance(look, Look)
+        else StepPart(path, goal=door_goal(builder.knowledge, look.between))
         for path, look in decided.checks
     )
 
@@ -380,6 +383,11 @@ def _check(assembler: Assembler, block: Check, builder: PlanBuilder, policy: Ste
     if isinstance(block.condition, Look) and isinstance(decided.decision, AnswerIs) and not decided.decision.max_age_s:
         key = _give_key(assembler, block.gives, decided.decision.key, bool, builder)
         return Assembled((answering(decided.looks[0], {"key": key}),), _checks(decided, builder))
+    if isinstance(block.condition, DoorOpen) and not block.condition.max_age_s:
+        key = _give_key(assembler, block.gives, below.key("answer"), bool, builder)
+        look = door_plan(below, block.condition.between, key)
+        goal = door_goal(builder.knowledge, block.condition.between)
+        return Assembled((look,), (StepPart(look.path_id, goal=goal),))
     key = _give_key(assembler, block.gives, below.key("decided"), bool, builder)
     decide = decide_plan(block.condition, decided, below, key)
     question = str(block.condition)

@@ -51,11 +51,11 @@ class Named:
 
 @dataclass(frozen=True)
 class Decided:
-    """A decision, the looks that it takes in the order of its answers, and the status checks behind them by path id."""
+    """A decision, the looks that it takes in the order of its answers, and the questions behind them by path id."""
 
     decision: Decision
     looks: tuple[NodeSpec, ...] = ()
-    checks: tuple[tuple[str, Look], ...] = ()
+    checks: tuple[tuple[str, Look | DoorOpen], ...] = ()
 
 
 def decision_of(condition: Condition, builder: PlanBuilder, names: Mapping[str, Named]) -> Decided:
@@ -64,7 +64,7 @@ def decision_of(condition: Condition, builder: PlanBuilder, names: Mapping[str, 
     Raises InputError: an expression that is not true or false, an unknown name, or something that cannot be looked for.
     """
     looks: list[NodeSpec] = []
-    checks: list[tuple[str, Look]] = []
+    checks: list[tuple[str, Look | DoorOpen]] = []
 
     def made(part: Condition) -> Decision:
         """The decision of a part; its looks are gathered on the way."""
@@ -85,6 +85,7 @@ def decision_of(condition: Condition, builder: PlanBuilder, names: Mapping[str, 
                 below = builder.at(f"look-{len(looks) + 1}")
                 answer = AnswerIs(below.key("answer"), max_age_s)
                 looks.append(door_plan(below, between, answer.key))
+                checks.append((below.path_id, part))
                 return answer
             case ButtonPressed(name):
                 return Pressed(name)

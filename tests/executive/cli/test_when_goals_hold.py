@@ -4,7 +4,7 @@ import pytest
 
 from executive.cli.goal_conditions import Share, conditions_of
 from executive.mission.command import parse_command
-from executive.mission.condition import Look, ValueIs
+from executive.mission.condition import DoorOpen, Look, ValueIs
 from executive.mission.expression import Expression
 from executive.mission.file import blocks
 from executive.mission.file.model import Mission, MissionStep, SkillCall, StepPolicy
@@ -12,6 +12,8 @@ from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from plant.referee import GoalKind, When
 from skills.api import Cause, Failed, Succeeded
+from skills.check_door.skill import CheckDoorInputs
+from tests.executive.conftest import KNOWLEDGE, scripted_skill
 
 AT_END, AT_STEP = When.END_OF_MISSION, When.END_OF_STEP
 
@@ -85,6 +87,21 @@ def test_each_look_of_a_condition_is_judged_at_its_time(ran):
     tree, result = ran(block(blocks.Repeat((block(blocks.Choose(LOOK, (go("hall"),))),), 2)))
     looks = [one for one in conditions_of(tree, result) if one.kind is GoalKind.ANSWERED]
     assert [one.answer for one in looks] == [True, True]
+    assert looks[0].answered_s < looks[1].answered_s
+
+
+def test_each_look_at_a_door_is_judged_at_its_time(ran, knowledge, registry, script, monkeypatch):
+    doors = [{"between": ["hall", "kitchen"], "at": [2.5, 0.0], "width": 1.0}]
+    monkeypatch.setattr(knowledge, "__dict__", knowledge.model_validate({**KNOWLEDGE, "doors": doors}).__dict__)
+    registry["check_door"] = scripted_skill(script, "check_door", CheckDoorInputs, {"open": bool})
+    script.ends["check_door"] = lambda skill: Succeeded("seen", {"open": script.begun.count("check_door") == 1})
+    door = DoorOpen(("hall", "kitchen"))
+    tree, result = ran(block(blocks.Choose(door, (go("hall"),))), block(blocks.Check(door)))
+    looks = [one for one in conditions_of(tree, result) if one.kind is GoalKind.DOOR_OPEN]
+    assert [(one.answer, one.source[0].name) for one in looks] == [
+        (True, "door between hall and kitchen"),
+        (False, "door between hall and kitchen"),
+    ]
     assert looks[0].answered_s < looks[1].answered_s
 
 

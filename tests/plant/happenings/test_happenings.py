@@ -50,6 +50,9 @@ def test_a_door_closes_and_opens_at_its_times_and_the_lidar_sees_it():
     simulation.clock.advance(3.0)
     assert rays_in_doorway(simulation) == 0
     assert [sentence for _, sentence in simulation.clock.happened] == ["the door closes", "the door opens"]
+    changes = simulation.engine.doors.history()[AT]
+    assert [share for _, share in changes] == [0.0, 0.5, 1.0, 0.5, 0.0]
+    assert [begun_s for begun_s, _ in changes] == pytest.approx([0.0, 1.0, 2.5, 5.0, 6.5], abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -123,6 +126,7 @@ def test_doors_and_moves_go_on_after_a_restart(tmp_path):
     after.restore(tmp_path / "flat.plant")
     assert panel_W(after) == pytest.approx(AT)
     assert after.clock.happened == []
+    assert after.engine.doors.history()[AT][:2] == before.engine.doors.history()[AT] == ((0.0, 0.0), (1.0, 0.5))
     assert thing_W(after, "beer") == pytest.approx(thing_W(before, "beer"), abs=0.01)
 
 

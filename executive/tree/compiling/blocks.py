@@ -84,7 +84,10 @@ class Flow:
     def join(self, branches: Sequence[Flow]) -> None:
         """Go on after one of several branches, nobody knows which."""
         first, *others = branches
-        shared = {n: named for n, named in first.names.items() if all(b.names.get(n) == named for b in others)}
+        shared = {n: named for n, named in first.names.items() if all(_same(b.names.get(n), named) for b in others)}
+        for name, named in shared.items():
+            if any(branch.names[name].quantity != named.quantity for branch in others):
+                shared[name] = replace(named, quantity=None)
         self.names.clear()
         self.names.update(shared)
         self.held = (
@@ -96,7 +99,19 @@ class Flow:
 
     def may_lack(self, before: Flow) -> None:
         """Go on although the last step may have been skipped: what it gave may be missing."""
-        self.names = {name: named for name, named in self.names.items() if before.names.get(name) == named}
+        after = {name: named for name, named in self.names.items() if _same(before.names.get(name), named)}
+        changed = {name for name, named in after.items() if before.names[name] != named}
+        self.names = after | {name: replace(after[name], quantity=None) for name in changed}
+
+
+def _same(one: Named | None, other: Named) -> bool:
+    """Whether two values stand under one blackboard key and are of one type."""
+    return one is not None and one.key == other.key and _alike(one.type, other.type)
+
+
+def _alike(one: type, other: type) -> bool:
+    """Whether values of two types are of one kind for expressions, or of the same type."""
+    return one is other or (kind_of(one) is kind_of(other) and kind_of(one) is not Kind.OTHER)
 
 
 class Assembler(Protocol):
@@ -245,6 +260,9 @@ def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder, policy: S
     condition = block.until or block.while_
     mode = "times" if condition is None else "until" if block.until is not None else "while"
     _refuse_endless(block, condition, builder, policy)
+    changing = _given(block.steps)
+    for name in changing & set(assembler.flow.names):
+        assembler.flow.names[name] = replace(assembler.flow.names[name], quantity=None)
     before, nodes, key = assembler.flow.copy(), [], ""
     parts: tuple[StepPart, ...] = ()
     if mode == "while" and condition is not None:
@@ -507,7 +525,9 @@ def _give_key(assembler: Assembler, name: str | None, key: str, kind: type, buil
 
 
 def give(assembler: Assembler, name: str, key: str, kind: type, builder: PlanBuilder, quantity: Any = None) -> str:
-    """Let later steps read a value under `name`; the key that it goes to, that of a declared one where it is declared.
+    """Let later steps read a value under `name`; the key that it goes to.
+
+    That is the key under which the name has been given before, so that a loop's steps read what its later ones give.
 
     Raises InputError: the name is no word, is that of a reading, or has another type elsewhere: steps may be repeated.
     """
@@ -515,7 +535,9 @@ def give(assembler: Assembler, name: str, key: str, kind: type, builder: PlanBui
     if not name.isidentifier() or name in READINGS or name in ("true", "false"):
         hint = "use letters, digits and underscores, and no name of a reading"
         raise InputError.at(builder.source, f"'{name[:60]}' cannot be the name of a value", hint=hint)
-    key = flow.names[name].key if name in flow.declared else key
+    known = flow.names.get(name)
+    if known is not None and (name in flow.declared or _alike(known.type, kind)):
+        key = known.key
     if flow.kinds.setdefault(key, kind_of(kind)) is not kind_of(kind):
         told = "is declared as" if name in flow.declared else "is elsewhere"
         what = f"'{name}' {told} {flow.kinds[key]}, and gets {kind_of(kind)}"

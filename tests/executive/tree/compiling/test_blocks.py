@@ -1,5 +1,7 @@
 """How blocks are compiled: which names and types are known where, what is in the gripper, what cannot go together."""
 
+from dataclasses import replace
+
 import pytest
 
 from executive.mission.command import parse_command
@@ -339,3 +341,26 @@ def test_path_ids_are_unique_through_all_blocks(compiled_steps):
     )
     tree = compiled_steps(*steps, *steps)
     assert len(set(tree.path_ids)) == len(tree.path_ids) > 200
+
+
+def keys_of_reads(tree, name):
+    """The blackboard keys under which the nodes of a tree read a value."""
+    found = []
+    for node in tree.root.walk():
+        keys = node.options.get("keys") or getattr(node.options.get("decision"), "keys", {})
+        found += [keys[name]] if name in keys else []
+    return found
+
+
+def test_a_loop_reads_the_answer_that_its_own_steps_change(compiled_steps):
+    question = block(Ask(Template("how many?"), match="number", gives="n"))
+    loop = block(Repeat((block(Speak(Template("{n}"))), put(n="n + 1")), while_=ValueIs(Expression("n < 5"))))
+    tree = compiled_steps(question, loop, block(Speak(Template("{n}"))))
+    assert len(keys_of_reads(tree, "n")) >= 3
+    assert len(set(keys_of_reads(tree, "n"))) == 1
+
+
+def test_a_count_that_a_round_lowers_may_fall_below_zero(compiled_steps):
+    count = MissionStep((replace(LOOK.command, object_count=-1),), gives={"count": "n"})
+    assert compiled_steps(count, block(Repeat((put(n="n - 1"),), until=ValueIs(Expression("n < 0")))))
+    assert compiled_steps(count, block(Repeat((put(n="n - 1"),), while_=ValueIs(Expression("n > -3")))))

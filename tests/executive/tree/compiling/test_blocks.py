@@ -361,6 +361,6 @@ def test_a_loop_reads_the_answer_that_its_own_steps_change(compiled_steps):
 
 
 def test_a_count_that_a_round_lowers_may_fall_below_zero(compiled_steps):
-    count = MissionStep((replace(LOOK.command, object_count=-1),), gives={"count": "n"})
+    count = MissionStep((replace(LOOK.command, object_count=0),), gives={"count": "n"})
     assert compiled_steps(count, block(Repeat((put(n="n - 1"),), until=ValueIs(Expression("n < 0")))))
     assert compiled_steps(count, block(Repeat((put(n="n - 1"),), while_=ValueIs(Expression("n > -3")))))

@@ -179,9 +179,9 @@ def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str
         for one in result.executions:
             if one.done and one.path_id == node.path_id:
                 begun_s, end_s = one.began_s - 1e-3, _end(one) + 1e-3
-                heard = (said.text for said in result.said if begun_s <= said.t_s <= end_s)
+                heard = (each.text for each in result.said if not each.asked and begun_s <= each.t_s <= end_s)
                 found = next((each for each in heard if _is_text(each, text)), None)
-                told = (text if found is None and isinstance(text, str) else found or "")[:SHOWN_CHARS]
+                told = (found or (text.text if isinstance(text, Template) else str(text or "")))[:SHOWN_CHARS]
                 end = "" if told.endswith((".", "!", "?")) else "."
                 yield found is not None, f'It {"said" if found is not None else "did not say"} "{told}"{end}'
 

@@ -34,10 +34,11 @@ class Finding:
 
 @dataclass(frozen=True)
 class Said:
-    """Something that the robot said, and when it began to (s on the robot's clock)."""
+    """Something that the robot said or `asked`, and when it began to (s on the robot's clock)."""
 
     t_s: float
     text: str
+    asked: bool = False
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,8 @@ class Findings:
             self._add(_finding(message))
         elif topic == SPEECH:
             now_s = round(self._clock.now(), 6)
-            self._board.put(self._keys.said, (*self.said, Said(now_s, str(message.get("text", "")))))
+            said = Said(now_s, str(message.get("text", "")), bool(message.get("asked", False)))
+            self._board.put(self._keys.said, (*self.said, said))
         self._publish(topic, message)
 
     @property

@@ -359,7 +359,8 @@ class _Person:
     def speech(self, path: str) -> Iterator[bool]:
         """Whether something was said, each time."""
         for begun_s, ended_s in self.times(path):
-            yield any(begun_s - 0.01 <= t_s <= ended_s + 0.01 for t_s, _ in self.world.said)
+            first_s = begun_s - 0.01 if begun_s == ended_s else begun_s + 0.01  # what was said before ended as it began
+            yield any(first_s <= t_s <= ended_s + 0.01 for t_s, _ in self.world.said)
 
     def count(self, goal: GoalCondition, t_s: float) -> int:
         """How many of what was asked for there were."""

@@ -93,7 +93,8 @@ class AskPeople(ExplainedLeaf):
         left_s = max(0.0, self._until_s - now_s)
         default = "" if self.default is None else _as_text(self.default)
         self._asked = self.context.ask(Question(self.path_id, text, self.options, default, left_s))
-        self.context.publish(SPEECH_TOPIC, {"t": round(now_s, 6), "robot": self.context.robot.name, "text": text})
+        message = {"t": round(now_s, 6), "robot": self.context.robot.name, "text": text, "asked": True}
+        self.context.publish(SPEECH_TOPIC, message)
         self.message = f"asks: {text}"
 
     def _meant(self, said: str) -> Value | None:

@@ -219,3 +219,14 @@ def test_a_mission_that_only_speaks_is_judged_by_what_was_said(spoken, block):
     assert (verdict.success, verdict.why) == (True, 'It said "Hello".')
     verdict, _ = spoken(MissionStep(block=blocks.Repeat((block,), 2)), forgets=True)
     assert (verdict.success, verdict.why) == (False, 'It did not say "Hello".')
+
+
+# Was "Hello" a question that was asked while a step was to say it? Then the step has not said it.
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_question_that_is_asked_meanwhile_is_not_what_a_step_was_to_say(knowledge, registry, run_tree, asked):
+    mission = Mission("tell", "flat", "Alice", (HELLO,))
+    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": Speak})
+    result = run_tree(tree).worst
+    heard = dataclasses.replace(result, said=tuple(dataclasses.replace(each, asked=asked) for each in result.said))
+    verdict = verdict_of(tree, heard, lambda given: Verdict(None, "", 0, 0))
+    assert verdict.success is not asked

@@ -43,7 +43,7 @@ _RELAX_M = 0.003
 _FEEL_S = 0.4
 _FLOOR_M = 0.06
 _STANDS_OUT_M, _HIGHEST_M = 0.03, 0.5
-_BESIDE, _TUCKED_M = 0.6, 0.03
+_BESIDE, _TUCKED_M, _AHEAD_RAD = 0.6, 0.03, 0.6
 _AT_HAND_M, _HIDDEN = 0.4, 0.5
 """A picture of which half is nearer than that, or too near to tell, shows what is held and not what lies behind it."""
 _OVER_SPOT_M = 0.45
@@ -219,15 +219,15 @@ class Place(ArmSkill[PlaceInputs]):
         return body_heights_m(surface.height_m, self.context.robot.capabilities())
 
     def _go_near(self, surface: Surface, held: HeldObject) -> Routine[None]:
-        """Drive nearer when the nearest spot is out of the arm's reach."""
-        near = apart(_by_distance(self._spots(surface), self.X_WB()))
-        spot, pose = near[0], self.context.pose()
-        offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
-        bearing = wrap(math.atan2(offset[1], offset[0]) - pose.yaw_rad)
-        comfortable = np.linalg.norm(offset) < self.arm.comfortable_m[1] and abs(bearing) < 0.6
-        if comfortable and self._reach_cost(surface, held, spot)(pose) is not None:
-            return
-        yield from self._go_before(near[:_OTHER_SPOTS], surface, held)
+        """Drive nearer when the spots nearby are out of the arm's reach."""
+        pose, near = self.context.pose(), apart(_by_distance(self._spots(surface), self.X_WB()))[:_OTHER_SPOTS]
+        for spot in near:
+            offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
+            bearing_rad = wrap(math.atan2(offset[1], offset[0]) - pose.yaw_rad)
+            ahead = np.linalg.norm(offset) < max(self.arm.standing_m) and abs(bearing_rad) < _AHEAD_RAD
+            if ahead and self._reach_cost(surface, held, spot)(pose) is not None:
+                return
+        yield from self._go_before(near, surface, held)
 
     def _go_before(self, candidates: Sequence[FloatArray], surface: Surface, held: HeldObject) -> Routine[FloatArray]:
         """Drive to where the first of some spots that can be is within the arm's reach, or as near as may be.

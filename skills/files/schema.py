@@ -119,6 +119,8 @@ def _comma_hint(error: ErrorDetails, path: KeyPath, source: YamlSource) -> str |
     above: Any = source.data
     for part in path[:-1]:
         above = above[part]
+    if not isinstance(above, Mapping):
+        return None
     before = next((key for key, after in pairwise(above) if after == path[-1] and above[after] is None), None)
     whole = before is not None and type(above[before]) is int and type(path[-1]) is int
     return f"write '{before}: {above[before]}.{path[-1]}', with a point" if whole else None

@@ -1,0 +1,24 @@
+"""Errors of a file that does not fit its schema."""
+
+import pytest
+from pydantic import BaseModel
+
+from skills.files.errors import InputError
+from skills.files.schema import validate
+from skills.files.yaml_source import read_yaml
+
+
+class Event(BaseModel):
+    at: float = 0.0
+
+
+class Plan(BaseModel):
+    events: tuple[Event, ...]
+
+
+def test_a_key_that_is_no_text_in_an_item_of_a_list_is_refused_in_its_line(tmp_path):
+    path = tmp_path / "plan.yaml"
+    path.write_text("events:\n  - {at: 1}\n  - {null: null}\n", encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        validate(Plan, read_yaml(path))
+    assert (error.value.file, error.value.line) == (path, 3)

@@ -170,20 +170,27 @@ def _node_of(part: StepPart) -> str:
 
 
 def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str]]:
-    """For each time that a step was to say a text: whether the robot said it, and a sentence."""
+    """For each time that a step was to say a text: whether the robot said it, and a sentence.
+
+    What was said counts for one step, in the order of time.
+    """
     nodes = list(tree.root.walk())
     filled = {key: text for node in nodes if node.kind == "set" for key, text in node.options["values"].items()}
-    for node in filter(is_speech, nodes):
-        binding = node.options["inputs"]["text"]
+    texts = {node.path_id: node.options["inputs"]["text"] for node in nodes if is_speech(node)}
+    unheard = [said for said in result.said if not said.asked]
+    for one in sorted(result.executions, key=lambda one: one.began_s):
+        if not one.done or one.path_id not in texts:
+            continue
+        binding = texts[one.path_id]
         text = filled.get(binding.key) if isinstance(binding, FromBoard) else " ".join(str(binding.value).split())
-        for one in result.executions:
-            if one.done and one.path_id == node.path_id:
-                begun_s, end_s = one.began_s - 1e-3, _end(one) + 1e-3
-                heard = (each.text for each in result.said if not each.asked and begun_s <= each.t_s <= end_s)
-                found = next((each for each in heard if _is_text(each, text)), None)
-                told = (found or (text.text if isinstance(text, Template) else str(text or "")))[:SHOWN_CHARS]
-                end = "" if told.endswith((".", "!", "?")) else "."
-                yield found is not None, f'It {"said" if found is not None else "did not say"} "{told}"{end}'
+        begun_s, end_s = one.began_s - 1e-3, _end(one) + 1e-3
+        found = next((said for said in unheard if begun_s <= said.t_s <= end_s and _is_text(said.text, text)), None)
+        if found is not None:
+            unheard.remove(found)
+        expected = text.text if isinstance(text, Template) else str(text or "")
+        told = (expected if found is None else found.text)[:SHOWN_CHARS]
+        end = "" if told.endswith((".", "!", "?")) else "."
+        yield found is not None, f'It {"said" if found is not None else "did not say"} "{told}"{end}'
 
 
 def _is_text(heard: str, text: str | Template | Expression | None) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 from types import UnionType
 from typing import Annotated, Any, Final, TypeVar, Union, get_args, get_origin

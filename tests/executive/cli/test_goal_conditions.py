@@ -230,3 +230,13 @@ def test_a_question_that_is_asked_meanwhile_is_not_what_a_step_was_to_say(knowle
     heard = dataclasses.replace(result, said=tuple(dataclasses.replace(each, asked=asked) for each in result.said))
     verdict = verdict_of(tree, heard, lambda given: Verdict(None, "", 0, 0))
     assert verdict.success is not asked
+
+
+def test_what_was_said_counts_for_one_step_only(knowledge, registry, run_tree):
+    anything = MissionStep(block=blocks.Speak(Template("{n}")))
+    mission = Mission("tell", "flat", "Alice", (HELLO, anything), variables={"n": 1})
+    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": Speak})
+    result = run_tree(tree).worst
+    heard = dataclasses.replace(result, said=result.said[:1])
+    verdict = verdict_of(tree, heard, lambda given: Verdict(None, "", 0, 0))
+    assert (verdict.success, verdict.why) == (False, 'It said "Hello". It did not say "{n}".')

@@ -1,7 +1,7 @@
 """Errors of a file that does not fit its schema."""
 
 import pytest
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict
 
 from skills.files.errors import InputError
 from skills.files.schema import validate
@@ -9,6 +9,8 @@ from skills.files.yaml_source import read_yaml
 
 
 class Event(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
     at: float = 0.0
 
 

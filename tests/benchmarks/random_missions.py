@@ -372,6 +372,7 @@ class Robotics:
             "navigate": world.navigate,
             "detect": world.detect,
             "find_people": world.find_people,
+            "charge": world.charge,
             "check_door": world.check_door,
             "grasp": world.grasp,
             "place": lambda t_s, inputs: world.let_go(t_s, inputs.surface.name, name),

@@ -30,6 +30,7 @@ __all__ = ["WORLD", "Clock", "ScriptedWorld", "expected"]
 SAMPLES: Final = 5
 NEAR_PERSON_M: Final = 2.0
 HAND, FLOOR = "hand", "floor"
+NEAR_DOCK_M: Final = 0.1
 DOOR_W: Final = (2.5, 0.0)
 DOOR_STAYS_S: Final = 17.0
 """The door is open for so long, then closed for so long, and so on."""
@@ -154,6 +155,13 @@ class ScriptedWorld:
             return Failed(Cause.POSTCONDITION, "nobody is there")
         size = (0.5, 0.5, 1.7)
         return _seen([ObjectObservation(now_s, Thing("person"), (x, y, 0.9), size, 0.0, 0.9) for x, y in there])
+
+    def charge(self, now_s: float, inputs: Any) -> Succeeded | Failed:
+        """Charge, at the dock only."""
+        dock = WORLD.dock
+        if dock is None or math.dist(self.robot_W, (dock.x, dock.y)) > NEAR_DOCK_M:
+            return Failed(Cause.PRECONDITION, "the robot is not at the dock")
+        return Succeeded("charged")
 
     def check_door(self, now_s: float, inputs: Any) -> Succeeded | Failed:
         """See whether the door is open."""

@@ -59,6 +59,7 @@ NIGHTLY = {
     "grasp": {**HANDS, FREEZES: Cause.EXECUTION, "gripper loses": Cause.POSTCONDITION},
     "place": {**HANDS, **LOST},
     "find_people": {DIES: Cause.ERROR, LEASE: Cause.EXECUTION},
+    "hand_over": {**HANDS, **LOST, "arm never ends": Cause.TIMEOUT},  # the person pulls before it is held out
 }
 
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 from rich.markup import escape
 
 from executive.run.findings import Said
+from skills.files.errors import numbered
 
 
 @dataclass(frozen=True)
@@ -209,15 +210,10 @@ def counts_text(referee: RefereeReport) -> str:
     """The counts; those with people where there were any."""
     with_whom = ((referee.people_hit, "with people"), (referee.robots_hit, "between robots"))
     people = "".join(f" ({count} {whom})" for count, whom in with_whom if count)
-    walked_in = (
-        f"{_times(referee.hit_by_people, 'time')} somebody walked into the robot" if referee.hit_by_people else ""
-    )
-    contacts = f"{_times(referee.collisions, 'collision')}{people}"
-    return ", ".join(filter(None, (contacts, _times(referee.drops, "drop"), walked_in)))
-
-
-def _times(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    counts = [f"{numbered(referee.collisions, 'collision')}{people}", numbered(referee.drops, "drop")]
+    if referee.hit_by_people:
+        counts.append(f"{numbered(referee.hit_by_people, 'time')} somebody walked into the robot")
+    return ", ".join(counts)
 
 
 def _mark(good: bool | None) -> str:

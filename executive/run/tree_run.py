@@ -209,11 +209,8 @@ class TreeRun:
     def _tells_nothing_more(self) -> bool:
         """Whether the last sentence of a mission that gave answers is one of them, or merely where the robot stands."""
         last = self.tree.parts[-1] if self.tree.parts else None
-        return (
-            last is None
-            or last.goal is None
-            or last.goal.kind in (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN)
-        )
+        plain = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN)
+        return last is None or last.goal is None or last.goal.kind in plain
 
     def _skipped(self) -> Sequence[str]:
         """What was skipped, and why."""

@@ -19,6 +19,7 @@ __all__ = [
     "few",
     "known_names",
     "listing",
+    "numbered",
     "one_line",
     "suggestion",
 ]
@@ -161,6 +162,11 @@ def few(words: Iterable[str]) -> str:
     if len(names) <= MOST_LISTED:
         return listing(names)
     return f"{', '.join(names[:MOST_LISTED])} and {len(names) - MOST_LISTED} more (see docs/reference)"
+
+
+def numbered(count: int, noun: str) -> str:
+    """A count with its noun: "1 door", "2 doors"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def listing(words: Iterable[str], *, last: str = "and") -> str:

@@ -283,7 +283,10 @@ class Place(ArmSkill[PlaceInputs]):
         yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, carried, q), message, speed_rad_s=0.9)
 
     def _reach_cost(self, surface: Surface, held: HeldObject, spot: FloatArray) -> Callable[[Pose2D], float | None]:
-        """How awkwardly the arm puts the object down on a spot from a pose of the body; None where it does not."""
+        """How awkwardly the arm puts the object down on a spot from a pose of the body; None where it does not.
+
+        The first way to bring it, the highest, is left out: the next one reaches as far.
+        """
         model, heights_m = self.model, self._heights_m(surface)
         p_WT = np.array([spot[0], spot[1], surface.height_m])
 

@@ -51,8 +51,9 @@ def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str) -> NodeS
         )
         return below.sequence(f"look from the {room}", near, below.skill(CHECK_DOOR, ports, {"open": key}))
 
-    look = builder.node("selector", f"is the {told} open?", *(looked(room, view) for room, view in views), part="look")
-    return builder.node("check", f"whether the {told} is open", look, question=f"the {told} is open", key=key)
+    looks = (looked(room, view) for room, view in views)
+    look = builder.node("selector", "look from one side, or else from the other", *looks, part="look")
+    return builder.node("check", f"is the {told} open?", look, question=f"is the {told} open", key=key)
 
 
 def view_of(knowledge: Knowledge, door: Door, room: str) -> Pose2D | None:

@@ -26,7 +26,7 @@ from executive.tree.estimate import Estimate, RoutePlanner
 from executive.tree.node_view import node_view
 from executive.view.collapse import folded_to
 from executive.view.text import to_rich
-from skills.files.errors import InputError, numbered, one_line
+from skills.files.errors import InputError, count_text, one_line
 
 SHOWN_NODES: Final = 40
 MOST_LETTERS: Final = 300
@@ -176,7 +176,7 @@ def _placed(file: Path, errors: Sequence[InputError]) -> tuple[InputError, ...]:
 def _show(one: CheckedFile, console: Console, *, verbose: bool) -> None:
     """One line on the file; its errors, and with `verbose` its commands and its tree, below."""
     mark = "[green]✓[/green]" if one.ok else "[red]✗[/red]"
-    found = _in_words(one.estimate) if one.ok else numbered(len(one.errors), "error")
+    found = _in_words(one.estimate) if one.ok else count_text(len(one.errors), "error")
     console.print(f"{mark} [bold]{escape(one_line(str(one.file)))}[/bold]: {found}")
     for error in one.errors:
         typer.echo(f"errand: {error}", err=True)

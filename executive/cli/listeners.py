@@ -18,7 +18,7 @@ from executive.store.trigger_source import TriggerSource, trigger_source
 from executive.store.triggers import OnCall, OnTopic, Trigger
 from executive.view.calls import CallServer
 from skills.files.errors import InputError
-from skills.files.plugins import PluginDefect, run_aside
+from skills.files.plugins import PluginDefect, run_in_thread
 
 __all__ = ["CallAddress", "Listeners"]
 
@@ -145,7 +145,7 @@ class Listeners:
                 source.stop()
 
         try:
-            run_aside(start, limit_s=self._limit_s)
+            run_in_thread(start, limit_s=self._limit_s)
         except PluginDefect as defect:
             given_up.set()
             message = f"trigger source '{kind}' does not start ({defect})"
@@ -157,6 +157,6 @@ class Listeners:
     def _stop(self, kind: str, source: TriggerSource) -> None:
         """Stop a plug-in; that it raises is told, and harms nothing else."""
         try:
-            run_aside(source.stop, limit_s=self._limit_s)
+            run_in_thread(source.stop, limit_s=self._limit_s)
         except PluginDefect as defect:
             self._tell(f"trigger source '{kind}' does not stop ({defect})")

@@ -12,7 +12,7 @@ import typer
 from executive.cli.number_options import quantity_option
 from executive.cli.output import print_json, refusals
 from plant.models.imported import ImportedObject, read_imported
-from skills.files.errors import InputError, numbered
+from skills.files.errors import InputError, count_text
 from skills.perception.class_forms import class_forms
 from skills.quantities import Factor, Mass
 
@@ -155,7 +155,7 @@ def _draw(folder: Path, found: ImportedObject, picture: Path) -> None:
 def _in_words(made: ImportedObject) -> str:
     size, parts = " x ".join(f"{value:.3f}" for value in made.size_m), made.collision_parts
     told = f"{made.name}, class {_class_of(made)}, {size} m, {made.mass_kg:g} kg"
-    return f"{told}, {numbered(parts, 'collision part')}"
+    return f"{told}, {count_text(parts, 'collision part')}"
 
 
 def _class_of(found: ImportedObject) -> str:

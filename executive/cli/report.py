@@ -9,7 +9,7 @@ from typing import Any, Final
 from rich.markup import escape
 
 from executive.run.findings import Said
-from skills.files.errors import numbered
+from skills.files.errors import count_text
 
 
 @dataclass(frozen=True)
@@ -210,9 +210,9 @@ def counts_text(referee: RefereeReport) -> str:
     """The counts; those with people where there were any."""
     with_whom = ((referee.people_hit, "with people"), (referee.robots_hit, "between robots"))
     people = "".join(f" ({count} {whom})" for count, whom in with_whom if count)
-    counts = [f"{numbered(referee.collisions, 'collision')}{people}", numbered(referee.drops, "drop")]
+    counts = [f"{count_text(referee.collisions, 'collision')}{people}", count_text(referee.drops, "drop")]
     if referee.hit_by_people:
-        counts.append(f"{numbered(referee.hit_by_people, 'time')} somebody walked into the robot")
+        counts.append(f"{count_text(referee.hit_by_people, 'time')} somebody walked into the robot")
     return ", ".join(counts)
 
 

@@ -19,7 +19,7 @@ from executive.cli.run_options import START, StartCommand, start_pose
 from executive.cli.worlds import knowledge_of, open_world
 from plant.worlds.world import WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
-from skills.files.errors import InputError, numbered
+from skills.files.errors import InputError, count_text
 from skills.files.outside import read_text
 from skills.files.schema_errors import first_error
 from skills.quantities import Angle, Coordinate, Opening, Quantity
@@ -115,7 +115,7 @@ def show(
         except OSError as error:
             raise InputError(f"the picture cannot be written ({error.strerror})", file=out) from error
     counts = ((facts.places, "room"), (facts.doors, "door"), (facts.surfaces, "surface"))
-    typer.echo(f"{out}: {', '.join(numbered(len(each), noun) for each, noun in counts)}")
+    typer.echo(f"{out}: {', '.join(count_text(len(each), noun) for each, noun in counts)}")
 
 
 def _grey(grid: GridMap) -> Picture:
@@ -162,5 +162,5 @@ def _told(out: Path) -> None:
     made = open_world(str(out))
     facts = knowledge_of(made)
     start = f"{made.start.x_m:.2f} {made.start.y_m:.2f} {made.start.yaw_rad:.2f}"
-    rooms, doors = numbered(len(facts.places), "room"), numbered(len(facts.doors), "door")
+    rooms, doors = count_text(len(facts.places), "room"), count_text(len(facts.doors), "door")
     typer.echo(f"{out}: {rooms}, {doors}, start at {start} (m, rad)")

@@ -101,7 +101,7 @@ def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[
 
 
 def door_goal(knowledge: Knowledge, between: tuple[str, str]) -> GoalCondition:
-    """The answer to whether a door is open. Raises StopIteration: the world has no such door."""
+    """Goal condition of the question whether a door is open. Raises StopIteration: the world has no such door."""
     door = next(each for each in knowledge.doors if set(each.between) == set(between))
     x, y = door.at
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))

@@ -247,7 +247,7 @@ def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:
 
 
 def _one_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """What decides, then one branch, or none where there is a single one; the walk goes on after the longest."""
+    """Range from the shortest branch to the longest, after the decision; a single branch may be left out."""
     decides, *branches = node.children
     begun, here, noted, drawn = _followed(decides, walk, first=first), walk.pose, dict(walk.noted), walk.drawn
     taken = [] if len(branches) > 1 else [(Estimate(), (here, noted, drawn))]

@@ -91,7 +91,7 @@ class Doors:
         self._history: dict[str, list[tuple[float, float]]] = {name: [(0.0, s)] for name, s in self._shares.items()}
 
     def history(self) -> Mapping[tuple[float, float], Sequence[tuple[float, float]]]:
-        """For the place (x, y) of each door the times (s) from which it was closed to a share; 0.5 while it moves."""
+        """Changes of each door by its position (x, y): time (s) and closed share, 0 open, 1 closed, 0.5 moving."""
         return {door.at: tuple(self._history[name]) for name, door in self._doors.items()}
 
     def before_step(self, now_s: float, dt_s: float) -> None:
@@ -108,7 +108,7 @@ class Doors:
             self._set(self._instances[name], pose, (_pose(door, after) - pose) / dt_s)
 
     def _note(self, name: str, now_s: float) -> None:
-        """Note whether a door is open, closed or moves, where that is new."""
+        """Record a change between open, closed and moving."""
         share = self._shares[name] if self._shares[name] in (0.0, 1.0) else 0.5
         if share != self._history[name][-1][1]:
             self._history[name].append((now_s, share))

@@ -93,7 +93,7 @@ class Receiver:
             self._turn_to(Phase.PULLING, now_s)
 
     def _end_receiving(self, offer: Offer, now_s: float) -> None:
-        """Keep what is on the tray, pull again at what only slid in the gripper, and else put the tray away."""
+        """Pull again when the gripper still holds the object; put the tray away when the object is not on it."""
         if self._offers.grips(offer) and self._offers.holds(offer):
             self._grip(offer)
             self._turn_to(Phase.PULLING, now_s)

@@ -17,7 +17,7 @@ NEAR_PERSON_M = 2.0
 NAMED_REGIONS = 3
 PERSON = "person"
 LOOKS_AT_DOOR_S = 2.0
-"""An answer about a door rests on what was seen in so long before it."""
+"""The robot may have looked at the door so long before its answer."""
 
 
 @dataclass(frozen=True)
@@ -277,7 +277,7 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
-    """The answer equal to how the door was while the robot looked; of a door that moved, either is right."""
+    """Compare the answer with the state of the door while the robot looked; while it moves, both answers are right."""
     then_s = truth.now_s if condition.answered_s is None else condition.answered_s
     (doorway,) = condition.source
     changes = next((each for (x, y), each in truth.doors.items() if doorway.contains((x, y, 0.0))), ())

@@ -75,13 +75,13 @@ def reachable(free: Sequence[Standing], reach_cost: Callable[[Pose2D], float | N
     return best
 
 
-def first_reachable(
+def first_reachable_spot(
     before: Sequence[tuple[FloatArray, Sequence[Standing]]],
     reach_cost: Callable[[FloatArray], Callable[[Pose2D], float | None]],
 ) -> tuple[FloatArray, Sequence[Standing]] | None:
-    """The first of some spots that is within reach of a free place before it, with its places; else one out of reach.
+    """First spot that the arm reaches from a free pose, with its poses; else the first spot with a free pose.
 
-    `reach_cost` says for a spot how awkward the reach from a pose is. None: there is no free place before any.
+    `reach_cost` gives the cost of reaching a spot from a pose. None: no spot has a free pose before it.
     """
     for spot, free in before:
         if near := reachable(free, reach_cost(spot)):

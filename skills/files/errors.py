@@ -14,12 +14,12 @@ __all__ = [
     "InputError",
     "Problems",
     "SourceLine",
+    "count_text",
     "did_you_mean",
     "disk_is_full",
     "few",
     "known_names",
     "listing",
-    "numbered",
     "one_line",
     "suggestion",
 ]
@@ -93,7 +93,7 @@ class InputError(Exception):
 
 
 def one_line(text: str) -> str:
-    """The text on one line; letters that a terminal obeys or cannot show are escaped, as in "\\x1b"."""
+    """Joins a text to one line and escapes control characters, as in "\\x1b"."""
     line = " ".join(text.split())
     return line if line.isprintable() else "".join(one if one.isprintable() else ascii(one)[1:-1] for one in line)
 
@@ -164,8 +164,8 @@ def few(words: Iterable[str]) -> str:
     return f"{', '.join(names[:MOST_LISTED])} and {len(names) - MOST_LISTED} more (see docs/reference)"
 
 
-def numbered(count: int, noun: str) -> str:
-    """A count with its noun: "1 door", "2 doors"."""
+def count_text(count: int, noun: str) -> str:
+    """Count with its noun: "1 door", "2 doors"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 

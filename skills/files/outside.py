@@ -23,17 +23,17 @@ _HIDDEN: Final = 100
 
 
 def is_file(path: Path) -> bool:
-    """Whether a path leads to a plain file; no where it is no name of a file, or the system cannot look there."""
+    """Whether a plain file is at a path; False where the system refuses the name or the folder."""
     return os.path.isfile(path)  # noqa: PTH113 (Path.is_file raises for a name that is too long)
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a path leads to a folder; no as for `is_file`."""
+    """Whether a folder is at a path; False as for `is_file`."""
     return os.path.isdir(path)  # noqa: PTH112 (Path.is_dir raises for a name that is too long)
 
 
 def is_there(path: Path) -> bool:
-    """Whether there is anything at a path; no as for `is_file`."""
+    """Whether anything is at a path; False as for `is_file`."""
     return os.path.exists(path)  # noqa: PTH110 (Path.exists raises for a name that is too long)
 
 

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from importlib.metadata import EntryPoint
 from typing import Final, TypeVar
 
-__all__ = ["LIMIT_S", "OURS", "PluginDefect", "distribution_of", "run_aside", "run_plugin"]
+__all__ = ["LIMIT_S", "OURS", "PluginDefect", "distribution_of", "run_in_thread", "run_plugin"]
 
 OURS: Final = "spot-errand"
 """The distribution of this project, whose modules need no time limit."""
@@ -47,8 +47,8 @@ def run_plugin(entry: EntryPoint, call: Callable[[], ResultT], *, limit_s: float
         raise PluginDefect(_words(defect)) from defect
 
 
-def run_aside(call: Callable[[], ResultT], *, limit_s: float) -> ResultT:
-    """The result of a call into the code of a plug-in, made in a thread of its own.
+def run_in_thread(call: Callable[[], ResultT], *, limit_s: float) -> ResultT:
+    """Call the code of a plug-in in a thread, and return its result.
 
     Raises PluginDefect: the code raised something, or is not done within the limit (s, on the wall's clock); then its
     thread is left behind.

@@ -98,12 +98,12 @@ class HandOver(HandOverVerification[HandOverInputs]):
         super().resume(inputs)
 
     def end(self) -> None:
-        """Offer it no longer."""
+        """Withdraw the offer."""
         self.context.payload.offered = False
         super().end()
 
     def trouble(self) -> SkillFailure | None:
-        """That the object is lost before it is offered; what begins to slip is gripped again."""
+        """Failure when the object is lost before the offer; grips again what begins to slip."""
         return self.lost("the object was lost before it was held out")
 
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
@@ -163,7 +163,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
     def _taken(self, inputs: HandOverInputs) -> Routine[bool]:
         """Wait for a pull at the object, or for the operator's word; False when the time is over.
 
-        What is out of the gripper was pulled out of it, or has fallen.
+        True as well when the object is out of the gripper: somebody pulled it out, or it has fallen.
         """
         message, robot = f"holding the {inputs.thing} out to {inputs.person}", self.context.robot
         watch, hold = PullWatch(self.model, self.p_HT, self.options.pull_n), self.hold_watch()

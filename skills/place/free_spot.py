@@ -79,8 +79,8 @@ def roomiest_first(free: FloatArray, view: SurfaceView, but: Sequence[FloatArray
     return free[np.argsort(-np.minimum(room_m, _ROOM_M), kind="stable")]
 
 
-def apart(free: FloatArray) -> list[FloatArray]:
-    """Those of some spots (N, 2), in their order, that are not near one before."""
+def spaced_spots(free: FloatArray) -> list[FloatArray]:
+    """Spots (N, 2) in their order, without those that are near an earlier one."""
     kept = list[FloatArray]()
     for spot in free:
         if all(float(np.linalg.norm(spot - other)) > _ANOTHER_M for other in kept):

@@ -13,7 +13,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
-from skills.approach.standing import first_reachable, free_places, go_to_one
+from skills.approach.standing import first_reachable_spot, free_places, go_to_one
 from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill, Goal
 from skills.arm.collision import ArmScene, Box, box_corners
 from skills.arm.poses import carry_configuration, overview_viewpoints, tucked_configuration
@@ -27,8 +27,17 @@ from skills.grasp.reach import body_heights_m
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.skill import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
-from skills.place.free_spot import apart, clear_spots, free_spots, roomiest_first, spots, unseen_view
-from skills.place.putting_down import LEVEL, Above, HeldObject, Release, above_goal, clear_heights, reaches, with_held
+from skills.place.free_spot import clear_spots, free_spots, roomiest_first, spaced_spots, spots, unseen_view
+from skills.place.placement import (
+    LEVEL,
+    HeldObject,
+    PrePlacePose,
+    Release,
+    above_goal,
+    clear_heights,
+    reaches,
+    with_held,
+)
 from skills.quantities import Coordinate, Length, Tries, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, Image, Pose2D
 
@@ -154,7 +163,7 @@ class Place(ArmSkill[PlaceInputs]):
         self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist()}
         return rotation
 
-    def _find_spot(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[Above]:
+    def _find_spot(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[PrePlacePose]:
         """Look, and bring the object over a free spot; out of reach, go before another one that was seen."""
         spot_W, gone_to, arm = self._nearest_spot(surface), list[FloatArray](), self.arm
         heights_m, standing = self._heights_m(surface), f"standing up to the {surface.name}"
@@ -182,7 +191,7 @@ class Place(ArmSkill[PlaceInputs]):
                     lambda scene, q: carry_configuration(scene, arm, carried, q), message, speed_rad_s=0.9
                 )
             yield from self._stand_as_usual()
-            spot_W = yield from self._go_before(apart(others)[:_OTHER_SPOTS], surface, held)
+            spot_W = yield from self._go_before(spaced_spots(others)[:_OTHER_SPOTS], surface, held)
 
     _clear_of: tuple[tuple[float, float, float], ...] = ()
 
@@ -220,7 +229,7 @@ class Place(ArmSkill[PlaceInputs]):
 
     def _go_near(self, surface: Surface, held: HeldObject) -> Routine[None]:
         """Drive nearer when the spots nearby are out of the arm's reach."""
-        pose, near = self.context.pose(), apart(_by_distance(self._spots(surface), self.X_WB()))[:_OTHER_SPOTS]
+        pose, near = self.context.pose(), spaced_spots(_by_distance(self._spots(surface), self.X_WB()))[:_OTHER_SPOTS]
         for spot in near:
             offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
             bearing_rad = wrap(math.atan2(offset[1], offset[0]) - pose.yaw_rad)
@@ -241,7 +250,7 @@ class Place(ArmSkill[PlaceInputs]):
             (spot, free_places((float(spot[0]), float(spot[1])), pose, context.costmap, footprint, each, best_m))
             for spot, each in itertools.product(candidates, (arm.standing_m, arm.nearer_m))
         ]
-        choose = partial(first_reachable, before, partial(self._reach_cost, surface, held))
+        choose = partial(first_reachable_spot, before, partial(self._reach_cost, surface, held))
         message = f"choosing where to stand at the {surface.name}"
         chosen = yield from self.compute(choose, latency_s=0.2, name="choose a place", message=message)
         if chosen is None:
@@ -285,13 +294,13 @@ class Place(ArmSkill[PlaceInputs]):
     def _reach_cost(self, surface: Surface, held: HeldObject, spot: FloatArray) -> Callable[[Pose2D], float | None]:
         """How awkwardly the arm puts the object down on a spot from a pose of the body; None where it does not.
 
-        The first way to bring it, the highest, is left out: the next one reaches as far.
+        The highest approach is left out, because the next one reaches as far.
         """
         model, heights_m = self.model, self._heights_m(surface)
         p_WT = np.array([spot[0], spot[1], surface.height_m])
 
         def cost(pose: Pose2D) -> float | None:
-            for (number, height_m), way in itertools.product(enumerate(heights_m), held.ways()[1:]):
+            for (number, height_m), way in itertools.product(enumerate(heights_m), held.approaches()[1:]):
                 p_BT = pose.transform(height_m).inverse() @ p_WT
                 if any(reaches(model, X_BH) for X_BH in held.above(p_BT, model.p_BS, *way)):
                     return _OTHER_HEIGHT_COST * number + way[1]
@@ -342,7 +351,7 @@ class Place(ArmSkill[PlaceInputs]):
             views += [] if view is None else [view]
         return max(views, key=lambda view: len(view.plane_points), default=None)
 
-    def _go_above(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[Above]:
+    def _go_above(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[PrePlacePose]:
         """Bring the object above the best free spot."""
         X_WB = self.X_WB()
         free = free_spots(view, self._spots(surface))
@@ -357,7 +366,7 @@ class Place(ArmSkill[PlaceInputs]):
         goal = above_goal(on_top, held, self.context.stack.arm_planner, letting_go)
         q_rad = yield from self._bring(goal, held, f"bringing the object over the {surface.name}")
         X_BH = self.model.X_BH(q_rad)
-        return Above(q_rad, float(X_BH.translation()[2] - on_top[0][2]) - held.drop_m(X_BH.rotation()))
+        return PrePlacePose(q_rad, float(X_BH.translation()[2] - on_top[0][2]) - held.drop_m(X_BH.rotation()))
 
     def _bring(self, goal: Goal, held: HeldObject, message: str) -> Routine[FloatArray]:
         """Go to a goal on a path on which what is held touches nothing; where there is none, the arm at least."""
@@ -374,7 +383,7 @@ class Place(ArmSkill[PlaceInputs]):
                 raise
         return (yield from self.move_to(lambda scene, q: found[0], message, speed_rad_s=0.8))
 
-    def _lower(self, surface: Surface, above: Above) -> Routine[None]:
+    def _lower(self, surface: Surface, above: PrePlacePose) -> Routine[None]:
         """Go down slowly until the hand is held up, by contact, or the height is that of the surface.
 
         The path down begins at the angles for which it was found to be possible, and not at those of the arm: they

@@ -19,7 +19,7 @@ from executive.tree.behaviours.policies import FINAL_CAUSES
 from executive.tree.behaviours.recovery import Afterwards
 from executive.tree.node import NodeKind
 from skills.api import Cause
-from skills.files.errors import numbered
+from skills.files.errors import count_text
 from skills.robot import Clock
 
 
@@ -155,7 +155,7 @@ class Repeat(MemoryComposite):
     def _told(self) -> str:
         done = self.rounds - (1 if self._phase == "before" else 0)
         last = message_of(self.children[-1]) if self.children[-1].status == Status.SUCCESS else ""
-        counted = numbered(done, "round")
+        counted = count_text(done, "round")
         return f"{counted}, the last: {last}" if last else counted
 
     def _goes_on(self, message: str) -> None:

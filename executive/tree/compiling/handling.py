@@ -148,7 +148,7 @@ def known_held_plan(builder: PlanBuilder, thing: Thing) -> NodeSpec:
 
 
 def _tucked(builder: PlanBuilder, thing: Thing) -> NodeSpec:
-    """The arm is drawn in, with the object in the gripper all the way."""
+    """Draw the arm in under a guard that the gripper holds the object."""
     return builder.node("guard", f"holding {thing}", tuck_plan(builder), part="held", condition=Holds(str(thing)))
 
 

@@ -223,7 +223,7 @@ def test_a_mission_that_only_speaks_is_judged_by_what_was_said(spoken, block):
 
 # Was "Hello" a question that was asked while a step was to say it? Then the step has not said it.
 @pytest.mark.parametrize("asked", [False, True])
-def test_a_question_that_is_asked_meanwhile_is_not_what_a_step_was_to_say(knowledge, registry, run_tree, asked):
+def test_a_question_does_not_count_as_the_text_of_a_step(knowledge, registry, run_tree, asked):
     mission = Mission("tell", "flat", "Alice", (HELLO,))
     tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": Speak})
     result = run_tree(tree).worst
@@ -232,7 +232,7 @@ def test_a_question_that_is_asked_meanwhile_is_not_what_a_step_was_to_say(knowle
     assert verdict.success is not asked
 
 
-def test_what_was_said_counts_for_one_step_only(knowledge, registry, run_tree):
+def test_one_sentence_counts_for_one_step(knowledge, registry, run_tree):
     anything = MissionStep(block=blocks.Speak(Template("{n}")))
     mission = Mission("tell", "flat", "Alice", (HELLO, anything), variables={"n": 1})
     tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": Speak})

@@ -145,7 +145,7 @@ def test_a_gripper_that_holds_on_is_pulled_at_again_after_a_pause(tmp_path):
     assert hall.robot.gripper().holding
 
 
-def test_what_only_slides_in_the_gripper_under_the_pull_is_pulled_at_again(tmp_path):
+def test_the_person_pulls_again_when_the_object_only_slides_in_the_gripper(tmp_path):
     hall = Hall(tmp_path).until(Phase.PULLING)
     state = hall.kim.state()
     x, y, z = state["p_HO"]

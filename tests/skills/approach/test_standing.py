@@ -8,7 +8,7 @@ import pytest
 from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 
 from skills.api import ObjectObservation, Thing
-from skills.approach.standing import Standing, first_reachable, free_places, is_comfortable, reachable
+from skills.approach.standing import Standing, first_reachable_spot, free_places, is_comfortable, reachable
 from skills.grasp.planning import GeometricGraspPlanner
 from skills.grasp.reach import observed_target, reached_grasps
 from skills.navigate.footprint import Footprint
@@ -114,9 +114,9 @@ def test_the_robot_goes_before_the_first_spot_that_it_can_reach_from_a_free_plac
         (np.array([spot, 0.0]), [Standing(Pose2D(spot - off_m, 0.0, 0.0), off_m) for off_m in each])
         for spot, each in enumerate(free_m)
     ]
-    spot, places = first_reachable(before, lambda spot: lambda pose: 0.0 if spot[0] - pose.x_m < 1.2 else None)
+    spot, places = first_reachable_spot(before, lambda spot: lambda pose: 0.0 if spot[0] - pose.x_m < 1.2 else None)
     assert (spot[0], len(places)) == chosen
 
 
 def test_without_a_free_place_before_any_spot_there_is_none():
-    assert first_reachable([(np.zeros(2), [])], lambda spot: lambda pose: 0.0) is None
+    assert first_reachable_spot([(np.zeros(2), [])], lambda spot: lambda pose: 0.0) is None

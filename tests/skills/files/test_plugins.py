@@ -8,7 +8,7 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from skills.files.plugins import PluginDefect, run_aside, run_plugin
+from skills.files.plugins import PluginDefect, run_in_thread, run_plugin
 
 ENTRY = EntryPoint("wave", "wavers:Wave", "errand.skills")
 HANGS = """
@@ -68,13 +68,13 @@ def test_a_call_that_is_over_in_time_harms_nobody_later():
 
 
 def test_a_call_aside_gives_its_result_or_one_error():
-    assert run_aside(lambda: 3, limit_s=10.0) == 3
+    assert run_in_thread(lambda: 3, limit_s=10.0) == 3
     with pytest.raises(PluginDefect, match="SystemExit: 3"):
-        run_aside(raising(SystemExit(3)), limit_s=10.0)
+        run_in_thread(raising(SystemExit(3)), limit_s=10.0)
 
 
 def test_a_call_aside_that_hangs_is_left_behind():
     over = threading.Event()
     with pytest.raises(PluginDefect, match=r"not done within 0\.05 s"):
-        run_aside(lambda: over.wait(10), limit_s=0.05)
+        run_in_thread(lambda: over.wait(10), limit_s=0.05)
     over.set()

@@ -159,12 +159,12 @@ def test_noise_and_a_light_touch_are_no_pull(pull_n):
     assert robot.q == pytest.approx(CARRYING, abs=0.01)
 
 
-def test_what_is_pulled_out_of_the_closed_gripper_is_given_when_it_is_seen_with_the_person():
+def test_an_object_pulled_out_of_the_closed_gripper_is_given_when_seen_with_the_person():
     robot = _before_robin(pull_n=0.0, lost_s=PULL_S)
     assert isinstance(outcome(HandOver(context_of(robot)), BEER), Succeeded)
 
 
-def test_what_is_lost_while_it_is_held_out_and_not_seen_is_no_hand_over():
+def test_an_object_lost_while_held_out_and_not_seen_is_not_given():
     robot = _before_robin(things=(), pull_n=0.0, lost_s=PULL_S)
     failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "the beer is not seen where it was let go of")
 

@@ -11,10 +11,10 @@ from skills.perception.surface_segmentation import Cluster, SurfaceView
 from skills.place.free_spot import (
     CLEARANCE_M,
     EDGE_M,
-    apart,
     clear_spots,
     free_spots,
     roomiest_first,
+    spaced_spots,
     spots,
     unseen_view,
 )
@@ -89,6 +89,6 @@ def test_a_surface_that_is_hidden_is_free_but_for_what_is_known_to_stand_there()
     assert len(free_spots(unseen_view(TABLE, np.empty((0, 3))), spots(TABLE))) == len(spots(TABLE))
 
 
-def test_spots_that_are_apart_are_in_their_order_and_none_is_near_one_before():
+def test_spaced_spots_keep_their_order_and_distance():
     free = np.array([[0.0, 0.0], [0.1, 0.0], [0.3, 0.0], [0.4, 0.0], [0.0, 0.25]])
-    assert np.array_equal(apart(free), free[[0, 2, 4]])
+    assert np.array_equal(spaced_spots(free), free[[0, 2, 4]])

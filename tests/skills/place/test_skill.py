@@ -12,7 +12,7 @@ from table_scene import TABLE as TOP
 from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause, Failed, Running, Succeeded, Surface
 from skills.arm.kinematics import arm_model
-from skills.place.putting_down import HeldObject
+from skills.place.placement import HeldObject
 from skills.place.skill import Place, PlaceInputs
 from skills.robot import Pose2D
 

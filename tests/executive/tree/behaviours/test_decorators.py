@@ -198,7 +198,7 @@ def test_a_guard_contradicts_a_success_when_the_gripper_is_empty_then(context, c
 
 # Whether it is offered when it is gone from the closed gripper -> whether the guard breaks
 @pytest.mark.parametrize(("offered", "breaks"), [(False, True), (True, False)])
-def test_what_is_pulled_out_of_the_gripper_is_left_to_the_skill_that_offers_it(context, clock, robot, offered, breaks):
+def test_the_guard_leaves_an_offered_object_to_the_skill_that_offers_it(context, clock, robot, offered, breaks):
     robot.holding = True
     condition = Holds("coke", "home", until_put_down=True)
     root = Guard(path_id="a/g", name="g", child=Queue(*[R] * 20), condition=condition, context=context)

@@ -516,9 +516,7 @@ def test_what_a_failed_grasp_holds_is_used_and_not_searched_for_again(compiled, 
     assert script.begun == ["navigate", "detect", "approach", "grasp", "stow"]
 
 
-def test_what_a_failed_grasp_holds_and_then_loses_while_the_arm_is_drawn_in_is_taken_anew(
-    compiled, run_tree, script, robot
-):
+def test_an_object_lost_while_the_arm_is_drawn_in_is_grasped_again(compiled, run_tree, script, robot):
     def closes(skill):
         robot.holding, skill.context.payload.thing = True, Thing("coke")
         first = script.begun.count("grasp") == 1

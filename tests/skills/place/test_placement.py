@@ -11,7 +11,7 @@ from skills.api import Surface
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model
 from skills.arm.motion import RrtConnect
-from skills.place.putting_down import HeldObject, Release, above_goal, clear_heights, with_held
+from skills.place.placement import HeldObject, Release, above_goal, clear_heights, with_held
 
 MODEL = arm_model(spot_capabilities())
 LEVEL_FORWARD = RotationMatrix.MakeXRotation(np.pi / 2)
@@ -68,13 +68,13 @@ BOTTLE = HeldObject(RotationMatrix.MakeYRotation(np.pi / 2), np.array([[0.1, -0.
 @pytest.mark.parametrize(
     ("held", "ways"), [(HAMMER, [(0.10, 0.0), (0.05, 0.0), (0.05, 0.3)]), (BOTTLE, [(0.10, 0.0), (0.05, 0.0)])]
 )
-def test_only_what_cannot_fall_over_is_put_down_tilted(held, ways):
-    assert held.ways() == ways
+def test_only_flat_objects_are_put_down_tilted(held, ways):
+    assert held.approaches() == ways
 
 
 # A spot ahead (m), 0.1 m above the shoulder -> how far over it and how tilted a hammer is brought
 @pytest.mark.parametrize(("ahead_m", "way"), [(0.75, (0.10, 0.0)), (0.82, (0.05, 0.0)), (0.95, (0.05, 0.3))])
-def test_out_of_reach_what_is_held_is_brought_lower_and_then_tilted_away_from_the_body(ahead_m, way):
+def test_a_far_spot_is_reached_from_lower_and_then_tilted(ahead_m, way):
     scene, spot_B = ArmScene(spot_capabilities(), MODEL, {}), np.array([ahead_m, 0.0, 0.3])
     q_rad = above_goal([spot_B], HAMMER, RrtConnect(), Release([], 0.7))(scene, CARRYING)
     X_BH = MODEL.X_BH(q_rad)

@@ -1,4 +1,4 @@
-"""How an object that the hand holds comes to stand on a surface: poses of the hand, and arm angles that reach them."""
+"""Poses of the hand and arm angles that put a held object down on a surface."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from skills.robot import FloatArray
 from skills.stack import ArmPlanner
 
 ABOVE_M, LEAST_ABOVE_M, TILT_RAD = 0.10, 0.05, 0.3
-"""So high over the surface the object's lowest point is brought, before it goes down.
+"""Height of the object's lowest point over the surface (m) before the hand goes down.
 
-Out of the arm's reach it is brought lower, and what cannot fall over is tilted as well.
+Spots out of reach use the lower height; flat objects are tilted there as well.
 """
 LEVEL = 0.5
 """Fingers whose direction has a larger level share point to a side, not down."""
 _FLAT = 1.2
-"""What is lower than so many times its width cannot fall over."""
+"""An object cannot fall over when it is lower than this multiple of its width."""
 _LEAST_BACK_M = 0.08
-"""A spot counts only where the open hand gets back by so much."""
+"""The open hand must be able to move back from a spot by this distance."""
 _MARGIN_RAD = 0.05
 _OFF_SURFACE_M, _EDGE_M = 0.01, 0.1
 
@@ -73,13 +73,13 @@ class HeldObject:
         turns = (0.0, 0.4, -0.4) if level else tuple(k * math.pi / 4 for k in range(8))
         return [RotationMatrix.MakeZRotation(ahead + turn) @ self.R_BH for turn in turns]
 
-    def ways(self) -> Sequence[tuple[float, float]]:
-        """How far over a surface (m) and how tilted (rad) the object may be brought, the best first."""
+    def approaches(self) -> Sequence[tuple[float, float]]:
+        """Heights over the surface (m) and tilts (rad) from which the object can go down, the best first."""
         tilted = [(LEAST_ABOVE_M, TILT_RAD)] if self._is_flat() else []
         return [(ABOVE_M, 0.0), (LEAST_ABOVE_M, 0.0), *tilted]
 
     def _is_flat(self) -> bool:
-        """Whether the object, as it stood, comes to lie the same way when it is let go of a little tilted."""
+        """Whether the object is too low for its width to fall over when the gripper lets go of it tilted."""
         x, y, height = np.ptp(self.corners_H @ self.R_BH.matrix().T, axis=0)
         return bool(height < _FLAT * min(x, y))
 
@@ -100,8 +100,8 @@ class HeldObject:
 
 
 @dataclass(frozen=True)
-class Above:
-    """The joint angles (J,) at which the object hangs over its spot, and how far its lowest point is above that."""
+class PrePlacePose:
+    """Joint angles (J,) with the object over its spot, and the height (m) of its lowest point over the surface."""
 
     q_rad: FloatArray
     height_m: float
@@ -125,7 +125,7 @@ def above_goal(
 
     def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
         """Arm angles above the first spot that can be reached and gone down to. Raises PlanningError."""
-        for (above_m, tilt_rad), p_BT in itertools.product(held.ways(), on_top_B):
+        for (above_m, tilt_rad), p_BT in itertools.product(held.approaches(), on_top_B):
             for X_BH in held.above(p_BT, scene.model.p_BS, above_m, tilt_rad):
                 for solution in scene.model.inverse(X_BH, margin_rad=_MARGIN_RAD):
                     q_above = scene.model.turned_near(solution, q)

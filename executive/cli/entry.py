@@ -16,7 +16,6 @@ from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
 from executive.cli.run_options import StartCommand
-from executive.cli.wake_check import refuse_unaddressed
 from skills.files.errors import MOST_LETTERS, InputError, one_line
 
 __all__ = ["app", "loaded", "main"]
@@ -125,6 +124,8 @@ def main() -> None:
         for argument in sys.argv[1:]:
             _refuse_undecoded(argument)
         if any(argument.startswith("--say") for argument in sys.argv):
+            from executive.cli.wake_check import refuse_unaddressed
+
             refuse_unaddressed(sys.argv[2:])
     except InputError as error:
         typer.echo(f"errand: {error}", err=True)

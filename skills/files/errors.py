@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from rapidfuzz import fuzz, process
-
 __all__ = [
     "InputError",
     "Problems",
@@ -132,6 +130,8 @@ class Problems:
 
 def did_you_mean(word: str, known: Iterable[str]) -> str | None:
     """The known word that is spelled most like `word`, or None when none is near."""
+    from rapidfuzz import fuzz, process
+
     by_lower = {name.lower(): name for name in known}
     near = process.extractOne(word.lower(), by_lower.keys(), scorer=fuzz.ratio, score_cutoff=70.0)
     return by_lower[near[0]] if near else None
@@ -149,6 +149,8 @@ def suggestion(word: str, known: Iterable[str], otherwise: str | None = None, *,
 
 def known_names(word: str, known: Iterable[str]) -> str:
     """All that is known where that is little, else those that are spelled most like `word`."""
+    from rapidfuzz import fuzz, process
+
     names = list(dict.fromkeys(known))
     if len(names) <= FEW:
         return f"known are {listing(names)}"

@@ -15,6 +15,8 @@ DEBIAN := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libsm6 libx11-6
 # Voices that speak to the tests of speech; without them those are skipped.
 VOICES := flite espeak-ng
 JOBS ?= 2
+# Tests start many processes; compiled modules are kept even where an environment would have none written.
+unexport PYTHONDONTWRITEBYTECODE
 
 missing = for package in $(1); do dpkg -s $$package >/dev/null 2>&1 || printf ' %s' $$package; done
 define install

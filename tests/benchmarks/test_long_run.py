@@ -20,6 +20,7 @@ def test_what_this_process_writes_and_holds_is_measured(tmp_path):
 
 
 @pytest.mark.mission
+@pytest.mark.nightly
 def test_a_short_run_is_reported(tmp_path):
     told = run(0.2, tmp_path, every_s=6.0, wait_s=1.0, record=False)
     assert told["outcome"] == "success"

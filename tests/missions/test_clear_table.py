@@ -12,7 +12,7 @@ from executive.cli.simulated import run_simulated
 from executive.mission.request import Request
 from plant.worlds.world import WORLDS_FOLDER
 
-pytestmark = pytest.mark.mission
+pytestmark = [pytest.mark.mission, pytest.mark.nightly]
 
 OBJECTS = ("beer", "cylinder", "cube")
 

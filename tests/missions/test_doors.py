@@ -18,6 +18,7 @@ steps:
 """
 
 
+@pytest.mark.nightly
 def test_a_door_that_is_open_is_found_so(tmp_path):
     (tmp_path / "look.yaml").write_text(LOOK)
     report = run_simulated(prepare(Request(file=tmp_path / "look.yaml", seed=1, out=tmp_path, record=False))).report

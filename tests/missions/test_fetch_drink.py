@@ -1,10 +1,5 @@
 """The whole path: from a sentence to a drink brought back, as a user runs it."""
 
-import json
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
 from executive.record.reader import read_events
@@ -12,23 +7,7 @@ from executive.record.schemas import WALL
 
 pytestmark = pytest.mark.mission
 
-SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
 ARTIFACTS = {"tree.svg", "log.mcap", "recording.html", "map.png", "detection.png", "grasp.png", "hand_over.png"}
-
-
-def errand_run(out: Path, *arguments: str) -> tuple[dict, list[str]]:
-    """The report, and the lines that people read."""
-    command = [sys.executable, "-m", "executive.cli", "run", "--say", SENTENCE, "--seed", "1", "--json"]
-    done = subprocess.run([*command, "--out", str(out), *arguments], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1]), done.stderr.splitlines()
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    """A run with recording: its folder, its report and what it printed."""
-    out = tmp_path_factory.mktemp("recorded")
-    return out, *errand_run(out)
 
 
 def test_tree_and_referee_agree_that_the_drink_was_brought(recorded):
@@ -59,10 +38,8 @@ def test_the_run_leaves_tree_log_recording_and_pictures(recorded):
     assert all((out / name).stat().st_size > 1000 for name in ARTIFACTS)
 
 
-def test_the_same_seed_gives_the_same_events(recorded, tmp_path):
-    out, _, _ = recorded
-    errand_run(tmp_path, "--no-record", "--quiet")
-    logs = (read_events(out / "log.mcap"), read_events(tmp_path / "log.mcap"))
+def test_the_same_seed_gives_the_same_events(recorded, repeated):
+    logs = (read_events(recorded[0] / "log.mcap"), read_events(repeated[0] / "log.mcap"))
     first, second = ([event for event in log if event.topic != WALL] for log in logs)
     assert len(first) > 100
     assert first == second

@@ -55,7 +55,11 @@ def done_leaves(out: Path) -> list[str]:
 
 @pytest.mark.mission
 @pytest.mark.parametrize(
-    ("sentence", "leaf", "after_s"), [(FETCH, "grasp", 7.0), (TIDY, "place", 6.0)], ids=["in grasp", "in place"]
+    ("sentence", "leaf", "after_s"),
+    [
+        pytest.param(FETCH, "grasp", 7.0, marks=pytest.mark.nightly, id="in grasp"),
+        pytest.param(TIDY, "place", 6.0, id="in place"),
+    ],
 )
 def test_a_killed_mission_is_taken_up_and_ends_right(sentence, leaf, after_s, tmp_path):
     options = ("--seed", "1", "--out", str(tmp_path), "--no-record", "--quiet")

@@ -23,7 +23,7 @@ from plant.worlds.placement import place_objects
 from plant.worlds.world import load_world
 from tests.benchmarks.manipulation_room import TAKEN, room
 
-pytestmark = pytest.mark.mission
+pytestmark = [pytest.mark.mission, pytest.mark.nightly]
 
 SEED, MIDDLE_X = 404, 2.5
 SPOTS = {"target": (0.0, 0.21), "other_0": (0.0, 0.09), "other_1": (0.13, 0.17)}

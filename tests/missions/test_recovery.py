@@ -96,6 +96,7 @@ def honest(result, verdict):
     assert claimed or (result.cause is not None and result.message)
 
 
+@pytest.mark.nightly
 def test_a_blocked_doorway_is_gone_around(tmp_path):
     box = box_at(tmp_path, 9.0, 5.4, (0.7, 0.3, 0.8))
     mission = FlatMission(FETCH, extra_models=(box,))
@@ -121,6 +122,7 @@ class WeakGripper:
         return self._robot.set_gripper(opening, force_n, until_s=until_s, lease=lease)
 
 
+@pytest.mark.nightly
 def test_a_thing_that_slips_is_taken_again():
     mission = FlatMission(FETCH)
     robot = WeakGripper(mission.entry.robot, weak_times=1, force_n=1.0)
@@ -159,6 +161,7 @@ class LosesHalfway:
             self._apart_m, self._robot = apart_m, with_faults(self._robot, self._clock, ["gripper loses it"])
 
 
+@pytest.mark.nightly
 def test_what_falls_on_the_way_is_noticed_at_once_picked_up_from_the_floor_and_brought():
     mission = FlatMission(BEER)
     robot = LosesHalfway(mission, "beer")
@@ -172,6 +175,7 @@ def test_what_falls_on_the_way_is_noticed_at_once_picked_up_from_the_floor_and_b
     assert "the beer fell on the way to the start; it is picked up again" in told
 
 
+@pytest.mark.nightly
 def test_a_low_battery_is_charged_in_between_and_the_mission_goes_on():
     mission = FlatMission(("Take [Nothing] to [workshop] and do [find] to [hammer]",), charge=0.153)
     charges = []

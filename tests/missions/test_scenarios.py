@@ -1,11 +1,11 @@
 """Whole missions while something happens in the world, from the command line: they find another way."""
 
 import json
-import subprocess
-import sys
 
 import pytest
+from typer.testing import CliRunner
 
+from executive.cli.entry import app
 from executive.record.reader import read_events
 
 pytestmark = pytest.mark.mission
@@ -13,9 +13,9 @@ pytestmark = pytest.mark.mission
 
 def errand_run(out, sentence, *arguments):
     """The report of a run."""
-    command = [sys.executable, "-m", "executive.cli", "run", "--say", sentence, "--no-record", "--quiet", "--json"]
-    done = subprocess.run([*command, "--out", str(out), *arguments], capture_output=True, text=True, check=False)
-    assert done.stdout, done.stderr
+    options = ["--no-record", "--quiet", "--json", "--out", str(out)]
+    done = CliRunner().invoke(app, ["run", "--say", sentence, *options, *arguments])
+    assert done.stdout, done.output
     return json.loads(done.stdout.splitlines()[-1])
 
 
@@ -37,6 +37,7 @@ def test_where_a_door_closes_the_robot_takes_another(tmp_path):
     assert min(pose["x"] for pose in poses) < 7.4  # through the hall
 
 
+@pytest.mark.nightly
 def test_an_object_that_is_moved_before_it_is_grasped_is_found_where_it_is_now(tmp_path):
     file = tmp_path / "moved.yaml"
     file.write_text("events:\n  - {object: beer, at: 8 s, to: kitchen table}\n", encoding="utf-8")

@@ -15,7 +15,7 @@ MISSION = Path(__file__).parents[2] / "missions" / "go_to_pose.yaml"
 pytestmark = pytest.mark.mission
 
 
-@pytest.mark.parametrize("localiser", ["scan_matching", "monte_carlo"])
+@pytest.mark.parametrize("localiser", ["scan_matching", pytest.param("monte_carlo", marks=pytest.mark.nightly)])
 def test_it_finds_out_where_it_is_and_then_does_the_mission(localiser, tmp_path):
     stack = tmp_path / "stack.yaml"
     stack.write_text(f"localiser: {{use: {localiser}}}\n", encoding="utf-8")

@@ -1,14 +1,9 @@
 """A fetch computes no more than its budgets allow: a slower path cannot come in unseen on a fast machine."""
 
-import json
-import subprocess
-import sys
-
 import pytest
 
 from executive.record.reader import read_events
 
-FETCH = "Hey Alice, can you fetch me a drink from the kitchen"
 # What this fetch took when the budget was last set, and a fifth more.
 BUDGETS = {
     "arm_configuration_checks": 2_070,
@@ -31,14 +26,10 @@ BUDGETS = {
 
 
 @pytest.mark.mission
-def test_a_fetch_keeps_its_budgets(tmp_path):
-    command = [sys.executable, "-m", "executive.cli", "run", "--say", FETCH, "--world", "flat", "--seed", "1"]
-    options = ["--no-record", "--quiet", "--json", "--out", str(tmp_path)]
-    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    report = json.loads(done.stdout.splitlines()[-1])
+def test_a_fetch_keeps_its_budgets(repeated):
+    out, report = repeated
     work = report["work"]
-    logged = [event.data for event in read_events(tmp_path / "log.mcap") if event.topic == "work"]
+    logged = [event.data for event in read_events(out / "log.mcap") if event.topic == "work"]
     assert logged == [work]
     assert {name: work.get(name) for name in BUDGETS if work.get(name, 0) > BUDGETS[name]} == {}
     assert set(work) == set(BUDGETS), "a counter has no budget, or a budget no counter"

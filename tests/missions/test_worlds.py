@@ -8,7 +8,7 @@ from executive.cli.requests import prepare
 from executive.cli.simulated import run_simulated
 from executive.mission.request import Request
 
-pytestmark = pytest.mark.mission
+pytestmark = [pytest.mark.mission, pytest.mark.nightly]
 
 
 @pytest.mark.parametrize(("world", "room"), [("shop", "office"), ("lab", "server room")])

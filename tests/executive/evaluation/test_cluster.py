@@ -1,4 +1,4 @@
-"""Work given out to a Dask cluster of real processes, and what it says when the cluster is not fit for it."""
+"""Work given out to a Dask cluster, and what it says when the cluster is not fit for it; nightly in processes."""
 
 import logging
 
@@ -14,10 +14,20 @@ distributed = pytest.importorskip("distributed")
 QUIET = {"dashboard_address": ":0", "memory_limit": 0, "silence_logs": logging.CRITICAL}
 
 
+IN_THREADS = {"threads_per_worker": 1, "processes": False, "protocol": "tcp", **QUIET}
+IN_PROCESSES = {"threads_per_worker": 1, "processes": True, **QUIET}
+
+
+@pytest.fixture(scope="module", params=[IN_THREADS, pytest.param(IN_PROCESSES, marks=pytest.mark.nightly)])
+def options(request):
+    """Workers that are threads of this process, or processes with a nanny each."""
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def address():
-    """A scheduler with two worker processes, each with a nanny."""
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, **QUIET) as started:
+def address(options):
+    """A scheduler with two workers."""
+    with distributed.LocalCluster(n_workers=2, **options) as started:
         yield started.scheduler_address
 
 
@@ -28,17 +38,21 @@ def test_each_item_is_worked_on_once(address):
     assert all(one.result == one.item**2 for one in finished)
 
 
-def test_a_worker_that_is_killed_loses_nothing_and_doubles_nothing(address, tmp_path):
-    with scheduler_at(address) as workers:
+@pytest.mark.nightly
+def test_a_worker_that_is_killed_loses_nothing_and_doubles_nothing(tmp_path):
+    with (
+        distributed.LocalCluster(n_workers=2, **IN_PROCESSES) as started,
+        scheduler_at(started.scheduler_address) as workers,
+    ):
         finished = list(workers.give_out(cheap_run.square_or_die, [(number, str(tmp_path)) for number in range(30)]))
     assert sorted(one.item[0] for one in finished) == list(range(30))
     assert all(one.result == one.item[0] ** 2 for one in finished)
 
 
 def test_workers_of_another_version_are_refused_before_anything_runs(address, monkeypatch):
-    monkeypatch.setattr(cluster, "installed_code", lambda: "9.9.9 of tomorrow")
+    monkeypatch.setattr(cluster, "_code_here", lambda: "9.9.9 of tomorrow")
     with (
-        pytest.raises(InputError, match=r"has another version of Errand .*here it is 9\.9\.9 of tomorrow"),
+        pytest.raises(InputError, match=r"has another version of Errand \(9\.9\.9 of tomorrow; here it is "),
         scheduler_at(address),
     ):
         pass
@@ -75,9 +89,9 @@ def test_a_scheduler_that_does_not_answer_is_told(named, monkeypatch):
         pass
 
 
-def test_workers_that_are_all_gone_are_told_and_what_has_landed_is_kept(monkeypatch):
+def test_workers_that_are_all_gone_are_told_and_what_has_landed_is_kept(options, monkeypatch):
     monkeypatch.setattr(cluster, "GONE_S", 0.5)
-    started = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, **QUIET)
+    started = distributed.LocalCluster(n_workers=1, **options)
     landed = []
     with (
         started,
@@ -92,8 +106,8 @@ def test_workers_that_are_all_gone_are_told_and_what_has_landed_is_kept(monkeypa
     assert 3 <= len(landed) < 200
 
 
-def test_a_scheduler_that_stops_is_told_and_what_has_landed_is_kept():
-    started = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, **QUIET)
+def test_a_scheduler_that_stops_is_told_and_what_has_landed_is_kept(options):
+    started = distributed.LocalCluster(n_workers=1, **options)
     landed = []
     with (
         started,

@@ -44,9 +44,10 @@ def test_it_needs_neither_capitals_nor_punctuation(parser, sentence, commands):
     assert found == [command.lower() for command in commands]
 
 
-@pytest.mark.parametrize(("sentence", "commands"), sentences("understood"))
-def test_its_commands_parse_back(parser, sentence, commands):
-    assert [str(parse_command(command)) for command in commands] == commands
+def test_all_commands_parse_back():
+    understood = (kinds.get("understood", {}) for kinds in FAMILIES.values())
+    commands = {command for kind in understood for commands in kind.values() for command in commands}
+    assert [command for command in sorted(commands) if str(parse_command(command)) != command] == []
 
 
 @pytest.mark.parametrize(("sentence", "part"), sentences("refused"))

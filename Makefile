@@ -31,6 +31,7 @@ env: $(VENV)/.ready
 
 $(VENV)/.ready: $(VENV)/.run
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,objects,cluster,test,browser,bench,dev]'
+	$(BIN)/errand warm-up
 	@touch $@
 
 $(VENV)/.run: pyproject.toml constraints.txt | debian

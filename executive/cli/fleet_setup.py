@@ -62,6 +62,9 @@ def simulated_fleet(
                 console.print(f"It is left out of this run: {error}", markup=False)
     if not missions:
         left_out.raise_any()
+    from executive.cli.kernels import compile_first
+
+    compile_first()
     return FleetDispatch(
         store,
         missions,

@@ -71,6 +71,9 @@ def build(
         opened = open_world(world) if people else open_world(world).without_people()
         points = None if route is None else _route_points(route)
         mapper = _mapper(opened, out)
+        from executive.cli.kernels import compile_first
+
+        compile_first()
         building = _Building(opened, seed, mapper, points, out, console)
         with cancelled_by_signals(Control(pace=None)) as control:
             ended = building.drive(most_s, lambda: control.poll().cancel is not None)

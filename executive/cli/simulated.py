@@ -131,6 +131,9 @@ def run_simulated(
     listener: Listener | None = None,
 ) -> Finished:
     """Run a request in the plant, as `run_request` does. Raises InputError: the world cannot be used."""
+    from executive.cli.kernels import compile_first
+
+    compile_first()
     request = prepared.request
     backend = SimulatedBackend(
         prepared.world,

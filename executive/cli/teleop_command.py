@@ -65,6 +65,9 @@ def teleop(
         placed = alone(opened, seed=seed, start=None if start is None else Start.of(start))
         if start is not None:
             refuse_blocked(opened, placed.start)
+        from executive.cli.kernels import compile_first
+
+        compile_first()
         simulation = simulate(opened, {robot: placed}, seed=seed, record=False)
         driven, clock = simulation.robots[robot], simulation.clock
         context = context_for(opened, driven, clock, placed.start)

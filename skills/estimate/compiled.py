@@ -15,10 +15,10 @@ FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 def compiled(function: FunctionT) -> FunctionT:
     """Compile at the first call, single-threaded and without reordering of floating point: equal runs stay equal."""
-    return cast(FunctionT, _Compiled(function))
+    return cast(FunctionT, CompiledFunction(function))
 
 
-class _Compiled:
+class CompiledFunction:
     """A function to be compiled. numba is imported at the first call, as that takes half a second."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -26,7 +26,13 @@ class _Compiled:
         self._function = function
 
     def __call__(self, *arguments: Any) -> Any:
+        """The function's result."""
         return self.machine_code(*arguments)
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether it was called, so that numba knows it."""
+        return "machine_code" in self.__dict__
 
     @functools.cached_property
     def machine_code(self) -> Callable[..., Any]:
@@ -35,7 +41,7 @@ class _Compiled:
 
         names = self._function.__globals__
         for name in self._function.__code__.co_names:
-            if isinstance(names.get(name), _Compiled):
+            if isinstance(names.get(name), CompiledFunction):
                 names[name] = names[name].machine_code
         code: Callable[..., Any] = njit(cache=True, nogil=True)(self._function)
         return code

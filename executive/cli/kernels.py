@@ -1,0 +1,145 @@
+"""Compiles the numeric code of drives, scans, arms and maps into numba's cache, by doing a little of each."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+import numpy as np
+import typer
+from numba.core.dispatcher import Dispatcher
+
+from executive.cli.mission_run import run_request
+from executive.cli.output import refusals
+from executive.cli.requests import prepare
+from executive.cli.simulated import SimulatedBackend
+from executive.cli.starts import DEFAULT_KIND, alone
+from executive.cli.worlds import open_world
+from executive.mission.file.model import DEFAULT_WORLD
+from executive.mission.request import Request
+from skills.estimate.compiled import CompiledFunction
+from skills.files.errors import count_text
+from skills.navigate.lattice import search
+
+__all__ = ["compile_first", "compile_kernels", "newly_compiled", "warm_up"]
+
+_MISSION: Final = """
+name: warm up
+steps: [{skill: navigate, with: {x: 5.2, y: 4.5, yaw: 3.1416}}]
+"""
+
+
+@dataclass(frozen=True)
+class _Drive:
+    """A kind of robot that drives, and the components in place of its default ones."""
+
+    kind: str = DEFAULT_KIND
+    stack: str | None = None
+
+
+_DRIVES: Final = (
+    _Drive(),
+    _Drive(stack="{localiser: {use: scan_matching}, costmap: {use: rolling}, controller: {use: mppi}}"),
+    _Drive(kind="fetch"),
+)
+TICK_S: Final = 0.05
+_DRIVEN_S: Final = 2.5
+_SURVEYED_S: Final = 4.0
+
+
+def warm_up() -> None:
+    """Compile the numeric code for this machine, so that the first run begins at once."""
+    begun_s = time.monotonic()
+    with refusals():
+        compile_kernels()
+    typer.echo(f"{count_text(newly_compiled(), 'function')} compiled in {time.monotonic() - begun_s:.0f} s")
+
+
+def compile_first() -> None:
+    """Run `errand warm-up` where nothing was compiled yet, and say so on standard error."""
+    if any(_cache_folder().glob("lattice.search-*.nbi")):
+        return
+    typer.echo("errand: compiles its numeric code for this machine, once; that takes about half a minute", err=True)
+    subprocess.run([sys.executable, "-m", "executive.cli", "warm-up"], stdout=subprocess.DEVNULL, check=False)
+
+
+def newly_compiled() -> int:
+    """How many functions this process compiled that numba's cache did not hold."""
+    modules = [module for name, module in sys.modules.items() if name.startswith(("skills.", "plant."))]
+    values = [value for module in modules for value in vars(module).values()]
+    codes = {id(code): code for code in (getattr(value, "machine_code", value) for value in values if _is_code(value))}
+    return sum(sum(code.stats.cache_misses.values()) for code in codes.values())
+
+
+def _is_code(value: object) -> bool:
+    return isinstance(value, Dispatcher) or (isinstance(value, CompiledFunction) and value.is_compiled)
+
+
+def _cache_folder() -> Path:
+    """Where numba keeps the planner's search."""
+    return Path(search.machine_code.stats.cache_path)  # type: ignore[attr-defined]
+
+
+def compile_kernels() -> None:
+    """Drive a little with each kind of robot and each component, bend an arm, and survey a little.
+
+    Takes some seconds where the cache already holds all of it.
+    """
+    with TemporaryDirectory() as folder:
+        for number, drive in enumerate(_DRIVES):
+            _begin(drive, Path(folder) / str(number))
+    _search()
+    _bend_arm()
+    _survey()
+
+
+def _begin(drive: _Drive, folder: Path) -> None:
+    """Drive for some seconds towards a place, as a mission does."""
+    folder.mkdir()
+    mission, stack = folder / "warm_up.yaml", None
+    mission.write_text(_MISSION, encoding="utf-8")
+    if drive.stack is not None:
+        stack = folder / "stack.yaml"
+        stack.write_text(drive.stack, encoding="utf-8")
+    prepared = prepare(Request(file=mission, out=folder, record=False, time_limit_s=_DRIVEN_S), ask=None)
+    robots = {prepared.mission.robot_name: alone(prepared.world, stack=stack, kind=drive.kind)}
+    run_request(prepared, SimulatedBackend(prepared.world, robots, seed=1, record=False))
+
+
+def _search() -> None:
+    """Compare scans at places where the robot may be, as one does that does not know where it is."""
+    from skills.estimate.grid_map import load_grid_map
+    from skills.estimate.matching import score_poses
+
+    score_poses(load_grid_map(open_world(DEFAULT_WORLD).scan_map_path), np.ones((2, 3)), np.ones((1, 3)))
+
+
+def _bend_arm() -> None:
+    """Solve for the joints of an arm that has seven."""
+    from plant.kinds import robot_kind
+    from skills.arm.kinematics import arm_model
+
+    model = arm_model(robot_kind("fetch").capabilities())
+    model.inverse(model.X_BH(np.full(7, 0.5)))
+
+
+def _survey() -> None:
+    """Begin to make a map, and look for a place in it."""
+    from executive.cli.assembly import simulate
+    from skills.mapping.closures import Window
+    from skills.mapping.mapper import Mapper
+    from skills.mapping.survey import Survey
+
+    world, name = open_world(DEFAULT_WORLD), "Alice"
+    simulation = simulate(world, {name: alone(world)}, seed=1, record=False)
+    robot, clock, mapper = simulation.robots[name], simulation.clock, Mapper(world.start)
+    survey = Survey(robot, robot.acquire_lease("errand warm-up"), mapper, home=world.start)
+    while clock.now() < _SURVEYED_S and not survey.done:
+        clock.advance(TICK_S)
+        survey.tick(clock.now())
+    mapper.find_in(mapper.submaps[0], mapper.keyframes[0].points_F, mapper.pose, Window(0.5, 0.1))

@@ -79,9 +79,9 @@ def test_the_model_loads_in_a_fresh_process(benchmark):
 def test_memory_of_errand_detect(benchmark, files):
     arguments = ["errand", "detect", "--json", *map(str, files)]
     program = (
-        "import sys; from executive.cli.entry import main\n"
+        "import sys; from executive.cli.entry import command_line\n"
         f"sys.argv = {arguments!r}\n"
-        "try: main()\n"
+        "try: command_line()\n"
         "except SystemExit as end: assert not end.code, end.code\n"
         "print([line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')][0])"
     )

@@ -123,9 +123,9 @@ def test_a_missing_model_is_named_with_the_command_that_makes_one(tmp_path):
 def test_neither_the_plant_nor_the_language_is_loaded_for_it(model, tmp_path):
     file = picture(tmp_path / "a.png", HAMMER)
     program = (
-        "import sys; from executive.cli.entry import main\n"
+        "import sys; from executive.cli.entry import command_line\n"
         f"sys.argv = ['errand', 'detect', '--json', '--model', {str(model)!r}, {str(file)!r}]\n"
-        "try: main()\n"
+        "try: command_line()\n"
         "except SystemExit as end: assert not end.code, end.code\n"
         "print(sorted({name.split('.')[0] for name in sys.modules} & {'pydrake', 'spacy', 'plant', 'scipy', 'torch'}))"
     )

@@ -36,9 +36,9 @@ IMPORTS = [
 @pytest.mark.parametrize("asked", [["run", "--wake", "--say", "get a beer"], ["queue", "add", "--wake", "--say=go"]])
 def test_a_missing_wake_phrase_is_refused_before_anything_heavy_is_imported(asked):
     program = (
-        "import sys; from executive.cli.entry import main\n"
+        "import sys; from executive.cli.entry import command_line\n"
         f"sys.argv = ['errand', *{asked!r}]\n"
-        "try: main()\n"
+        "try: command_line()\n"
         "except SystemExit as end: assert end.code == 2, end.code\n"
         f"print(sorted({{name.split('.')[0] for name in sys.modules}} & {HEAVY | {'numpy', 'pydantic', 'rich'}!r}))"
     )
@@ -49,9 +49,9 @@ def test_a_missing_wake_phrase_is_refused_before_anything_heavy_is_imported(aske
 @pytest.mark.parametrize(("arguments", "expected"), IMPORTS)
 def test_a_command_imports_no_heavy_library_that_it_does_not_use(arguments, expected, tmp_path):
     program = (
-        "import sys; from executive.cli.entry import main\n"
+        "import sys; from executive.cli.entry import command_line\n"
         f"sys.argv = ['errand', *{arguments!r}]\n"
-        "try: main()\n"
+        "try: command_line()\n"
         "except SystemExit as end: assert not end.code, end.code\n"
         f"assert not [name for name in sys.modules if name.startswith({TRAINING!r})]\n"
         f"print(*sorted({{name.split('.')[0] for name in sys.modules}} & {HEAVY!r}))"
@@ -62,6 +62,19 @@ def test_a_command_imports_no_heavy_library_that_it_does_not_use(arguments, expe
             [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=environment
         )
     assert set(run.stdout.splitlines()[-1].split()) == expected
+
+
+@pytest.mark.parametrize(("arguments", "code"), [(["--help"], 0), (["parse"], 2)])
+def test_the_process_ends_with_its_exit_status_after_threads_and_exit_handlers(arguments, code):
+    program = (
+        "import atexit, sys, threading; from executive.cli.entry import main\n"
+        f"sys.argv = ['errand', *{arguments!r}]\n"
+        "atexit.register(print, 'handled')\n"
+        "threading.Timer(0.1, print, ['worked']).start()\n"
+        "main()"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (run.returncode, run.stdout.splitlines()[-2:]) == (code, ["worked", "handled"])
 
 
 @pytest.mark.parametrize(

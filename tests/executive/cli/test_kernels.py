@@ -37,9 +37,9 @@ def test_a_mission_after_warming_up_compiles_nothing(tmp_path):
     )
     assert int(warm_up.stdout.split()[0]) > 0
     program = (
-        "import sys; from executive.cli.entry import main\n"
+        "import sys; from executive.cli.entry import command_line\n"
         f"sys.argv = ['errand', 'run', 'fetch_drink', '--no-record', '--quiet', '--out', {str(tmp_path / 'out')!r}]\n"
-        "try: main()\n"
+        "try: command_line()\n"
         "except SystemExit as end: assert not end.code, end.code\n"
         "from executive.cli.kernels import newly_compiled\n"
         "print(newly_compiled())"

@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import combinations
-from typing import TYPE_CHECKING, Final
+from itertools import combinations, groupby
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.api import NO_WORK_COUNTER, WorkCounter
+from skills.arm.clearance import FIXED, Kind, box_gaps, touching
 from skills.arm.kinematics import ArmModel
 from skills.robot import Capabilities, FloatArray
 
 if TYPE_CHECKING:
+    from pydrake.geometry import GeometryId, SceneGraphInspector
     from pydrake.planning import SceneGraphCollisionChecker
 
 AROUND: Final = "around"
 """The name of the body that stands for all boxes."""
 EDGE_STEP_RAD = 0.05
 """How far apart (rad, all joints together) the configurations of a motion are checked."""
-_LINK_RADIUS_M, _PARALLEL = 0.06, 1e-6
-_SCENES_KEPT, _FAR_M = 4, 100.0
+_LINK_RADIUS_M = 0.06
+_Arrays = tuple[NDArray[Any], ...]
+_ALL_OR_NONE: Final = np.zeros(0, dtype=np.bool_)
+"""For `touching`, to which it is the same which shape touches."""
 
 
 @dataclass(frozen=True)
@@ -38,23 +44,19 @@ class Box:
 def gaps_m(box: Box, boxes: Sequence[Box], moves: FloatArray) -> FloatArray:
     """How far (m) a box is at least from each of N others after each of K moves (K, 3): (K, N).
 
-    It is negative where they overlap. All are in one frame. By the fifteen axes that separate boxes (Gottschalk, Lin
-    and Manocha, "OBBTree", 1996).
+    It is negative where they overlap. All are in one frame.
     """
-    if not boxes:
-        return np.empty((len(moves), 0))
-    poses = np.array([other.X_FG.GetAsMatrix34() for other in boxes])
-    own, others = box.X_FG.rotation().matrix().T, np.swapaxes(poses[:, :, :3], 1, 2)  # rows are the sides' directions
-    crossed = np.cross(own[None, :, None, :], others[:, None, :, :]).reshape(-1, 9, 3)
-    lengths = np.linalg.norm(crossed, axis=2, keepdims=True)
-    crossed = np.where(lengths > _PARALLEL, crossed / np.maximum(lengths, _PARALLEL), own[0])
-    axes = np.concatenate([np.broadcast_to(own, others.shape), others, crossed], axis=1)
-    spans = np.abs(axes @ own.T) @ (0.5 * np.array(box.size_m))
-    spans += np.einsum(
-        "nas,ns->na", np.abs(axes @ np.swapaxes(others, 1, 2)), 0.5 * np.array([b.size_m for b in boxes])
-    )
-    apart = np.einsum("nac,nc->na", axes, poses[:, :, 3] - box.X_FG.translation())
-    return np.asarray(np.max(np.abs(apart - np.einsum("nac,kc->kna", axes, moves)) - spans, axis=2))
+    (half, *_), (R, *_), (p, *_) = _as_arrays([box])
+    return np.asarray(box_gaps(half, R, p, np.asarray(moves, dtype=float), *_as_arrays(boxes)))
+
+
+def _as_arrays(boxes: Sequence[Box], X_BF: RigidTransform | None = None) -> _Arrays:
+    """Half extents (N, 3), rotations (N, 3, 3) and middles (N, 3) of boxes in B, F where X_BF is left out."""
+    X_FG = np.array([box.X_FG.GetAsMatrix34() for box in boxes]).reshape(-1, 3, 4)
+    halves_m = 0.5 * np.array([box.size_m for box in boxes]).reshape(-1, 3)
+    X = (X_BF or RigidTransform()).GetAsMatrix34()
+    R_BG, p_BG = X[:, :3] @ X_FG[:, :, :3], X_FG[:, :, 3] @ X[:, :3].T + X[:, 3]
+    return halves_m, np.ascontiguousarray(R_BG), np.ascontiguousarray(p_BG)
 
 
 def box_corners(box: Box) -> FloatArray:
@@ -67,7 +69,9 @@ def box_corners(box: Box) -> FloatArray:
 class ArmScene:
     """The robot standing still with boxes around it, all in the body frame.
 
-    Legs stand at the joint angles given; the gripper's angle and a thing in the hand may change between checks.
+    Legs stand at the joint angles given; the gripper's angle and a thing in the hand may change between checks. Drake
+    checks the robot against itself and what it holds; both are checked against the boxes by `clearance`, where meshes
+    and other shapes of the robot stand in by their oriented bounding boxes.
     """
 
     def __init__(
@@ -80,32 +84,31 @@ class ArmScene:
     ) -> None:
         """`work` counts the checks."""
         self.model, self._work = model, work
-        self._description = _without_visuals(capabilities.description)
-        self._joints_rad = dict(joint_positions_rad)
+        self._capabilities, self._gripper = capabilities, capabilities.gripper
+        fingers = () if self._gripper is None else tuple(self._gripper.finger_positions(0.0))
+        self._robot = _Robot(_without_visuals(capabilities.description), model, fingers)
         self._padding_m, self._opening = padding_m, 0.0
-        self._gripper, self._capabilities = capabilities.gripper, capabilities
-        self._held: tuple[Box, ...] = ()
-        self._built: dict[bytes, _BuiltScene] = {}
-        self._now, self._X_BF = self._with(()), RigidTransform()
+        self._boxes: tuple[Box, ...] = ()
+        self._X_BF = RigidTransform()
+        self._obstacles: _Obstacles | None = None
+        self.set_joints(joint_positions_rad)
 
     def set_boxes(self, boxes: Sequence[Box], X_BF: RigidTransform | None = None) -> None:
-        """Replace the boxes around the robot, given in frame F, the body's own where X_BF is left out.
-
-        Boxes of one of the last few calls are found again at once; only X_BF may differ.
-        """
-        self._now, self._X_BF = self._with(tuple(boxes)), RigidTransform() if X_BF is None else X_BF
-        self._now.place(self._X_BF)
+        """Replace the boxes around the robot, given in frame F, the body's own where X_BF is left out."""
+        self._boxes, self._X_BF = tuple(boxes), RigidTransform() if X_BF is None else X_BF
+        self._obstacles = None
 
     @contextmanager
     def with_only(self, boxes: Sequence[Box], opening: float) -> Iterator[None]:
         """For a while other boxes (frame B) stand around, and the gripper is open so far."""
-        before, X_BF, opening_before_rad = self._now, self._X_BF, self._opening
+        before, X_BF, opening_before = self._boxes, self._X_BF, self._opening
         self.set_boxes(boxes)
-        self._opening = opening
+        self.set_opening(opening)
         try:
             yield
         finally:
-            self._now, self._X_BF, self._opening = before, X_BF, opening_before_rad
+            self.set_boxes(before, X_BF)
+            self.set_opening(opening_before)
 
     def beyond_body_m(self, q_rad: FloatArray) -> tuple[float, float]:
         """How far the arm sticks out of the body's footprint ahead and to a side (m); 0 where it does not."""
@@ -116,42 +119,35 @@ class ArmScene:
 
     def hold(self, boxes: Sequence[Box]) -> None:
         """Replace the boxes fixed to the hand (frame H), for a thing held."""
-        self._held = tuple(boxes)
+        self._robot.hold(tuple(boxes))
+        self._obstacles = None
 
     def set_opening(self, opening: float) -> None:
         """Opening of the gripper in later checks, 0 closed."""
         self._opening = opening
+        self._obstacles = None
 
     def set_joints(self, joint_positions: Mapping[str, float]) -> None:
         """Where the robot's other joints are in later checks: legs, lift, head."""
-        self._joints_rad = dict(joint_positions)
-        for built in self._built.values():
-            built.set_joints(self._joints_rad)
+        self._turn_joints(dict(joint_positions))
+        self._robot.allow_stowed_contacts()
+
+    def _turn_joints(self, joint_positions: dict[str, float]) -> None:
+        self._joints_rad = joint_positions
+        self._robot.set_joints(joint_positions)
+        self._obstacles = None
 
     def set_padding(self, padding_m: float) -> None:
         """Distance that the robot keeps from boxes in later checks."""
         self._padding_m = padding_m
-
-    def _with(self, boxes: tuple[Box, ...]) -> _BuiltScene:
-        """The scene with these boxes, the one built before where it is still kept."""
-        key = b"".join(box.X_FG.GetAsMatrix34().tobytes() + np.array(box.size_m).tobytes() for box in boxes)
-        fingers = () if self._gripper is None else tuple(self._gripper.finger_positions(0.0))
-        built = self._built.pop(key, None)
-        built = built or _BuiltScene(self._description, self.model, boxes, self._joints_rad, fingers)
-        self._built[key] = built
-        if len(self._built) > _SCENES_KEPT:
-            del self._built[next(iter(self._built))]
-        return built
-
-    @property
-    def _checker(self) -> SceneGraphCollisionChecker:
-        """The checker of the present boxes, with the present padding and thing held."""
-        return self._now.checker(self._padding_m, self._held)
+        self._obstacles = None
 
     def free(self, q_rad: FloatArray) -> bool:
         """Whether arm angles q_rad (J,) collide with nothing."""
         self._work.count("arm_configuration_checks")
-        return bool(self._checker.CheckConfigCollisionFree(self._full(q_rad)))
+        if self._around().meet(np.asarray(q_rad, dtype=float)[None]):
+            return False
+        return bool(self._robot.checker.CheckConfigCollisionFree(self._full(q_rad)))
 
     def free_as_usual(self, q_rad: FloatArray) -> bool:
         """Whether arm angles q_rad (J,) collide with nothing once a torso on a lift is at its usual height again.
@@ -161,20 +157,23 @@ class ArmScene:
         lift, usual_m = self._capabilities.lift_joint, self._capabilities.standing_height_m
         if lift is None:
             return True
-        before = self._joints_rad
+        boxes, X_BF, joints = self._boxes, self._X_BF, self._joints_rad
         usual = usual_m - self._capabilities.height_range_m[0]
         try:
-            self._now.place(RigidTransform([0.0, 0.0, before.get(lift, usual) - usual]) @ self._X_BF)
-            self._now.set_joints({**before, lift: usual})
+            self.set_boxes(boxes, RigidTransform([0.0, 0.0, joints.get(lift, usual) - usual]) @ X_BF)
+            self._turn_joints({**joints, lift: usual})
             return self.free(q_rad)
         finally:
-            self._now.place(self._X_BF)
-            self._now.set_joints(before)
+            self.set_boxes(boxes, X_BF)
+            self._turn_joints(joints)
 
     def edge_free(self, q_from_rad: FloatArray, q_to_rad: FloatArray) -> bool:
         """Whether the straight joint motion between two configurations collides with nothing."""
         self._work.count("arm_edge_checks")
-        return bool(self._checker.CheckEdgeCollisionFree(self._full(q_from_rad), self._full(q_to_rad)))
+        steps = max(1, math.ceil(float(np.linalg.norm(q_to_rad - q_from_rad)) / EDGE_STEP_RAD))
+        if self._around().meet(np.linspace(q_from_rad, q_to_rad, steps + 1)):
+            return False
+        return bool(self._robot.checker.CheckEdgeCollisionFree(self._full(q_from_rad), self._full(q_to_rad)))
 
     def path_free(self, path_rad: FloatArray) -> bool:
         """Whether every configuration of a dense path (K, J) is free."""
@@ -182,79 +181,143 @@ class ArmScene:
 
     def gravity_efforts(self, q_rad: FloatArray) -> FloatArray:
         """Efforts (J,), N m, with which the arm holds its own weight at angles q_rad (J,), the body level."""
-        checker = self._checker
-        context = checker.UpdatePositions(self._full(q_rad))
-        held: FloatArray = -checker.plant().CalcGravityGeneralizedForces(context)[self._now.arm_velocities]
+        context = self._robot.checker.UpdatePositions(self._full(q_rad))
+        held: FloatArray = -self._robot.plant.CalcGravityGeneralizedForces(context)[self._robot.arm_velocities]
         return held
 
     def contacts(self, q_rad: FloatArray) -> tuple[tuple[str, str], ...]:
         """Names of the links that touch or come closer than the padding, for messages; boxes are `AROUND`."""
-        return _contacts(self._checker, self._full(q_rad))
+        links = self._around().touched(np.asarray(q_rad, dtype=float))
+        return *_contacts(self._robot.checker, self._full(q_rad)), *((link, AROUND) for link in links)
+
+    def _around(self) -> _Obstacles:
+        """The boxes and the robot's shapes as they are now."""
+        if self._obstacles is None:
+            shapes = self._robot.shapes(self._full(np.zeros(len(self.model.joints))))
+            self._obstacles = _Obstacles(self.model, shapes, _as_arrays(self._boxes, self._X_BF), self._padding_m)
+        return self._obstacles
 
     def _full(self, q_rad: FloatArray) -> FloatArray:
         fingers = {} if self._gripper is None else self._gripper.finger_positions(self._opening)
-        return self._now.positions(q_rad, fingers)
+        return self._robot.positions(q_rad, fingers)
 
 
-class _BuiltScene:
-    """Drake's collision checker with the robot welded by its body and all boxes on one floating body.
+@dataclass(frozen=True)
+class _Shape:
+    """A collision shape of the robot: the link that bears it, and the arm joint that moves it, `FIXED` for none.
 
-    Boxes are part of the model from the start: shapes that are added to a checker later cost 10 ms each.
+    X_LS is its frame in the link of that joint, the body for `FIXED`.
     """
+
+    link: str
+    joint: int
+    kind: Kind
+    half_m: tuple[float, float, float]
+    X_LS: RigidTransform
+
+    @property
+    def radius_m(self) -> float:
+        """Of a sphere about it."""
+        radius, other, length = self.half_m
+        if self.kind is Kind.BOX:
+            return math.hypot(radius, other, length)
+        return math.hypot(radius, length) if self.kind is Kind.CYLINDER else radius + length
+
+
+class _Obstacles:
+    """Boxes around the arm and the robot's shapes, as arrays."""
 
     def __init__(
         self,
-        description: str,
         model: ArmModel,
-        boxes: tuple[Box, ...],
-        joint_positions_rad: Mapping[str, float],
-        fingers: Sequence[str] = (),
+        shapes: Sequence[_Shape],
+        boxes: _Arrays,
+        padding_m: float,
     ) -> None:
-        from pydrake.geometry import Box as BoxShape
+        """`boxes` are half extents (N, 3), rotations (N, 3, 3) and middles (N, 3) in the body frame."""
+        X_PF = np.array([joint.X_PF.GetAsMatrix34() for joint in model.joints])
+        axes = np.array([joint.axis for joint in model.joints], dtype=float)
+        self._padding_m, self._boxes = padding_m, boxes
+        self._chain = axes, np.ascontiguousarray(X_PF[:, :, :3]), np.ascontiguousarray(X_PF[:, :, 3])
+        self._moved = [shape for shape in shapes if shape.joint != FIXED]
+        self._fixed = [shape for shape in shapes if shape.joint == FIXED]
+        self._moved_rows = _rows(self._moved)
+        self._any_fixed = self._touch(_ALL_OR_NONE, np.zeros((1, len(axes))), _rows(self._fixed))
+
+    def meet(self, path_rad: FloatArray) -> bool:
+        """Whether the robot comes within the padding of a box, the arm in any of the configurations (K, J)."""
+        return self._any_fixed or self._touch(_ALL_OR_NONE, path_rad, self._moved_rows)
+
+    def touched(self, q_rad: FloatArray) -> list[str]:
+        """The links that come within the padding of a box, the arm at q_rad (J,)."""
+        links: dict[str, None] = {}
+        for shapes in (self._fixed, self._moved):
+            found = np.zeros(len(shapes), dtype=np.bool_)
+            self._touch(found, q_rad[None], _rows(shapes))
+            links.update((shapes[number].link, None) for number in np.flatnonzero(found))
+        return list(links)
+
+    def _touch(self, found: NDArray[np.bool_], path_rad: FloatArray, rows: _Arrays) -> bool:
+        path_rad = np.ascontiguousarray(path_rad, dtype=float)
+        return bool(touching(found, self._padding_m, path_rad, *self._chain, *rows, *self._boxes))
+
+
+def _rows(shapes: Sequence[_Shape]) -> _Arrays:
+    """Shapes, those of one joint together, as `touching` takes them: groups first."""
+    joints, ends, spheres = [], [], []
+    X_LS = np.array([shape.X_LS.GetAsMatrix34() for shape in shapes]).reshape(-1, 3, 4)
+    radii_m = np.array([shape.radius_m for shape in shapes])
+    for joint, members in groupby(range(len(shapes)), lambda number: shapes[number].joint):
+        numbers = [*members]
+        middle = X_LS[numbers, :, 3].mean(axis=0)
+        joints.append(joint)
+        ends.append(numbers[-1] + 1)
+        spheres.append([*middle, np.max(np.linalg.norm(X_LS[numbers, :, 3] - middle, axis=1) + radii_m[numbers])])
+    return (
+        np.array(joints, dtype=np.int64),
+        np.array(ends, dtype=np.int64),
+        np.array(spheres).reshape(-1, 4),
+        radii_m,
+        np.array([shape.kind for shape in shapes], dtype=np.int64),
+        np.array([shape.half_m for shape in shapes]).reshape(-1, 3),
+        np.ascontiguousarray(X_LS[:, :, :3]),
+        np.ascontiguousarray(X_LS[:, :, 3]),
+    )
+
+
+class _Robot:
+    """Drake's collision checker of the robot alone, welded by its body, and its shapes."""
+
+    def __init__(self, description: str, model: ArmModel, fingers: Sequence[str]) -> None:
         from pydrake.multibody.parsing import Parser
-        from pydrake.multibody.plant import CoulombFriction
-        from pydrake.multibody.tree import SpatialInertia
         from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
 
         builder = RobotDiagramBuilder()
-        plant = builder.plant()
+        self.plant = plant = builder.plant()
         (robot,) = Parser(plant).AddModelsFromString(description, "urdf")
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("body", robot))
-        around = plant.AddRigidBody(
-            AROUND, plant.AddModelInstance(AROUND), SpatialInertia.SolidSphereWithMass(1.0, 1.0)
-        )
-        for number, box in enumerate(boxes):
-            friction = CoulombFriction(1.0, 1.0)
-            plant.RegisterCollisionGeometry(around, box.X_FG, BoxShape(*box.size_m), f"box_{number}", friction)
         plant.Finalize()
         self._model, self._instance = model, plant.GetModelInstanceName(robot)
-        self._checker = SceneGraphCollisionChecker(
+        self.checker = SceneGraphCollisionChecker(
             model=builder.Build(), robot_model_instances=[robot], edge_step_size=EDGE_STEP_RAD
         )
-        self._padding_m: float | None = None
         self._held: tuple[Box, ...] = ()
         self._q = np.array(plant.GetPositions(plant.CreateDefaultContext()))
         joints = {plant.get_joint(index).name(): plant.get_joint(index) for index in plant.GetJointIndices(robot)}
         self._arm = np.array([joints[name].position_start() for name in model.names])
         self.arm_velocities = np.array([joints[name].velocity_start() for name in model.names])
         self._positions = {name: joint.position_start() for name, joint in joints.items() if joint.num_positions() == 1}
-        self.set_joints(joint_positions_rad)
-        self._around = around.floating_positions_start()
-        self.place(RigidTransform([0.0, 0.0, _FAR_M]))
-        self._allow_stowed_contacts()
-        for one, other in combinations([joints[name].child_body() for name in fingers], 2):  # they meet when they close
-            self._checker.SetCollisionFilteredBetween(one, other, True)
-        self.place(RigidTransform())
+        moved = [plant.GetBodiesKinematicallyAffectedBy([joints[name].index()]) for name in model.names]
+        self._links = [(plant.get_body(i), sum(i in each for each in moved) - 1) for i in plant.GetBodyIndices(robot)]
+        standing = [body for body, joint in self._links if joint == FIXED]  # how legs stand, the arm does not change
+        closing = [joints[name].child_body() for name in fingers]  # fingers meet when they close
+        for one, other in (*combinations(standing, 2), *combinations(closing, 2)):
+            self.checker.SetCollisionFilteredBetween(one, other, True)
 
     def set_joints(self, joint_positions: Mapping[str, float]) -> None:
         """Where all joints are that are not given with each check; 0 where nothing is said."""
         for name, start in self._positions.items():
             self._q[start] = joint_positions.get(name, 0.0)
-
-    def place(self, X_BF: RigidTransform) -> None:
-        """Put the boxes' frame F there."""
-        quaternion = X_BF.rotation().ToQuaternion().wxyz()
-        self._q[self._around : self._around + 7] = [*quaternion, *X_BF.translation()]
 
     def positions(self, q_rad: FloatArray, fingers: Mapping[str, float]) -> FloatArray:
         """All positions of the model with the arm at q_rad (J,) and the gripper's joints there, by name."""
@@ -264,27 +327,65 @@ class _BuiltScene:
             q[self._positions[name]] = position
         return q
 
-    def checker(self, padding_m: float, held: tuple[Box, ...]) -> SceneGraphCollisionChecker:
-        """The checker with a padding to the boxes (m) and a thing in the hand (frame H)."""
+    def hold(self, boxes: tuple[Box, ...]) -> None:
+        """Put boxes into the hand (frame H) instead of those of before."""
         from pydrake.geometry import Box as BoxShape
         from pydrake.planning import BodyShapeDescription
 
-        if held != self._held:
-            self._checker.RemoveAllAddedCollisionShapes("held")
-            for box in held:
+        if boxes != self._held:
+            self.checker.RemoveAllAddedCollisionShapes("held")
+            for box in boxes:
                 shape = BodyShapeDescription(BoxShape(*box.size_m), box.X_FG, self._instance, self._model.hand_link)
-                self._checker.AddCollisionShape("held", shape)
-            self._held = held
-        if padding_m != self._padding_m:
-            self._checker.SetPaddingAllRobotEnvironmentPairs(padding_m)
-            self._padding_m = padding_m
-        return self._checker
+                self.checker.AddCollisionShape("held", shape)
+            self._held = boxes
 
-    def _allow_stowed_contacts(self) -> None:
-        """Links that touch when the arm is stowed may touch: resting there is what stowing means."""
-        for a, b in _contacts(self._checker, self.positions(self._model.stowed_rad, {})):
-            plant = self._checker.plant()
-            self._checker.SetCollisionFilteredBetween(plant.GetBodyByName(a), plant.GetBodyByName(b), True)
+    def shapes(self, positions: FloatArray) -> list[_Shape]:
+        """All shapes and what is held, by the joints that move them; `positions` are those of the whole model."""
+        plant, inspector = self.plant, self.checker.model().scene_graph().model_inspector()
+        context = self.checker.UpdatePositions(positions)
+        chain = [plant.GetBodyByName(joint.child) for joint in self._model.joints]
+        X_BL = [*(plant.EvalBodyPoseInWorld(context, link) for link in chain), RigidTransform()]  # of `FIXED` the last
+        shapes = []
+        for body, joint in self._links:
+            X_LK = X_BL[joint].inverse() @ plant.EvalBodyPoseInWorld(context, body)
+            for geometry in plant.GetCollisionGeometriesForBody(body):
+                kind, half_m, X_KS = _measured(inspector, geometry)
+                shapes.append(_Shape(body.name(), joint, kind, half_m, X_LK @ X_KS))
+        for box in self._held:
+            x, y, z = box.size_m
+            half_m = 0.5 * x, 0.5 * y, 0.5 * z
+            shapes.append(_Shape(self._model.hand_link, len(chain) - 1, Kind.BOX, half_m, box.X_FG))
+        return sorted(shapes, key=lambda shape: shape.joint)
+
+    def allow_stowed_contacts(self) -> None:
+        """Allow the contacts that there are when the arm is stowed: resting there is what stowing means."""
+        for a, b in _contacts(self.checker, self.positions(self._model.stowed_rad, {})):
+            one, other = self.plant.GetBodyByName(a), self.plant.GetBodyByName(b)
+            self.checker.SetCollisionFilteredBetween(one, other, True)
+
+
+def _measured(
+    inspector: SceneGraphInspector, geometry: GeometryId
+) -> tuple[Kind, tuple[float, float, float], RigidTransform]:
+    """Kind, half extents (m) and pose in its link of a collision shape; of other kinds its oriented bounding box."""
+    from pydrake.geometry import Box as BoxShape
+    from pydrake.geometry import Capsule, Cylinder, Sphere
+
+    shape, X_KS = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
+    match shape:
+        case Sphere():
+            return Kind.SPHERE, (shape.radius(), shape.radius(), 0.0), X_KS
+        case Capsule():
+            return Kind.CAPSULE, (shape.radius(), shape.radius(), 0.5 * shape.length()), X_KS
+        case Cylinder():
+            return Kind.CYLINDER, (shape.radius(), shape.radius(), 0.5 * shape.length()), X_KS
+        case BoxShape():
+            return Kind.BOX, (0.5 * shape.width(), 0.5 * shape.depth(), 0.5 * shape.height()), X_KS
+    around = inspector.GetObbInGeometryFrame(geometry)
+    if around is None:
+        raise ValueError(f"link {inspector.GetName(geometry)}: a collision shape without end cannot be checked")
+    x, y, z = around.half_width()
+    return Kind.BOX, (float(x), float(y), float(z)), X_KS @ around.pose()
 
 
 def _contacts(checker: SceneGraphCollisionChecker, q_rad: FloatArray) -> tuple[tuple[str, str], ...]:

@@ -85,7 +85,7 @@ def followed(page):
     return pytest.param(page, marks=marks, id=page.stem)
 
 
-@pytest.mark.parametrize("page", map(followed, PAGES))
+@pytest.mark.parametrize("page", [followed(page) for page in PAGES])
 def test_a_tutorial_does_what_it_says(page, tmp_path):
     reader = Reader(tmp_path)
     for block in blocks(page):

@@ -54,7 +54,11 @@ DECIDING = {
 """The missions that decide, repeat, wait and speak: the seed, and what the robot says last."""
 
 
-@pytest.mark.parametrize("name", DECIDING)
+KEPT = "patrol_and_report"
+"""The one that stands for all in `make test`: it goes round, looks, counts and says what it found."""
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[NIGHTLY] * (name != KEPT)) for name in DECIDING])
 def test_what_it_decides_is_right_and_it_says_so(name, tmp_path):
     seed, said = DECIDING[name]
     file = MISSIONS / f"{name}.yaml"

@@ -53,8 +53,14 @@ def case_of(name):
     return SuiteCase(SKILLS[name], file.inputs(n, SKILLS[name]), make, samples=4)
 
 
+LONG = ("approach", "grasp", "hand_over")
+"""Those of `place` are like them: it drives, looks, and moves the arm and the gripper."""
+
+
 @pytest.mark.parametrize("part", sorted(PARTS))
-@pytest.mark.parametrize("name", sorted(SKILLS))
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.nightly] * (name in LONG)) for name in sorted(SKILLS)]
+)
 def test_the_suite_of_every_skill(name, part):
     """With half of the samples that Spot's own suites take: it is the robot that is new here."""
     assert list(PARTS[part](case_of(name))) == []

@@ -265,7 +265,9 @@ def test_things_stay_where_the_seed_put_them(world: World, furnished: tuple[Diag
         assert moved[2] == pytest.approx(-0.001, abs=5e-4)
 
 
-def test_committed_world_is_what_the_builder_writes(world: World, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.nightly] * (name != "flat")) for name in PLANS])
+def test_committed_world_is_what_the_builder_writes(name: str, tmp_path: Path) -> None:
+    world = load_world(name)
     build(load_plan(world.name), tmp_path, f"{PACKAGE_NAME}/worlds/{world.name}")
     written = [p for p in tmp_path.rglob("*") if p.suffix in (".sdf", ".obj", ".mtl", ".yaml", ".pgm")]
     assert len(written) > 3 * len(load_plan(world.name).furniture)

@@ -195,10 +195,14 @@ def _ticks(robot, skill):
         assert robot.now() < 60.0
 
 
-def test_cancelled_at_any_tick_nothing_is_under_way():
+TICKS = pytest.mark.parametrize("every", [13, pytest.param(3, marks=pytest.mark.nightly)])
+
+
+@TICKS
+def test_cancelled_at_any_tick_nothing_is_under_way(every):
     whole = _before_robin()
     count = sum(1 for _ in _ticks(whole, HandOver(context_of(whole))))
-    for end in range(1, count + 1, 3):
+    for end in range(1, count + 1, every):
         robot = _before_robin()
         operator = _Operator(robot, "hold on", at_s=math.inf)
         skill = HandOver(replace(context_of(robot), ask=operator))
@@ -209,10 +213,11 @@ def test_cancelled_at_any_tick_nothing_is_under_way():
         assert operator.withdrawn or operator.question is None
 
 
-def test_paused_at_any_tick_it_goes_on_and_gives_it():
+@TICKS
+def test_paused_at_any_tick_it_goes_on_and_gives_it(every):
     whole = _before_robin()
     count = sum(1 for _ in _ticks(whole, HandOver(context_of(whole))))
-    for pause in range(1, count + 1, 3):
+    for pause in range(1, count + 1, every):
         robot = _before_robin()
         skill = HandOver(context_of(robot))
         next(tick for tick in _ticks(robot, skill) if tick == pause)

@@ -1,6 +1,7 @@
 """Loose objects at rest sleep: they float where they are, without weight and contacts, until something comes near.
 
-A sleeping object costs the solver nothing. It wakes when a link, or an object that moves, is about to reach it; when it
+A sleeping object costs the solver nothing, and the search for contacts neither, as its shapes have no proximity role.
+It wakes when a link, or an object that moves, is about to reach it; when it
 is put elsewhere; and when an object beside it wakes, on which it may lie. A person's tray, which only what a hand holds
 can come to lie on, wakes nothing. All this is read off positions, so the same
 run sleeps and wakes at the same times. Joints are not locked for this: beside a locked joint, Drake's SAP
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraphInspector
+from pydrake.geometry import GeometryId, ProximityProperties, Role, SceneGraphInspector
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex, RigidBody
 from pydrake.systems.framework import Context
@@ -45,11 +46,11 @@ class SleepLimits:
 
 @dataclass(frozen=True)
 class _Object:
-    """A loose object of one body, its collision shapes, and where it stands in the plant's velocities."""
+    """A loose object of one body, its collision shapes with what they are like, and its place in the velocities."""
 
     name: str
     body: RigidBody
-    shapes: GeometrySet
+    shapes: Mapping[GeometryId, ProximityProperties]
     velocities: slice
 
 
@@ -79,10 +80,9 @@ class Sleepers:
         plant, inspector = world.plant, world.scene_graph.model_inspector()
         self._plant, self._limits = plant, limits or SleepLimits()
         self._context = plant.GetMyMutableContextFromRoot(root_context)
-        geometry_context = world.scene_graph.GetMyMutableContextFromRoot(root_context)
-        self._filters = world.scene_graph.collision_filter_manager(geometry_context)
-        self._all_shapes = GeometrySet([*_all_shapes(plant)])
-        self._objects = tuple(_objects(plant, world.models))
+        self._scene_graph = world.scene_graph
+        self._geometry_context = world.scene_graph.GetMyMutableContextFromRoot(root_context)
+        self._objects = tuple(_objects(plant, inspector, world.models))
         passed_over = {int(body.index()) for body in (*(each.body for each in self._objects), *world.trays.values())}
         others = [body for body in _moving_bodies(plant) if int(body.index()) not in passed_over]
         self._links = _Spheres(plant, inspector, others)
@@ -150,12 +150,15 @@ class Sleepers:
 
     def _turn(self, number: int) -> None:
         """Wake a sleeper, or put to sleep who is awake."""
-        each, filtering, plant = self._objects[number], CollisionFilterDeclaration(), self._plant
+        each, graph, plant = self._objects[number], self._scene_graph, self._plant
+        source = plant.get_source_id()
         if self._asleep[number]:
-            self._filters.Apply(filtering.AllowBetween(each.shapes, self._all_shapes))
+            for shape, properties in each.shapes.items():
+                graph.AssignRole(self._geometry_context, source, shape, properties)
             self._lift[each.velocities] = 0.0
         else:
-            self._filters.Apply(filtering.ExcludeBetween(each.shapes, self._all_shapes))
+            for shape in each.shapes:
+                graph.RemoveRole(self._geometry_context, source, shape, Role.kProximity)
             self._lift[each.velocities] = -plant.CalcGravityGeneralizedForces(self._context)[each.velocities]
             velocities = plant.GetVelocities(self._context)
             velocities[each.velocities] = 0.0
@@ -164,12 +167,15 @@ class Sleepers:
         self._asleep[number] = not self._asleep[number]
 
 
-def _objects(plant: MultibodyPlant, models: Mapping[str, ModelInstanceIndex]) -> Iterator[_Object]:
+def _objects(
+    plant: MultibodyPlant, inspector: SceneGraphInspector, models: Mapping[str, ModelInstanceIndex]
+) -> Iterator[_Object]:
     """The loose objects of one body each; models with parts that move against each other stay awake."""
     for name, instance in models.items():
         bodies = [plant.get_body(index) for index in plant.GetBodyIndices(instance)]
         if len(bodies) == 1 and bodies[0].is_floating_base_body():
-            shapes = GeometrySet(plant.GetCollisionGeometriesForBody(bodies[0]))
+            found = plant.GetCollisionGeometriesForBody(bodies[0])
+            shapes = {shape: inspector.GetProximityProperties(shape) for shape in found}
             start = bodies[0].floating_velocities_start_in_v()
             yield _Object(name, bodies[0], shapes, slice(start, start + 6))
 
@@ -177,11 +183,6 @@ def _objects(plant: MultibodyPlant, models: Mapping[str, ModelInstanceIndex]) ->
 def _slides(body: RigidBody, models: Mapping[str, ModelInstanceIndex]) -> bool:
     """Whether a moving body is a model of its own that is not loose: a person who walks."""
     return body.model_instance() in models.values() and not body.is_floating_base_body()
-
-
-def _all_shapes(plant: MultibodyPlant) -> Iterator[GeometryId]:
-    for index in range(plant.num_bodies()):
-        yield from plant.GetCollisionGeometriesForBody(plant.get_body(BodyIndex(index)))
 
 
 def _moving_bodies(plant: MultibodyPlant) -> Iterator[RigidBody]:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Protocol
 
@@ -18,7 +18,7 @@ from pydrake.systems.framework import Context
 from plant.scene import Scene
 from plant.snapshot.values import State
 from skills.files.errors import InputError
-from skills.files.plugins import PluginDefect, distribution_of, run_plugin
+from skills.files.plugins import PluginDefect, distribution_of, installed_plugins, run_plugin
 from skills.robot import Capabilities, Pose2D, Robot
 
 GROUP = "errand.robots"
@@ -122,7 +122,7 @@ class RobotKind:
 @cache
 def robot_kinds() -> Mapping[str, EntryPoint]:
     """The kinds that are installed, by name. The modules of each are loaded when it is first used."""
-    return {entry.name: entry for entry in sorted(entry_points(group=GROUP))}
+    return {entry.name: entry for entry in sorted(installed_plugins(GROUP))}
 
 
 @cache

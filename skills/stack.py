@@ -11,14 +11,14 @@ import dataclasses
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Protocol, get_type_hints
 
 import numpy as np
 
-from skills.files.plugins import OURS, PluginDefect, distribution_of, run_plugin
+from skills.files.plugins import OURS, PluginDefect, distribution_of, installed_plugins, run_plugin
 from skills.files.schema_errors import first_error, nearest_of
 from skills.quantities import shown
 from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Pose2D
@@ -254,21 +254,15 @@ def components(slot: str) -> Mapping[str, type]:
     return MappingProxyType({name: _loaded(slot, name, SLOTS[slot]) for name in _names(slot)})
 
 
-@cache
-def _installed(group: str) -> EntryPoints:
-    """The entry points of a group, read once: each reading opens the files of all distributions."""
-    return entry_points(group=group)
-
-
 def _names(slot: str) -> list[str]:
     first = _default_data()[slot][USE]
-    names = {entry.name for entry in _installed(SLOTS[slot])}
+    names = {entry.name for entry in installed_plugins(SLOTS[slot])}
     return sorted(names, key=lambda name: (name != first, name))
 
 
 @cache
 def _loaded(slot: str, name: str, group: str) -> type:
-    entry = max(_installed(group).select(name=name), key=_is_ours)
+    entry = max(installed_plugins(group).select(name=name), key=_is_ours)
     try:
         component: type = run_plugin(entry, entry.load)
     except PluginDefect as defect:
@@ -286,14 +280,14 @@ def _is_ours(entry: EntryPoint) -> bool:
 
 def skill_options() -> Mapping[str, type]:
     """The options class of each installed skill that has one and can be loaded."""
-    found = {name: _options_of(name) for name in sorted({entry.name for entry in _installed(SKILL_GROUP)})}
+    found = {name: _options_of(name) for name in sorted({entry.name for entry in installed_plugins(SKILL_GROUP)})}
     return MappingProxyType({name: kind for name, kind in found.items() if kind is not None})
 
 
 @cache
 def _options_of(name: str) -> type | None:
     """The options class of an installed skill; None where it has none or cannot be loaded."""
-    entry = max(_installed(SKILL_GROUP).select(name=name), key=_is_ours)
+    entry = max(installed_plugins(SKILL_GROUP).select(name=name), key=_is_ours)
     try:
         kind = getattr(run_plugin(entry, entry.load), "Options", None)
     except PluginDefect:
@@ -305,7 +299,7 @@ def _options_of(name: str) -> type | None:
 
 def _options(name: str, given: Any) -> Any:
     """The options that a stack gives to a skill. Raises StackError: there are none, or it cannot be loaded."""
-    entries = _installed(SKILL_GROUP).select(name=name)
+    entries = installed_plugins(SKILL_GROUP).select(name=name)
     kind = _options_of(name) if entries else None
     if kind is None:
         _known((SKILLS,), {name: given}, sorted(skill_options()))

@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.models.catalogue import ModelClass, ModelForm, load_catalogue
 from plant.worlds.route import Route, route_of
-from plant.worlds.world import Lengths, ObjectRule, PersonRule, Point, Polygon, SurfaceTop, World, WorldError
+from plant.worlds.world import Lengths, ObjectRule, PersonRule, Point, SurfaceTop, World, WorldError
 from skills.robot import FloatArray
 
 ATTEMPTS = 500
@@ -106,13 +106,14 @@ def place_one(
     """A free pose for one thing of a class and form, and its outline there. Raises WorldError: there is none."""
     rules, (class_name, form) = world.seed_rules.rules, model
     first = int(rng.integers(len(rule.surfaces)))
-    obstacles = [*others, *(np.array(polygon) for polygon in world.seed_rules.keep_clear)]
+    obstacles = np.array([shapely.Polygon(each) for each in (*others, *world.seed_rules.keep_clear)], dtype=np.object_)
     for name in (*rule.surfaces[first:], *rule.surfaces[:first]):
         surface = world.surfaces[name]
+        top = shapely.Polygon(surface.polygon_W).buffer(-rules.rim_m)
         for centre, yaw in candidates(world, surface, rng):
             outline = outline_W(form, centre, yaw)
-            inside = _inside(outline, surface.polygon_W, rules.rim_m)
-            if inside and all(polygon_distance(outline, other) >= rules.clear_m for other in obstacles):
+            covered = shapely.Polygon(outline)
+            if top.covers(covered) and bool(np.all(shapely.distance(covered, obstacles) >= rules.clear_m)):
                 z = surface.height_m + form.rest_height_m + rules.drop_m
                 X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([*centre, z], dtype=np.float64))
                 return Placement(rule.name, class_name, form, X_WO, name), outline
@@ -190,11 +191,6 @@ def outline_W(form: ModelForm, centre: Point, yaw_rad: float) -> FloatArray:
         corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * half
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
     return np.asarray(corners @ np.array([[c, s], [-s, c]]) + np.array(centre))
-
-
-def _inside(outline: FloatArray, polygon: Polygon, rim_m: float) -> bool:
-    """True when a convex polygon holds all corners at least rim_m from its edges."""
-    return bool(shapely.Polygon(polygon).buffer(-rim_m).covers(shapely.Polygon(outline)))
 
 
 def polygon_distance(a: FloatArray, b: FloatArray) -> float:

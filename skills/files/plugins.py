@@ -8,10 +8,11 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
-from importlib.metadata import EntryPoint
+from functools import cache
+from importlib.metadata import EntryPoint, EntryPoints, SelectableGroups, entry_points
 from typing import Final, TypeVar
 
-__all__ = ["LIMIT_S", "OURS", "PluginDefect", "distribution_of", "run_in_thread", "run_plugin"]
+__all__ = ["LIMIT_S", "OURS", "PluginDefect", "distribution_of", "installed_plugins", "run_in_thread", "run_plugin"]
 
 OURS: Final = "spot-errand"
 """The distribution of this project, whose modules need no time limit."""
@@ -29,6 +30,16 @@ class PluginDefect(Exception):  # noqa: N818
 def distribution_of(entry: EntryPoint) -> str:
     """The distribution that registers an entry point."""
     return "an unknown distribution" if entry.dist is None else entry.dist.name
+
+
+def installed_plugins(group: str) -> EntryPoints:
+    """The entry points of a group. They are read once: each reading opens the files of all distributions."""
+    return _all_installed().select(group=group)
+
+
+@cache
+def _all_installed() -> SelectableGroups:
+    return entry_points()
 
 
 def run_plugin(entry: EntryPoint, call: Callable[[], ResultT], *, limit_s: float = LIMIT_S) -> ResultT:

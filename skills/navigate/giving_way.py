@@ -104,6 +104,8 @@ class WithBodies:
 
 def with_bodies(costmap: Costmap, swept: Sequence[tuple[FloatArray, FloatArray]], larger_m: float = 0.0) -> Costmap:
     """The costmap with outlines (discs), larger_m wider to all sides, at poses (N, 3)."""
+    if not swept:
+        return costmap
     from scipy.spatial import cKDTree
 
     for discs, poses in swept:

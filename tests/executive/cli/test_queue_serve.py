@@ -10,8 +10,10 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
+from typer.testing import CliRunner
 
 from executive.cli import queue_serve
+from executive.cli.entry import app
 from executive.cli.queue_serve import MOST_STARTS, Ended, MissionRunner, QueueServer
 from executive.mission.request import Request
 from executive.run.journal import TickNote
@@ -307,10 +309,10 @@ class TestMissionRunner:
 
 @pytest.mark.mission
 def test_a_server_of_its_own_runs_what_is_called_and_ends_at_a_polite_kill(tmp_path):
-    errand = [sys.executable, "-m", "executive.cli", "queue"]
     where = ["--out", str(tmp_path)]
-    subprocess.run([*errand, "add", "go_to_pose", "--on", "call pose", "--no-record", *where], cwd=ROOT, check=True)
-    serve = [*errand, "serve", "--quiet", "--json", "--port", "0", *where]
+    added = CliRunner().invoke(app, ["queue", "add", "go_to_pose", "--on", "call pose", "--no-record", *where])
+    assert added.exit_code == 0, added.output
+    serve = [sys.executable, "-m", "executive.cli", "queue", "serve", "--quiet", "--json", "--port", "0", *where]
     with subprocess.Popen(serve, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as server:
         port = next(int(line.split(":")[3].split("/")[0]) for line in server.stderr if line.startswith("Calls:"))
         token = (tmp_path / "missions.sqlite-token").read_text().strip()

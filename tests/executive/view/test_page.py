@@ -459,6 +459,7 @@ def test_the_first_cause_told_decides_although_a_retry_has_reset_its_leaf(page, 
     playwright_api.expect(leaf).to_be_in_viewport()
 
 
+@pytest.mark.nightly
 def test_a_leaf_that_succeeded_in_the_end_decides_no_failure(page, live):
     feed, tree, url = live
     one, other = leaf_ids(tree)[:2]
@@ -471,6 +472,7 @@ def test_a_leaf_that_succeeded_in_the_end_decides_no_failure(page, live):
     playwright_api.expect(page.locator(".row.decisive")).to_contain_text("it fell")
 
 
+@pytest.mark.nightly
 def test_a_run_that_goes_well_has_no_failure_on_top(page, live):
     feed, _, url = live
     page.goto(url)
@@ -530,12 +532,14 @@ def test_the_recording_in_a_replay_of_one_file_follows_the_slider(page, log_path
     expect_scene_follows_slider(page)
 
 
+@pytest.mark.nightly
 def test_the_recording_in_a_served_replay_follows_the_slider(page, log_path, recording):
     with PageServer(PageContent(fed(read_history(log_path).events), recording=recording)) as server:
         page.goto(server.url)
         expect_scene_follows_slider(page)
 
 
+@pytest.mark.nightly
 def test_the_recording_that_is_there_when_a_run_has_ended_follows_the_slider(page, log_path, recording):
     with PageServer(PageContent(fed(read_history(log_path).events))) as server:
         page.goto(server.url)
@@ -696,6 +700,7 @@ def test_each_of_several_robots_has_a_panel_of_its_own_and_all_stand_on_one_map(
     assert len(set(colours)) == 2
 
 
+@pytest.mark.nightly
 def test_the_buttons_of_a_panel_are_for_its_robot_and_those_above_for_all(page, two, control):
     _, _, url = two
     page.goto(url)
@@ -714,6 +719,7 @@ def test_the_buttons_of_a_panel_are_for_its_robot_and_those_above_for_all(page, 
         assert panel(page, name).locator(".stop").is_disabled()
 
 
+@pytest.mark.nightly
 def test_a_question_stands_on_the_panel_of_the_robot_that_asks(page, two, control, clock):
     _, _, url = two
     page.goto(url)
@@ -725,6 +731,7 @@ def test_a_question_stands_on_the_panel_of_the_robot_that_asks(page, two, contro
     assert (asked.done(), asked.result()) == (True, "yes")
 
 
+@pytest.mark.nightly
 def test_a_sentence_is_said_to_the_robot_that_is_chosen(page, two):
     _, _, url = two
     page.goto(url)
@@ -748,6 +755,7 @@ def test_the_missions_of_a_fleet_are_listed_with_the_robot_and_what_came_of_them
     playwright_api.expect(lines).to_have_text(["1Go <b>there Bob✓ successgiven anew 1 x", "2Wait○ queued"])
 
 
+@pytest.mark.nightly
 def test_how_several_robots_ended_is_told_for_each_and_for_all(page, two, control):
     feed, _, url = two
     page.goto(url)

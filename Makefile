@@ -1,10 +1,10 @@
 # make env    the virtual environment .venv with all but the training extra
 # make demo   one mission, end to end; look into out/ (sets up what missions need, and no more)
-# make test   all tests; those of training run when the extra `train` is there
+# make test   a test of everything, and one mission of each kind; those of training when the extra `train` is there
 # make train  adds the extra `train`: torch, to train the detector and the speech adapter
 # make check  lint, format and strict types
 # make bench  benchmarks, as ratios
-# make nightly  the smallest case of each measure, and other long checks
+# make nightly  further missions, tutorials, seeds and worlds, and the smallest case of each measure
 # make docs   the documentation as a site: open out/site/index.html
 
 PYTHON ?= $(shell command -v python3.11 || echo python3)

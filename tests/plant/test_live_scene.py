@@ -10,8 +10,9 @@ from plant.simulation import Simulation
 from plant.worlds.world import load_world
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def simulation() -> Simulation:
+    """A plant that no test commands; each shows it anew."""
     return Simulation(load_world("flat"), seed=1, visuals=False)
 
 
@@ -59,11 +60,11 @@ def test_it_shows_the_plant_as_it_is(simulation):
     assert np.array_equal(shown, simulation.engine.world.plant.GetPositions(simulation.engine.context))
 
 
-def test_a_run_is_the_same_with_it_and_without(simulation):
-    alone = Simulation(load_world("flat"), seed=1, visuals=False)
-    simulation.show_live()
-    for each in (alone, simulation):
+def test_a_run_is_the_same_with_it_and_without():
+    alone, shown = (Simulation(load_world("flat"), seed=1, visuals=False) for _ in range(2))
+    shown.show_live()
+    for each in (alone, shown):
         each.clock.advance(0.2)
-    plants = [each.engine.world.plant.GetPositions(each.engine.context) for each in (alone, simulation)]
+    plants = [each.engine.world.plant.GetPositions(each.engine.context) for each in (alone, shown)]
     assert np.array_equal(*plants)
-    assert alone.robots["Alice"].odometry().X_OB.IsExactlyEqualTo(simulation.robots["Alice"].odometry().X_OB)
+    assert alone.robots["Alice"].odometry().X_OB.IsExactlyEqualTo(shown.robots["Alice"].odometry().X_OB)

@@ -8,18 +8,20 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from pydrake.geometry import CollisionFilterManager, GeometrySet, SceneGraph
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
-from pydrake.systems.framework import Context
-
-from plant.scene import Scene
-from plant.snapshot.values import State
 from skills.files.errors import InputError
 from skills.files.plugins import PluginDefect, distribution_of, installed_plugins, run_plugin
 from skills.robot import Capabilities, Pose2D, Robot
+
+if TYPE_CHECKING:
+    from pydrake.geometry import CollisionFilterManager, GeometrySet, SceneGraph
+    from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
+    from pydrake.systems.framework import Context
+
+    from plant.scene import Scene
+    from plant.snapshot.values import State
 
 GROUP = "errand.robots"
 

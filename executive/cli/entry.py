@@ -133,6 +133,7 @@ def main() -> NoReturn:
     Python would take apart all modules first, which takes longer than some commands.
     """
     gc.set_threshold(*_COLLECTED_AFTER)
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else it reads the files of all distributions
     code: object = 0
     try:
         command_line()

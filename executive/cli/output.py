@@ -7,14 +7,15 @@ import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import typer
-from rich.console import Console
-from rich.table import Column, Table
-from rich.text import Text
 
 from skills.files.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.text import Text
 
 NOT_ACHIEVED = 1
 BAD_INPUT = 2
@@ -26,6 +27,8 @@ _SHOWN: Final = 100
 
 def console_for(as_json: bool) -> Console:
     """The console for people: standard error when standard output belongs to a script."""
+    from rich.console import Console
+
     return Console(stderr=as_json, highlight=False, soft_wrap=True)
 
 
@@ -38,6 +41,9 @@ def print_json(value: Mapping[str, Any] | Sequence[Any]) -> None:
 def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> None:
     """A table: in a box at a terminal, else one line for each row, the columns two spaces apart."""
     if console.is_terminal:
+        from rich.table import Column, Table
+        from rich.text import Text
+
         table = Table(*(Column(name, overflow="fold") for name in header))
         for row in rows:
             table.add_row(*(cell if isinstance(cell, Text) else Text(cell) for cell in row))

@@ -6,8 +6,10 @@ import functools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import shapely
+if TYPE_CHECKING:
+    import shapely
 
 __all__ = ["Point", "Side", "distance_m", "fits", "inside", "nearest_side"]
 
@@ -24,6 +26,8 @@ class Side:
 
 def inside(polygon: Sequence[Point], point: Point) -> bool:
     """Whether (x, y) lies within the outline."""
+    import shapely
+
     return bool(shapely.contains_xy(_outline(tuple(polygon)), *point))
 
 
@@ -34,11 +38,15 @@ def area_m2(polygon: Sequence[Point]) -> float:
 
 def distance_m(polygon: Sequence[Point], point: Point) -> float:
     """How far (x, y) lies outside the outline; 0 within it."""
+    import shapely
+
     return float(shapely.distance(_outline(tuple(polygon)), shapely.Point(point)))
 
 
 def fits(outline: Sequence[Point], polygon: Sequence[Point], taken: Iterable[Sequence[Point]]) -> bool:
     """Whether one outline lies within another, and meets none of those that are taken."""
+    import shapely
+
     body = shapely.Polygon(outline)
     return bool(shapely.Polygon(polygon).covers(body)) and not any(body.intersects(shapely.Polygon(t)) for t in taken)
 
@@ -51,6 +59,8 @@ def nearest_side(polygon: Sequence[Point], middle: Point, length_m: float) -> Si
 
 def _ends_off_m(side: tuple[Point, Point], middle: Point, length_m: float) -> float:
     """How far the ends of a line are from a side to which it is parallel, together."""
+    import shapely
+
     (x0, y0), (x1, y1) = side
     way_m = max(math.dist(*side), 1e-9)
     dx, dy = (0.5 * length_m * (b - a) / way_m for a, b in ((x0, x1), (y0, y1)))
@@ -61,4 +71,6 @@ def _ends_off_m(side: tuple[Point, Point], middle: Point, length_m: float) -> fl
 @functools.lru_cache(maxsize=256)
 def _outline(polygon: tuple[Point, ...]) -> shapely.Polygon:
     """The outline; rooms are asked for again and again while a mission is compiled."""
+    import shapely
+
     return shapely.Polygon(polygon)

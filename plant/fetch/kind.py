@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-
-from pydrake.multibody.plant import MultibodyPlant
+from typing import TYPE_CHECKING
 
 from plant.fetch.capabilities import fetch_capabilities
 from plant.fetch.wheels import WheelLimits
@@ -19,6 +18,9 @@ from plant.models.fetch.description import (
     HEAD_JOINTS,
     WHEELS,
 )
+
+if TYPE_CHECKING:
+    from pydrake.multibody.plant import MultibodyPlant
 
 
 def _add(plant: MultibodyPlant, name: str, options: BodyOptions) -> RobotBody:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from pydrake.multibody.plant import MultibodyPlant
+from typing import TYPE_CHECKING
 
 from plant.kinds import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
-from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.models.spot.description import FACTS, LEGS
 from plant.spot.capabilities import spot_capabilities
+
+if TYPE_CHECKING:
+    from pydrake.multibody.plant import MultibodyPlant
 
 HAND_LINK, FINGER_LINK = "arm_wr1", "arm_f1x"
 
 
 def _add(plant: MultibodyPlant, name: str, options: BodyOptions) -> RobotBody:
+    from plant.locomotion.floating_base import FloatingBaseLimits
     from plant.spot.model import SpotModel
 
     limits = options.locomotion if isinstance(options.locomotion, FloatingBaseLimits) else None

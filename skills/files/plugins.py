@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from functools import cache
-from importlib.metadata import EntryPoint, EntryPoints, SelectableGroups, entry_points
+from importlib.metadata import Distribution, EntryPoint, EntryPoints, SelectableGroups, entry_points
 from typing import Final, TypeVar
 
 __all__ = ["LIMIT_S", "OURS", "PluginDefect", "distribution_of", "installed_plugins", "run_in_thread", "run_plugin"]
@@ -29,7 +29,13 @@ class PluginDefect(Exception):  # noqa: N818
 
 def distribution_of(entry: EntryPoint) -> str:
     """The distribution that registers an entry point."""
-    return "an unknown distribution" if entry.dist is None else entry.dist.name
+    return "an unknown distribution" if entry.dist is None else _name_of(entry.dist)
+
+
+@cache
+def _name_of(distribution: Distribution) -> str:
+    """The name of a distribution, which each time is read from its file."""
+    return distribution.name
 
 
 def installed_plugins(group: str) -> EntryPoints:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from executive.cli.backend import Scene
 from executive.cli.feasibility import refuse_impossible
 from executive.cli.missions_command import shipped_missions
-from executive.cli.replay_command import served, wait
 from executive.cli.requests import Prepared, prepare
 from executive.cli.talk import Talk, load_ahead
 from executive.conversation import ReplyKind
@@ -26,10 +25,12 @@ from executive.run.runner import Progress
 from executive.store.missions import MissionStore
 from executive.view.actions import Action, RefusedError, asked_json, control_actions, robot_of, text_of
 from executive.view.feed import Feed
-from executive.view.server import PageContent, PageServer
 from executive.view.watch import ControlWatch, ProgressWatch
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
+
+if TYPE_CHECKING:
+    from executive.view.server import PageServer
 
 
 class PageView:
@@ -54,6 +55,9 @@ class PageView:
 
     def begin(self, log: EventLog, scene: Scene | None) -> None:
         """Serve the page and print its address. Raises InputError when the port is taken."""
+        from executive.cli.replay_command import served
+        from executive.view.server import PageContent
+
         log.listen(self._feed)
         sentences: dict[str, Action] = {}
         if self.talk is not None:
@@ -78,6 +82,8 @@ class PageView:
 
     def stay(self, limit_s: float | None) -> None:
         """Keep serving until Ctrl-C or the limit (s, on the wall's clock), and close."""
+        from executive.cli.replay_command import wait
+
         try:
             if self._server is not None:
                 self._console.print(

@@ -22,7 +22,7 @@ from executive.evaluation.summary import (
     time_rows,
     to_look_at,
 )
-from executive.view.server import PAGE_FOLDER
+from executive.view.page_files import PAGE_FOLDER
 from executive.view.text import printable
 
 __all__ = ["EvaluationPage", "to_page"]

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from executive.record.reader import Event
 from executive.view.feed import Feed
-from executive.view.server import PAGE_FOLDER
+from executive.view.page_files import PAGE_FOLDER
 
 _STYLE: Final = re.compile(r'<link rel="stylesheet" href="page/([\w.]+)">')
 _SCRIPT: Final = re.compile(r'<script src="page/([\w.]+)" defer></script>\n?')

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import Final
 
-from executive.view.server import PAGE_FOLDER
+from executive.view.page_files import PAGE_FOLDER
 from executive.view.styles import NodeStyle, Styles
 from executive.view.text import printable
 

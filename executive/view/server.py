@@ -25,12 +25,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from executive.view.actions import Action, RefusedError
 from executive.view.feed import Feed
+from executive.view.page_files import PAGE_FOLDER
 from executive.view.serving import MAX_BODY, ServingThread, body_of
 from skills.files.errors import InputError
 from skills.files.texts import json_object
 
 HOST: Final = "127.0.0.1"
-PAGE_FOLDER: Final = Path(__file__).parent / "page"
 RECORDING_ADDRESS: Final = "recording.html"
 TOKEN_HEADER: Final = "x-errand-token"
 _GOING_AWAY: Final = 1001

@@ -120,12 +120,21 @@ def _search() -> None:
 
 
 def _bend_arm() -> None:
-    """Solve for the joints of an arm that has seven."""
+    """Solve for the joints of an arm that has seven, and check it against a box."""
+    from pydrake.math import RigidTransform
+
     from plant.kinds import robot_kind
+    from skills.arm.collision import ArmScene, Box, gaps_m
     from skills.arm.kinematics import arm_model
 
-    model = arm_model(robot_kind("fetch").capabilities())
-    model.inverse(model.X_BH(np.full(7, 0.5)))
+    capabilities = robot_kind("fetch").capabilities()
+    model = arm_model(capabilities)
+    q_rad = np.full(7, 0.5)
+    model.inverse(model.X_BH(q_rad))
+    scene, box = ArmScene(capabilities, model, {}), Box(RigidTransform([2.0, 0.0, 0.0]), (0.1, 0.1, 0.1))
+    scene.set_boxes([box])
+    scene.edge_free(q_rad, q_rad)
+    gaps_m(box, [box], np.zeros((1, 3)))
 
 
 def _survey() -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -35,7 +38,8 @@ class ModelClass(BaseModel):
     forms: dict[str, ModelForm] = Field(min_length=1)
 
 
-def load_catalogue() -> dict[str, ModelClass]:
-    """All classes by name."""
+@cache
+def load_catalogue() -> Mapping[str, ModelClass]:
+    """All classes by name, read once."""
     entries = read_yaml(MODELS_FOLDER / "catalogue.yaml").data
-    return {name: ModelClass.model_validate(entry) for name, entry in entries.items()}
+    return MappingProxyType({name: ModelClass.model_validate(entry) for name, entry in entries.items()})

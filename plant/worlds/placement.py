@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -76,13 +76,15 @@ def place_people(world: World, seed: int) -> tuple[Placement, ...]:
     )
 
 
-def _model_class(catalogue: dict[str, ModelClass], name: str, world: World) -> ModelClass:
+def _model_class(catalogue: Mapping[str, ModelClass], name: str, world: World) -> ModelClass:
     if name not in catalogue:
         raise WorldError(f"{world.folder / 'objects.yaml'}: no model {name!r}; there are {', '.join(catalogue)}")
     return catalogue[name]
 
 
-def _model(catalogue: dict[str, ModelClass], name: str, world: World, seed: int, index: int) -> tuple[str, ModelForm]:
+def _model(
+    catalogue: Mapping[str, ModelClass], name: str, world: World, seed: int, index: int
+) -> tuple[str, ModelForm]:
     """Class and form of an object: those of the imported model of that name, else a form of the class."""
     if name in world.imports:
         found = world.imports[name]

@@ -68,8 +68,8 @@ class Carried:
         """Slow down the free bodies that spin faster than `FASTEST_SPIN_RAD_S`."""
         velocities = self._plant.GetVelocities(self._context)
         spins = velocities[self._spins]
-        rates = np.linalg.norm(spins, axis=1, keepdims=True)
-        if rates.size and rates.max() > FASTEST_SPIN_RAD_S:
+        if spins.size and (spins * spins).sum(axis=1).max() > FASTEST_SPIN_RAD_S**2:
+            rates = np.linalg.norm(spins, axis=1, keepdims=True)
             velocities[self._spins] = spins * np.minimum(1.0, FASTEST_SPIN_RAD_S / np.maximum(rates, 1e-9))
             self._plant.SetVelocities(self._context, velocities)
 

@@ -39,6 +39,8 @@ class Offers:
         self._plant, self._context, self._query = plant, context, plant.get_geometry_query_input_port()
         self._inspector = world.scene_graph.model_inspector()
         self._robots = world.robots
+        outlines = {name: np.array(robot.kind.capabilities().footprint_m) for name, robot in world.robots.items()}
+        self._outlines_B = {name: (corners.min(axis=0), corners.max(axis=0)) for name, corners in outlines.items()}
         self._bodies = {name: robot.body for name, robot in world.robots.items()}
         self._links = {
             name: [plant.GetBodyByName(link, robot.instance) for link in robot.kind.gripper_links]
@@ -56,6 +58,10 @@ class Offers:
                 shape_row(self._inspector, shape) for shape in plant.GetCollisionGeometriesForBody(body)
             ]
             for body in (*self.loose.values(), *(link for links in self._links.values() for link in links))
+        }
+        bodies = (*self.loose.values(), *(link for links in self._links.values() for link in links))
+        self._owners: Mapping[GeometryId, int] = {
+            shape: int(body.index()) for body in bodies for shape in plant.GetCollisionGeometriesForBody(body)
         }
         self._still_since_s: dict[str, float] = {}
 
@@ -126,13 +132,12 @@ class Offers:
     def _before_outline(self, robot: str) -> bool:
         X_WB = self._plant.EvalBodyPoseInWorld(self._context, self._bodies[robot])
         p_BG = X_WB.inverse() @ self.grip_W(robot)
-        outline_B = np.array(self._robots[robot].kind.capabilities().footprint_m)
-        low, high = outline_B.min(axis=0), outline_B.max(axis=0)
+        low, high = self._outlines_B[robot]
         return bool(np.any((p_BG[:2] < low - BEYOND_OUTLINE_M) | (p_BG[:2] > high + BEYOND_OUTLINE_M)))
 
     def _free_in(self, robot: str) -> str | None:
         """The object that a gripper touches and that touches nothing else; None where there is not just one."""
-        of_shape = self._owners()
+        of_shape = self._owners
         links = {int(link.index()) for link in self._links[robot]}
         touching: dict[int, set[int]] = {}
         for each in self._query.Eval(self._context).ComputePointPairPenetration():
@@ -143,13 +148,6 @@ class Offers:
         if len(held) != 1 or touching[int(self.loose[held[0]].index())] - links:
             return None
         return held[0]
-
-    def _owners(self) -> Mapping[GeometryId, int]:
-        """The body of each collision shape of a loose object or a gripper."""
-        bodies = (*self.loose.values(), *(link for links in self._links.values() for link in links))
-        return {
-            shape: int(body.index()) for body in bodies for shape in self._plant.GetCollisionGeometriesForBody(body)
-        }
 
     def state(self) -> State:
         """Since when each robot holds something out."""

@@ -25,8 +25,8 @@ _EPS = 1.0e-9
 
 
 def _compiled(function: FunctionT) -> FunctionT:
-    """numba's njit with a disk cache and fast arithmetic, keeping the function's type."""
-    return cast(FunctionT, numba.njit(cache=True, fastmath=True, error_model="numpy")(function))
+    """numba's njit with a disk cache, fast arithmetic and without the GIL, keeping the function's type."""
+    return cast(FunctionT, numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")(function))
 
 
 @_compiled

@@ -103,6 +103,8 @@ class RayScene:
         self._anchored = ShapeArrays.from_rows(anchored)
         self._moving = ShapeArrays.from_rows(moving)
         self._body_slots = np.array(body_slots, dtype=np.int64)
+        self._kinds = np.concatenate([self._anchored.kinds, self._moving.kinds])
+        self._half_extents_m = np.concatenate([self._anchored.half_extents_m, self._moving.half_extents_m])
 
     def world_shapes(self, plant_context: Context) -> ShapeArrays:
         """All shapes in the world frame at the context's state."""
@@ -112,8 +114,8 @@ class RayScene:
         R_WF, p_WF = R_WF[self._body_slots], p_WF[self._body_slots]
         moved_p = np.einsum("nij,nj->ni", R_WF, self._moving.positions_m) + p_WF
         return ShapeArrays(
-            np.concatenate([self._anchored.kinds, self._moving.kinds]),
-            np.concatenate([self._anchored.half_extents_m, self._moving.half_extents_m]),
+            self._kinds,
+            self._half_extents_m,
             np.concatenate([self._anchored.rotations, R_WF @ self._moving.rotations]),
             np.concatenate([self._anchored.positions_m, moved_p]),
         )

@@ -211,7 +211,7 @@ def _status() -> tuple[int | None, str]:
     before = signal.signal(signal.SIGALRM, too_long)
     signal.alarm(LIMIT_S)
     try:
-        entry.main()
+        entry.command_line()
     except SystemExit as end:
         return (end.code if isinstance(end.code, int) else 0 if end.code is None else 1), ""
     except WorkBegins:

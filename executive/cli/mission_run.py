@@ -12,12 +12,12 @@ from executive.cli.found_out import with_found_out
 from executive.cli.goal_conditions import Share
 from executive.cli.happening_log import HappeningLog
 from executive.cli.page_view import PageView, log_map
+from executive.cli.preload import preload
 from executive.cli.profiling import profiled
 from executive.cli.report import RefereeReport, RobotReport, RunReport
 from executive.cli.report_file import EndedTree, write_report
 from executive.cli.requests import Prepared
 from executive.cli.signals import HUNG_UP, cancelled_by_signals
-from executive.cli.warm_up import warm_up
 from executive.mission.request import Request
 from executive.record.announce import announce
 from executive.record.event_log import EventLog, Listener
@@ -119,7 +119,7 @@ def run_request(
 def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None, work: Work) -> RunEntry:
     """The robot of a mission with its faults, its pictures counted, and its numeric code warm."""
     entry, clock = backend.entry(prepared.tree, durable), backend.clock
-    warm_up(entry)
+    preload(entry)
     faults = _to_come(prepared.request.scenario.faults, clock.now())
     return replace(
         entry,

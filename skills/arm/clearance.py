@@ -64,13 +64,10 @@ def touching(
     joints, groups, boxes = path_rad.shape[1], group_joints.shape[0], box_halves.shape[0]
     reach = np.sqrt(box_halves[:, 0] ** 2 + box_halves[:, 1] ** 2 + box_halves[:, 2] ** 2) + padding_m
     R, p = np.empty((joints + 1, 3, 3)), np.empty((joints + 1, 3))
-    R[0], p[0] = np.eye(3), np.zeros(3)
     shapes, any_touch = kinds.shape[0], False
     R_BS, p_BS, placed = np.empty((shapes, 3, 3)), np.empty((shapes, 3)), np.zeros(shapes, dtype=np.int64)
     for k in range(path_rad.shape[0]):
-        for j in range(joints):
-            _place(R[j + 1], p[j + 1], R[j], p[j], R_PF[j], p_PF[j])
-            _turn(R[j + 1], axes[j], path_rad[k, j])
+        _place_links(R, p, path_rad[k], axes, R_PF, p_PF)
         first = 0
         for g in range(groups):
             link, last = group_joints[g] + 1, group_ends[g]
@@ -97,6 +94,17 @@ def touching(
                         found[s] = any_touch = True
             first = last
     return any_touch
+
+
+@compiled
+def _place_links(
+    R: FloatArray, p: FloatArray, q_rad: FloatArray, axes: FloatArray, R_PF: FloatArray, p_PF: FloatArray
+) -> None:
+    """Put the poses of body and J links, in the body frame, into R (J + 1, 3, 3) and p (J + 1, 3)."""
+    R[0], p[0] = np.eye(3), np.zeros(3)
+    for j in range(q_rad.shape[0]):
+        _place(R[j + 1], p[j + 1], R[j], p[j], R_PF[j], p_PF[j])
+        _turn(R[j + 1], axes[j], q_rad[j])
 
 
 @compiled
@@ -152,14 +160,14 @@ def _gap(
     p_BX: FloatArray,
 ) -> float:
     """The gap (m) between a shape and a box; 0 or less where they touch."""
-    if kind == 3:
+    if kind == Kind.BOX:
         return _box_gap(half, R_BS, p_BS, box_half, R_BX, p_BX)
     dx, dy, dz = p_BS[0] - p_BX[0], p_BS[1] - p_BX[1], p_BS[2] - p_BX[2]
     cx = R_BX[0, 0] * dx + R_BX[1, 0] * dy + R_BX[2, 0] * dz
     cy = R_BX[0, 1] * dx + R_BX[1, 1] * dy + R_BX[2, 1] * dz
     cz = R_BX[0, 2] * dx + R_BX[1, 2] * dy + R_BX[2, 2] * dz
     radius, length = half[0], half[2]
-    if kind == 0:
+    if kind == Kind.SPHERE:
         return float(_from_box(cx, cy, cz, box_half) - radius)
     ax = R_BX[0, 0] * R_BS[0, 2] + R_BX[1, 0] * R_BS[1, 2] + R_BX[2, 0] * R_BS[2, 2]
     ay = R_BX[0, 1] * R_BS[0, 2] + R_BX[1, 1] * R_BS[1, 2] + R_BX[2, 1] * R_BS[2, 2]
@@ -176,7 +184,7 @@ def _gap(
             low = t
     t = 0.5 * (low + high)
     gap = _from_box(cx + t * ax, cy + t * ay, cz + t * az, box_half) - radius
-    if kind == 2:  # flat ends: along the box's own axes, and along the cylinder's
+    if kind == Kind.CYLINDER:  # flat ends: along the box's own axes, and along the cylinder's
         for centre, along, half_box in ((cx, ax, box_half[0]), (cy, ay, box_half[1]), (cz, az, box_half[2])):
             span = length * abs(along) + radius * math.sqrt(max(0.0, 1.0 - along * along))
             gap = max(gap, abs(centre) - half_box - span)

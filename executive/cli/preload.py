@@ -1,4 +1,4 @@
-"""Lets the numeric code be compiled, or read from its cache, before the clock runs."""
+"""Reads the numeric code from its cache, or lets it be compiled, before the clock runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from skills.navigate.planner import plan_path
 from skills.robot import Pose2D
 
 
-def warm_up(entry: RunEntry) -> None:
+def preload(entry: RunEntry) -> None:
     """Take in the robot's first scan and plan a short way; the first time on a machine this takes some seconds."""
     robot, localiser, costmap = entry.robot, entry.localiser, entry.costmap
     localiser.update(robot)

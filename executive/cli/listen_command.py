@@ -18,8 +18,9 @@ from executive.cli.output import BAD_INPUT, console_for, refusals
 from executive.cli.run_options import ROBOTS, robots_of
 from executive.cli.signals import interrupted_by_hang_up
 from executive.cli.worlds import knowledge_of, open_world
-from executive.language import Status, Understanding, load_parser
+from executive.language.parser import load_parser
 from executive.language.robots import Part
+from executive.language.understand import Status, Understanding
 from executive.mission.file.model import DEFAULT_WORLD
 from executive.mission.knowledge import Knowledge
 from executive.mission.robots import RobotSetup, display_name

@@ -11,8 +11,10 @@ import typer
 
 from executive.cli.output import BAD_INPUT, print_json, refusals
 from executive.cli.worlds import knowledge_of, open_world
-from executive.language import Status, Understanding, explain, load_parser, parse_lines
+from executive.language.explain import explain
 from executive.language.explain_views import arcs_svg, explanation_lines
+from executive.language.parser import load_parser
+from executive.language.understand import Status, Understanding, parse_lines
 from executive.mission.file.model import DEFAULT_WORLD
 from executive.mission.written import written
 from skills.files.errors import InputError

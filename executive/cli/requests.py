@@ -6,12 +6,13 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from executive.cli.answers import answerer, ask_at_terminal
 from executive.cli.missions_command import mission_file
 from executive.cli.starts import DEFAULT_KIND, PlacedRobot
 from executive.cli.worlds import knowledge_of, open_world, refuse_blocked, with_map
-from executive.language import Understanding, load_parser
+from executive.language.parser import load_parser
 from executive.language.questions import Answerer
 from executive.mission.file.model import DEFAULT_WORLD, Mission
 from executive.mission.file.objects import import_folders
@@ -29,6 +30,9 @@ from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
 from skills.files.errors import InputError, Problems
 from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
+
+if TYPE_CHECKING:
+    from executive.language.understand import Understanding
 
 __all__ = [
     "Prepared",

@@ -10,9 +10,10 @@ from executive.cli.answers import answerer
 from executive.cli.requests import Prepared, commanded, filed, prepared_for, world_of
 from executive.cli.starts import PlacedRobot, knowledge_for, placed_robots
 from executive.cli.worlds import knowledge_of, with_map
-from executive.language import Status, Understanding, load_parser
+from executive.language.parser import load_parser
 from executive.language.questions import Answerer
 from executive.language.robots import Addressed, Part, Whom, understand_for_robots_asking
+from executive.language.understand import Status, Understanding
 from executive.mission.file.model import KeyPath, Mission
 from executive.mission.file.resolve import for_robot
 from executive.mission.file.schema import MissionFile, PartFile

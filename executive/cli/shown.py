@@ -16,7 +16,7 @@ from executive.cli.live import live_view
 from executive.cli.mission_run import Finished, both
 from executive.cli.requests import Prepared
 from executive.cli.talk import Talk, load_ahead
-from executive.language import load_parser
+from executive.language.parser import load_parser
 from executive.record.event_log import Listener
 from executive.record.schemas import SPEECH
 from executive.run.control import Control

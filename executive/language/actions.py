@@ -22,9 +22,9 @@ from executive.language.items import (
 )
 from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
-from executive.language.parser import Token
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, THERE, Location, Roles, read_roles
+from executive.language.tokens import Token
 from executive.mission.command import TIME_UNITS_S
 
 __all__ = ["Action", "read_actions"]

@@ -10,9 +10,9 @@ from executive.language.actions import Action
 from executive.language.clauses import Clause
 from executive.language.command_frames import spoken_command
 from executive.language.items import spoken_words
-from executive.language.parser import Token
 from executive.language.roles import Location
 from executive.language.steps import Trace
+from executive.language.tokens import Token
 from executive.mission.written import written
 
 __all__ = ["ActionRow", "Explanation", "ThingRow", "TokenRow", "explain", "tree_lines"]

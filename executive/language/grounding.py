@@ -13,12 +13,12 @@ from typing import Final
 
 from executive.language.command_frames import CommandFrame
 from executive.language.lexicon import lexicon
-from executive.language.parser import Token
 from executive.language.phrases import Phrase
 from executive.language.questions import ClarifyingQuestion, RefusalError, Slot, perhaps, which
 from executive.language.relations import check_relation
 from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
+from executive.language.tokens import Token
 from executive.mission.command import Command, Task, Thing
 from executive.mission.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
 from skills.files.errors import known_names, listing

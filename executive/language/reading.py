@@ -23,11 +23,11 @@ from executive.language.items import (
 )
 from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
 from executive.language.nouns import NounKind
-from executive.language.parser import Token
 from executive.language.phrases import Phrase
 from executive.language.question_parsing import do_we_have, how_many, what_is, where_is
 from executive.language.row import LONGEST, Row, command_position
 from executive.language.statements import belongs, goes_on, narrated, needed, told
+from executive.language.tokens import Token
 
 __all__ = ["split_items"]
 

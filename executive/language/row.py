@@ -8,8 +8,8 @@ from typing import Final
 
 from executive.language.items import Item, Separator
 from executive.language.lexicon import Lexicon
-from executive.language.parser import Token
 from executive.language.phrases import Phrase
+from executive.language.tokens import Token
 
 __all__ = ["LONGEST", "Row", "command_position"]
 

@@ -18,7 +18,7 @@ from executive.language.lexicon import VerbKind, lexicon
 from executive.language.names import name_table, parse_with_names
 from executive.language.normalise import MAX_CHARACTERS, MAX_WORDS
 from executive.language.nouns import NounKind
-from executive.language.parser import DependencyParser, Token
+from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase, noun_phrases
 from executive.language.questions import RefusalError, Slot, which
 from executive.language.reading import split_items
@@ -26,6 +26,7 @@ from executive.language.reference import Memory, ResolvedAction, resolve
 from executive.language.relations import check_ways_and_speaker
 from executive.language.rephrasing import rephrased
 from executive.language.similar import WordFacts
+from executive.language.tokens import Token
 from executive.mission.command import Command, is_attribute
 from executive.mission.file.model import MissionStep
 from executive.mission.knowledge import Knowledge

@@ -48,7 +48,7 @@ Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
 
 
 class _Facts(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class Pose(_Facts):

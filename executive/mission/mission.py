@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from executive.language import DependencyParser, Status, Understanding
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
-from executive.language.understand import understand_asking
 from executive.mission.command import Command, parse_command
 from executive.mission.file.model import Mission, MissionStep
 from executive.mission.knowledge import Knowledge
 from executive.mission.written import parse_written, written
 from skills.files.errors import InputError
+
+if TYPE_CHECKING:
+    from executive.language.parser import DependencyParser
+    from executive.language.understand import Understanding
 
 __all__ = [
     "lines_of",
@@ -38,6 +41,8 @@ def understood(
     Raises:
         InputError: it is refused, leaves a question open or is not for this robot; the message says why.
     """
+    from executive.language.understand import Status, understand_asking
+
     nobody = answer_by(QuestionPolicy.REFUSE)
     meant = understand_asking(
         sentence, answer=answer or nobody, parser=parser, knowledge=knowledge, require_wake=require_wake

@@ -60,7 +60,7 @@ class RobotSetup:
 class NamedRobot(BaseModel):
     """A robot of a run: its kind, and where and with what it begins."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     kind: Name = Field(description="The kind of robot: spot, fetch, or one that a package adds.")
     at: tuple[Coordinate, Coordinate, Angle] | None = Field(

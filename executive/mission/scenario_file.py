@@ -35,7 +35,7 @@ Stops = Annotated[tuple[Corner | Name | StopFile, ...], Field(min_length=1)]
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, defer_build=True)
 
 
 class EventFile(_Strict):

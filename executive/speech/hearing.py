@@ -7,14 +7,15 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
-from executive.language import DependencyParser, Status, Understanding, understand
 from executive.language.lexicon import lexicon
 from executive.language.normalise import clean
+from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.robots import Part, understand_for_robots
 from executive.language.robots.cutting import cut_by_robot
 from executive.language.roles import HERE
 from executive.language.sounds import sound_distance
+from executive.language.understand import Status, Understanding, understand
 from executive.language.wake import SAME_NAME, Address, addressed_to, heard_wake
 from executive.mission.command import Command, is_attribute
 from executive.mission.knowledge import Knowledge

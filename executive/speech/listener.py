@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from executive.language import Status
 from executive.language.robots import Part
+from executive.language.understand import Status
 from executive.mission.command import Command
 from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Utterance
 from executive.speech.alikes import SoundAlikes

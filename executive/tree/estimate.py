@@ -32,7 +32,7 @@ USUALLY_FOUND: Final = 3
 
 
 class _Data(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class DriveTimes(_Data):

@@ -17,7 +17,7 @@ MODELS_FOLDER = Path(__file__).resolve().parent
 class ModelForm(BaseModel):
     """One form of a class: its SDF file, its outline seen from above, and its resting height (m)."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     file: str
     half_extents_m: tuple[float, float]
@@ -32,7 +32,7 @@ class ModelForm(BaseModel):
 class ModelClass(BaseModel):
     """One class: its id (0 is Nothing), and its forms by name."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     id: int
     forms: dict[str, ModelForm] = Field(min_length=1)

@@ -25,7 +25,7 @@ class CameraSpec(BaseModel):
     `picture_shrink` and `depth_shrink` divide the pixels of the picture and of the depth, which share the pose.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     name: str
     link: str

@@ -96,7 +96,7 @@ CellSize = Annotated[float, Quantity(ge=0.005, le=1.0, unit="m")]
 class _MapFile(BaseModel):
     """The keys of a map_server YAML file, and the band of heights."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     image: str
     resolution: CellSize

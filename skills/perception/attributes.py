@@ -32,7 +32,7 @@ _BIGGER: Final[Mapping[str, bool]] = {
 class ColourRange(BaseModel):
     """A range of hue (degrees, may wrap past 360), saturation and value (0 to 1)."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     hue_deg: tuple[float, float] = (0.0, 360.0)
     saturation: tuple[float, float] = (0.0, 1.0)

@@ -25,7 +25,7 @@ class ClassForm(BaseModel):
     per volume of the bar about it (its longest side times the shortest twice); None: its size says nothing of its mass.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     id: int
     form: Literal["round", "tank", "long", "box", "person"]

@@ -17,8 +17,9 @@ from typing import Final
 
 import yaml
 
-from executive.language import Status, load_parser
+from executive.language.parser import load_parser
 from executive.language.robots import Addressed, Part, Whom, understand_for_robots
+from executive.language.understand import Status
 from executive.mission.knowledge import load_knowledge
 from executive.mission.written import parse_written
 from plant.worlds.world import load_world

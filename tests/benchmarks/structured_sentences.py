@@ -19,7 +19,8 @@ from typing import Final
 
 import yaml
 
-from executive.language import Status, Understanding, load_parser, understand
+from executive.language.parser import load_parser
+from executive.language.understand import Status, Understanding, understand
 from executive.mission.file.model import MissionStep
 from executive.mission.knowledge import load_knowledge
 from executive.mission.written import parse_written, written

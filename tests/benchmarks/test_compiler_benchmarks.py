@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.language import load_parser
+from executive.language.parser import load_parser
 from executive.mission.file.resolve import mission_from_file
 from executive.mission.knowledge import load_knowledge
 from executive.tree.compiler import compile_mission

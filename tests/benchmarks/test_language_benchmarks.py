@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from executive.language import load_parser, understand
+from executive.language.parser import load_parser
+from executive.language.understand import understand
 from executive.mission.knowledge import load_knowledge
 from executive.mission.mission import mission_from_meaning, understood
 from executive.tree.compiler import compile_mission
@@ -71,7 +72,7 @@ def test_a_sentence_takes_milliseconds(parser, sentences):
 def test_the_parser_loads_in_a_fresh_process():
     program = (
         "import time; begun = time.process_time()\n"
-        "from executive.language import load_parser; load_parser().parse('go')\n"
+        "from executive.language.parser import load_parser; load_parser().parse('go')\n"
         "print(time.process_time() - begun)"
     )
     tried = [subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True) for _ in "ab"]

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
-from executive.language import Understanding
 from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
 from executive.mission.command import Command, Task
 from executive.mission.condition import RANGES, AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
@@ -33,6 +32,9 @@ from executive.mission.file.schema import HandlerFile, StepFile
 from executive.mission.file.scope import Scope
 from executive.mission.knowledge import ANYBODY, Knowledge
 from skills.files.errors import listing, suggestion
+
+if TYPE_CHECKING:
+    from executive.language.understand import Understanding
 
 __all__ = ["Reader", "condition_of", "plain_value", "read_block", "round_values"]
 

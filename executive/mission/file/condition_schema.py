@@ -19,7 +19,7 @@ _CONDITIONS: Final = ("expression", "look", "object", "person", "door", "button"
 class Strict(BaseModel):
     """No unknown keys, and nothing changes."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=False, defer_build=True)
 
 
 Clock = Annotated[str, BeforeValidator(clock_text)]

@@ -18,7 +18,7 @@ __all__ = ["ObjectFile", "import_folders"]
 class ObjectFile(BaseModel):
     """An object that lies there at the beginning."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     model: Name = Field(description="A class of objects, or the name of an imported model.")
     surfaces: Annotated[tuple[Name, ...], Field(min_length=1)] = Field(

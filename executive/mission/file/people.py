@@ -19,7 +19,7 @@ __all__ = ["RouteFile", "StopFile", "routes_in"]
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class StopFile(_Strict):

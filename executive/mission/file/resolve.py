@@ -7,11 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from executive.language import DependencyParser, Status, Understanding
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
-from executive.language.understand import understand_asking
 from executive.mission.command import START, Command
 from executive.mission.condition import Condition
 from executive.mission.file.block_steps import condition_of, plain_value, read_block, round_values
@@ -28,6 +26,10 @@ from skills.files.errors import InputError, Problems, suggestion
 from skills.files.outside import is_file
 from skills.files.schema import validate
 from skills.files.yaml_source import read_yaml
+
+if TYPE_CHECKING:
+    from executive.language.parser import DependencyParser
+    from executive.language.understand import Understanding
 
 __all__ = ["for_robot", "load_mission", "mission_from_file"]
 
@@ -179,6 +181,8 @@ class _Resolver:
 
     def meaning(self, scope: Scope, path: KeyPath, sentence: str) -> Understanding:
         """What a sentence at `path` means. Raises InputError: it is not understood."""
+        from executive.language.understand import Status
+
         answer = self._understand(sentence)
         if answer.status is not Status.OK:
             hint = "say it in other words, or write take, to, do and object"
@@ -237,6 +241,8 @@ class _Resolver:
 
     def _understand(self, sentence: str) -> Understanding:
         """What a sentence means; one that stands there again means the same."""
+        from executive.language.understand import understand_asking
+
         if sentence not in self.understood:
             self.understood[sentence] = understand_asking(
                 sentence,

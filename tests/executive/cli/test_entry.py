@@ -64,6 +64,18 @@ def test_a_command_imports_no_heavy_library_that_it_does_not_use(arguments, expe
     assert set(run.stdout.splitlines()[-1].split()) == expected
 
 
+def test_a_check_of_steps_without_sentences_imports_nothing_that_understands_sentences():
+    program = (
+        "import sys; from executive.cli.entry import command_line\n"
+        f"sys.argv = ['errand', 'check', {str(MISSIONS / 'fetch_drink.yaml')!r}]\n"
+        "try: command_line()\n"
+        "except SystemExit as end: assert not end.code, end.code\n"
+        "print(*sorted(name for name in sys.modules if name.startswith('executive.language.')))"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines()[-1].split() == ["executive.language.parser", "executive.language.questions"]
+
+
 @pytest.mark.parametrize(("arguments", "code"), [(["--help"], 0), (["parse"], 2)])
 def test_the_process_ends_with_its_exit_status_after_threads_and_exit_handlers(arguments, code):
     program = (

@@ -3,7 +3,8 @@ from dataclasses import replace
 import pytest
 
 from executive.conversation import Conversation, Speech
-from executive.language import load_parser, understand
+from executive.language.parser import load_parser
+from executive.language.understand import understand
 from executive.mission.file.model import MissionStep
 from executive.mission.mission import mission_from_steps
 from executive.run.control import Control

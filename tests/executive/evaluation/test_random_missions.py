@@ -5,7 +5,8 @@ from collections import Counter
 import pytest
 
 from executive.evaluation.random_missions import KINDS, TURNS, KnownWorld, random_evaluation, random_sentence
-from executive.language import Status, load_parser, understand
+from executive.language.parser import load_parser
+from executive.language.understand import Status, understand
 from executive.mission.knowledge import Knowledge, load_knowledge
 from plant.worlds.world import known_worlds, load_world
 

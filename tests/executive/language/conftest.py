@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.language import load_parser
+from executive.language.parser import load_parser
 from executive.mission.knowledge import load_knowledge
 
 

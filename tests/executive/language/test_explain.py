@@ -2,9 +2,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from executive.language import explain, understand
-from executive.language.explain import tree_lines
+from executive.language.explain import explain, tree_lines
 from executive.language.explain_views import arcs_svg, explanation_lines
+from executive.language.understand import understand
 
 SVG = "{http://www.w3.org/2000/svg}"
 SENTENCE = "could you give Robin the hammer from the workshop, and bring two cokes here"

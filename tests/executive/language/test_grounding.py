@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.language import Status, understand
+from executive.language.understand import Status, understand
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from executive.language import Status, understand
+from executive.language.understand import Status, understand
 from executive.mission.command import parse_command
 
 ROWS = yaml.safe_load(Path(__file__).with_name("not_carried.yaml").read_text(encoding="utf-8"))

@@ -2,7 +2,8 @@
 
 import pytest
 
-from executive.language import Status, load_parser, understand
+from executive.language.parser import load_parser
+from executive.language.understand import Status, understand
 
 
 @pytest.fixture(scope="module")

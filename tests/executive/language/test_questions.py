@@ -1,7 +1,7 @@
 import pytest
 
-from executive.language import Status, understand
 from executive.language.questions import ClarifyingQuestion, QuestionPolicy, Slot, answer_by, chosen, with_answer
+from executive.language.understand import Status, understand
 
 TABLE = ClarifyingQuestion(
     "Which table: kitchen table or coffee table?",

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from executive.language import Status, understand
+from executive.language.understand import Status, understand
 from executive.mission.command import parse_command
 
 FAMILIES = {

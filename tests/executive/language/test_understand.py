@@ -5,7 +5,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from executive.language import Status, parse_lines, understand
+from executive.language.understand import Status, parse_lines, understand
 from executive.mission.command import parse_command
 
 HERE = Path(__file__).parent

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.language import load_parser
+from executive.language.parser import load_parser
 from executive.mission.command import Command, parse_command
 from executive.mission.file.blocks import Repeat
 from executive.mission.file.model import MissionStep, SourceLine

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from executive.language import load_parser
+from executive.language.parser import load_parser
 from executive.mission.knowledge import load_knowledge
 from plant.worlds.world import load_world
 

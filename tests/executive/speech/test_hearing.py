@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.language import Status
+from executive.language.understand import Status
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.vocabulary import Vocabulary, of_world
 

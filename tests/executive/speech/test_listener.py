@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_speech import LoudIsSpeech, ScriptedRecogniser, silence, speech_like, tone, write_wav
 
-from executive.language import Status
+from executive.language.understand import Status
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener

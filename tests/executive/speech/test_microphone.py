@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_speech import LoudIsSpeech, ScriptedRecogniser, speech_like
 
-from executive.language import Status
+from executive.language.understand import Status
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener
 from executive.speech.microphone import follow, microphone_blocks

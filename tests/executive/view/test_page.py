@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from executive.conversation import Conversation, Speech
-from executive.language import Status, Understanding
 from executive.language.questions import ClarifyingQuestion, Slot
+from executive.language.understand import Status, Understanding
 from executive.mission.command import parse_command
 from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.record.event_log import EventLog

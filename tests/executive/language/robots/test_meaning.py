@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from executive.language import Status, understand
 from executive.language.robots import Whom, understand_for_robots
+from executive.language.understand import Status, understand
 
 ROBOTS = ("alice", "bob")
 

@@ -1,6 +1,6 @@
 import pytest
 
-from executive.language import understand
+from executive.language.understand import understand
 from executive.mission.knowledge import load_knowledge
 from plant.worlds.world import load_world
 

@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from executive.language import Status, understand
 from executive.language.structure.sentence import MOST_NESTED
-from executive.language.understand import understand_asking
+from executive.language.understand import Status, understand, understand_asking
 from executive.mission.written import parse_written, written
 
 HERE = Path(__file__).parent

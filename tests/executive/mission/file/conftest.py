@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.language import load_parser
+from executive.language.parser import load_parser
 from executive.mission.file.overrides import overridden
 from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
 from executive.mission.knowledge import load_knowledge

@@ -61,7 +61,7 @@ def _members(kind: type[Any]) -> Iterator[str]:
 
 
 def _fields(kind: type[Any]) -> Iterator[str]:
-    for field in dataclasses.fields(kind):
+    for field in (each for each in dataclasses.fields(kind) if each.init):
         default = "" if field.default is dataclasses.MISSING else f"`{_plain(field.default)}`"
         if field.default_factory is not dataclasses.MISSING:
             default = "new object"

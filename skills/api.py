@@ -359,6 +359,13 @@ class SeenSolid:
     views: tuple[tuple[Image, RigidTransform], ...] = ()
 
 
+@dataclass
+class _LastPose:
+    """The pose that was worked out last, behind the two transforms that it was worked out from."""
+
+    known: tuple[RigidTransform, RigidTransform, Pose2D] | None = None
+
+
 @dataclass(frozen=True)
 class SkillContext:
     """All that a skill may use. `seed` derives from the run's seed and the leaf's path id.
@@ -382,14 +389,19 @@ class SkillContext:
     solid: SeenSolid = field(default_factory=SeenSolid)
     traffic: Traffic = NO_TRAFFIC
     doors: tuple[Doorway, ...] = ()
+    _last_pose: _LastPose = field(default_factory=_LastPose, init=False, repr=False, compare=False)
 
     def X_WB(self) -> RigidTransform:
         """The body's pose in the world, as estimated."""
         return self.localiser.estimate().X_WO @ self.robot.odometry().X_OB
 
     def pose(self) -> Pose2D:
-        """The planar part of X_WB."""
-        return Pose2D.from_transform(self.X_WB())
+        """The planar part of X_WB, worked out once for each estimate and reading."""
+        X_WO, X_OB = self.localiser.estimate().X_WO, self.robot.odometry().X_OB
+        last = self._last_pose.known
+        if last is None or last[0] is not X_WO or last[1] is not X_OB:
+            last = self._last_pose.known = X_WO, X_OB, Pose2D.from_transform(X_WO @ X_OB)
+        return last[2]
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ class Control:
         self._questions = QuestionManager()
         self._version = 0
         self._begun = self._ended = False
-        self._requests = ControlRequests()
+        self._requests = self._lasting = ControlRequests()
         self._pressed: str | None = None
         self._holds: Mapping[tuple[str, Mode], str] = MappingProxyType({})  # of single robots
         self._paused: str | None = None
@@ -275,11 +275,14 @@ class Control:
     @_locked
     def poll(self) -> ControlRequests:
         """What is asked for now; new missions and events are handed out once."""
+        if self._requests is self._lasting and self._pressed is None and self._paused is None and not self._holds:
+            return self._requests
         mode, reason = self._mode()
         held = mode is Mode.STOPPED or (mode is Mode.PAUSED and self._stride is None)
         holds = {robot: why for (robot, _), why in self._holds.items()}
         requests = replace(self._requests, hold=reason if held else None, holds=holds)
-        self._requests = ControlRequests(requests.cancel, requests.insists, breakpoints=requests.breakpoints)
+        self._lasting = ControlRequests(requests.cancel, requests.insists, breakpoints=requests.breakpoints)
+        self._requests = self._lasting
         return requests
 
     @_locked

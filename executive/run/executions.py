@@ -79,7 +79,8 @@ class Executions:
         )
         named = {node.path_id: node for node in nodes if isinstance(node, Explained) and isinstance(node, Behaviour)}
         self._nodes = {path: named[path] for path in self._below if path in named}
-        self._drivers = tuple((path, named[path]) for path in self._base if path in named)
+        self._drivers = {path: named[path] for path in self._base if path in named}
+        self._driving = {path for path, node in self._drivers.items() if node.status is Status.RUNNING}
         self._open = {path for path in self._nodes if self._last_is_open(path)}
         self._taken_up = set(self._open)
         self._moved_s = board.get(self._keys.moved) if self._keys.moved in board else None
@@ -103,10 +104,11 @@ class Executions:
         for path in [path for path in self._open if self._nodes[path].status is not Status.RUNNING]:
             if path not in self._taken_up:
                 self._end(path, done=False)
-        moving = self._base.intersection(changed)
-        if any(
-            each.status is Status.RUNNING or (path in moving and each.status in _ENDED) for path, each in self._drivers
-        ):
+        moving = self._drivers.keys() & set(changed)
+        ended = [path for path in moving if self._drivers[path].status in _ENDED]
+        self._driving -= moving
+        self._driving |= {path for path in moving if self._drivers[path].status is Status.RUNNING}
+        if self._driving or ended:
             self._moved_s = self._clock.now()
             if moving or self._keys.moved not in self._board:
                 self._board.put(self._keys.moved, self._moved_s)

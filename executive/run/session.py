@@ -51,6 +51,7 @@ class Session:
         speaker_W: Pose2D | None = None,
     ) -> None:
         """`speaker_W` is where whoever asked for it stands; None: where the robot begins."""
+        self.name: Final = context.robot.name
         if speaker_W is not None:
             context.board.put(start_key(tree.robot_name, tree.mission_name), speaker_W)
         self.context = context
@@ -67,11 +68,6 @@ class Session:
         self._asked_at: Pose2D | None = None
         self._matched_s = -math.inf
         self._navigation: Mapping[str, object] = {}
-
-    @property
-    def name(self) -> str:
-        """The robot's name."""
-        return self.context.robot.name
 
     @property
     def tree(self) -> CompiledTree:

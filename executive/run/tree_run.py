@@ -64,7 +64,8 @@ class TreeRun:
         self._for_buttons = tuple(
             n for n in waits if isinstance(n.decorated, Decide) and n.decorated.path_id in buttons
         )
-        self._skills = frozenset(leaf.path_id for leaf in self._leaves)
+        self._skills = {leaf.path_id: leaf for leaf in self._leaves}
+        self._running = {path_id: leaf for path_id, leaf in self._skills.items() if leaf.status is Status.RUNNING}
         if profile is not None:
             for leaf in self._leaves:
                 profile.attach("skills", leaf, "initialise", "update", "terminate")
@@ -105,10 +106,20 @@ class TreeRun:
             self._set_gates(breakpoints)
         self._tick()
         changes = self.log_changes()
+        for change in changes:
+            self._note_running(change)
         self._executions.after_tick(change.path_id for change in changes)
         if self.journal is not None:
             self.journal.note(self._tick_note(changes))
         return bool(changes)
+
+    def _note_running(self, change: Change) -> None:
+        if change.path_id not in self._skills:
+            return
+        if change.after.status is Status.RUNNING:
+            self._running[change.path_id] = self._skills[change.path_id]
+        else:
+            self._running.pop(change.path_id, None)
 
     def _tick(self) -> None:
         """Tick the tree; or, while the rest of it stands still, what a node that was stopped was still to do."""
@@ -117,13 +128,12 @@ class TreeRun:
         if due is None:
             self._suspended = False
             if not self._ended_early:
-                self.root.tick_once()
+                self._observed.tick(self.root)
             return
         if not self._suspended:
             self._suspended = True
             suspend(self.root, sparing=due)
-        for _ in due.tick():
-            pass
+        self._observed.tick(due)
         if due.status != Status.RUNNING:
             endings.done()
             if due.status == Status.FAILURE:
@@ -144,9 +154,9 @@ class TreeRun:
         """What every node said last."""
         return self._observed.states
 
-    def log_changes(self) -> Sequence[Change]:
+    def log_changes(self, *, of_all: bool = False) -> Sequence[Change]:
         """Log the transitions since the last time, and what running skills do by now; the transitions."""
-        changes = self._observed.changes()
+        changes = self._observed.changes(of_all=of_all)
         transitions = [change for change in changes if change.is_transition]
         for change in transitions:
             self.context.publish(TRANSITIONS, self._transition(change))
@@ -167,7 +177,7 @@ class TreeRun:
             attempt("stop the tree", lambda: self.root.stop(Status.INVALID))
         for leaf in self._leaves:
             attempt(f"end {leaf.path_id}", leaf.abandon)
-        self.log_changes()
+        self.log_changes(of_all=True)
 
     def judge(self, ending: Ending | None, preempting: tuple[RobotResult, ...] = ()) -> RobotResult:
         """How it ended: by itself, else by `ending`."""
@@ -228,8 +238,7 @@ class TreeRun:
 
     def _tick_note(self, changes: Sequence[Change]) -> TickNote:
         context = self.context
-        running = (leaf for leaf in self._leaves if leaf.status is Status.RUNNING)
-        checkpoints = {leaf.path_id: leaf.checkpoint for leaf in running if leaf.checkpoint}
+        checkpoints = {path_id: kept for path_id, leaf in self._running.items() if (kept := leaf.checkpoint)}
         now_s, pose, charge = context.clock.now(), None, None
         if changes or now_s >= self._pose_due_s:
             self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.known_pose()

@@ -52,6 +52,7 @@ class StoreJournal:
     ) -> None:
         """`robot` is the one of several whose part it keeps; `charges` tells whether its battery's is noted, too."""
         self._connection, self._mission, self._robot, self._counts = connection, mission, robot, charges
+        self._board: Mapping[str, Any] = {}
         self._written: dict[str, Any] = {}
         self._steps: dict[str, tuple[object, ...]] = {}
         self._values: dict[str, str] = {}
@@ -123,6 +124,9 @@ class StoreJournal:
         return (self._mission, change.path_id, after.status.name, cause, after.message, checkpoint, now_s)
 
     def _take_values(self, board: Mapping[str, Any]) -> None:
+        if board is self._board:
+            return
+        self._board = board
         for key, value in board.items():
             if key in self._written and self._written[key] is value:
                 continue

@@ -16,7 +16,6 @@ from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.decorators import Decorator
 
 from executive.run.executions import execution_keys
 from executive.run.findings import finding_keys
@@ -24,7 +23,7 @@ from executive.store.recollection import Recollection
 from executive.store.records import Memory, StepRecord
 from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.decorators import Guard
+from executive.tree.behaviours.decorators import ExplainedDecorator, Guard
 from executive.tree.behaviours.explained import Explained
 from executive.tree.behaviours.skill_leaf import Remembered
 from executive.tree.compiler import CompiledTree
@@ -242,7 +241,7 @@ class _Unguarded:
         if self._pass_on is not None:
             yield from self._pass_on()
             return
-        yield from Decorator.tick(self._node)
+        yield from ExplainedDecorator.tick(self._node)
         if self._node.status is not Status.RUNNING:
             self._pass_on = self._guarded
 

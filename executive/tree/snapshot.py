@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -13,8 +13,7 @@ from executive.tree.behaviours.explained import Explained
 from skills.api import Cause
 
 
-@dataclass(frozen=True)
-class NodeState:
+class NodeState(NamedTuple):
     """Status, cause, sentence and, for a skill, progress from 0 to 1 where known."""
 
     status: Status = Status.INVALID
@@ -23,8 +22,7 @@ class NodeState:
     progress: float | None = None
 
 
-@dataclass(frozen=True)
-class Change:
+class Change(NamedTuple):
     """A node that says something else than before."""
 
     path_id: str
@@ -49,7 +47,11 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 class Observed:
-    """A built tree that is read after every tick. `states` gives what every explained node said last, parents first."""
+    """A built tree that is read after every tick. `states` gives what every explained node said last, parents first.
+
+    A node says something else only when it is ticked, here by `tick`, or stopped: only those are looked at. So a tick
+    costs nothing for the nodes that it leaves alone.
+    """
 
     def __init__(self, root: Behaviour) -> None:
         self.nodes: tuple[Behaviour, ...] = tuple(_walk(root))
@@ -57,23 +59,46 @@ class Observed:
         self._last = [_state(node) for node in self._explained]
         named = zip(self._explained, self._last, strict=True)
         self.states: Snapshot = {node.path_id: state for node, state in named}
+        self._index: Mapping[Behaviour, int] = {node: index for index, node in enumerate(self._explained)}
+        self._touched: set[Behaviour] = set()
+        for node in self._index:
+            vars(node)["stop"] = _noted(node, self._touched)
 
-    def changes(self) -> Sequence[Change]:
-        """What changed since the last time, in the order of the tree; brings `states` up to date."""
-        found = []
-        for index, (node, last) in enumerate(zip(self._explained, self._last, strict=True)):
-            if (
-                node.status is last.status
-                and node.cause is last.cause
-                and node.message == last.message
-                and node.progress == last.progress
-            ):
-                continue
-            self._last[index] = _state(node)
-            found.append(Change(node.path_id, last, self._last[index]))
+    def tick(self, node: Behaviour) -> None:
+        """Tick the tree, or a part of it."""
+        self._touched.update(node.tick())
+
+    def changes(self, *, of_all: bool = False) -> Sequence[Change]:
+        """What changed since the last time, in the order of the tree; brings `states` up to date.
+
+        After an exception in a tick, or where a node was changed by hand, it has to look at all nodes (`of_all`).
+        """
+        touched = sorted(self._index[node] for node in self._touched if node in self._index)
+        self._touched.clear()
+        found = list(self._changed(range(len(self._explained)) if of_all else touched))
         if found:
             self.states = {**self.states, **{change.path_id: change.after for change in found}}
         return found
+
+    def _changed(self, indices: Iterable[int]) -> Iterator[Change]:
+        for index in indices:
+            node, last = self._explained[index], self._last[index]
+            state = _state(node)
+            if state != last:
+                self._last[index] = state
+                yield Change(node.path_id, last, state)
+
+
+def _noted(node: Behaviour, touched: set[Behaviour]) -> Callable[[Status], None]:
+    """The node's `stop`, which adds it to `touched`."""
+    stop = node.stop
+
+    def noted_stop(new_status: Status = Status.INVALID) -> None:
+        """As the node's own."""
+        touched.add(node)
+        stop(new_status)
+
+    return noted_stop
 
 
 def _walk(root: Behaviour) -> Iterator[Behaviour]:

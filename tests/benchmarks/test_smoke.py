@@ -43,6 +43,12 @@ def barn_folder(tmp_path):
 
 
 @pytest.mark.nightly
+def test_ticks_of_a_small_and_a_larger_tree_are_timed():
+    result = result_of("tick_time", "--more", 0, 1, "--ticks", 8, "--rounds", 1)
+    assert len(result["tick_us"]) == 2 and min(result["tick_us"].values()) > 0.0, result
+
+
+@pytest.mark.nightly
 def test_a_narrow_world_without_map_is_driven_through(barn_folder):
     result = result_of("barn", barn_folder, "--jobs", 1)
     assert (result["runs"][0]["world"], result["success_rate"]) == (7, 1.0), result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -19,6 +19,7 @@ from executive.run.worker import LockStepWorker
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
 from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.snapshot import Change, Observed
 from skills.api import (
     Cause,
     Failed,
@@ -75,6 +76,7 @@ class ScriptedRobot:
         self.leases = 0
         self.calls: list[str] = []
         self.raising: dict[str, BaseException] = {}
+        self._odometry: tuple[object, Odometry] | None = None
 
     def _called(self, verb: str) -> CommandId:
         self.calls.append(verb)
@@ -85,7 +87,10 @@ class ScriptedRobot:
     def odometry(self) -> Odometry:
         if "odometry" in self.raising:
             raise self.raising["odometry"]
-        return Odometry(self.clock.now(), self.standing.transform(), (0.0, 0.0, 0.0))
+        now = self.clock.now(), self.standing
+        if self._odometry is None or self._odometry[0] != now:  # one reading for all who ask at one time
+            self._odometry = now, Odometry(now[0], self.standing.transform(), (0.0, 0.0, 0.0))
+        return self._odometry[1]
 
     def gripper(self) -> Gripper:
         opening = self.opening if self.holding else self.empty_rad
@@ -143,6 +148,9 @@ class ScriptedRobot:
             self.lease, self.driving = None, False
 
 
+ORIGIN = RigidTransform()
+
+
 class StillLocaliser:
     """Stands at the origin of the world."""
 
@@ -152,7 +160,7 @@ class StillLocaliser:
         self.stamp_s = 0.0
 
     def estimate(self) -> LocalisationEstimate:
-        return LocalisationEstimate(self.stamp_s, RigidTransform(), np.zeros((3, 3)), self.localised)
+        return LocalisationEstimate(self.stamp_s, ORIGIN, np.zeros((3, 3)), self.localised)
 
     def update(self, robot: Any) -> None:
         self.updates += 1
@@ -358,6 +366,21 @@ FETCH = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
     "Take [drink] to [start] and do [Nothing] to [Nothing]",
 )
+
+
+@pytest.fixture(autouse=True)
+def no_change_is_missed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """In every run of every test: the nodes that are not looked at after a tick say what they said before."""
+    looked, missed = Observed.changes, list[Change]()
+
+    def checked(self: Observed, *, of_all: bool = False) -> Sequence[Change]:
+        found = looked(self, of_all=of_all)
+        missed.extend(looked(self, of_all=True))
+        return found
+
+    monkeypatch.setattr(Observed, "changes", checked)
+    yield
+    assert missed == []
 
 
 @pytest.fixture

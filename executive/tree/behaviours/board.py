@@ -17,12 +17,14 @@ class Board:
     def __init__(self, prefix: str) -> None:
         self._prefix = f"{prefix}/"
         self._values: dict[str, Any] = {}
+        self._copy: Mapping[str, Any] | None = None
 
     def put(self, key: str, value: Any) -> None:
         """Store a value. Raises ValueError for a key with a dot or without the robot's name in front."""
         if "." in key or not key.startswith(self._prefix):
             raise ValueError(f"blackboard key '{key}': must begin with '{self._prefix}' and hold no dot")
         self._values[key] = value
+        self._copy = None
 
     def get(self, key: str) -> Any:
         """The value under `key`. Raises KeyError with a plain sentence when nothing wrote it yet."""
@@ -34,13 +36,16 @@ class Board:
         """Take values off the board, so that nothing leaks into another attempt; unknown keys are let pass."""
         for key in keys:
             self._values.pop(key, None)
+        self._copy = None
 
     def __contains__(self, key: str) -> bool:
         return key in self._values
 
     def values(self) -> Mapping[str, Any]:
-        """A copy of all values."""
-        return dict(self._values)
+        """A copy of all values, the same one until they change."""
+        if self._copy is None:
+            self._copy = dict(self._values)
+        return self._copy
 
 
 class Binding(Protocol):

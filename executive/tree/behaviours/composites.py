@@ -29,7 +29,7 @@ class Conditional(Protocol):
 class MemoryComposite(ExplainedNode, Composite):
     """Ticks its children one after the other and never goes back to one that is done."""
 
-    goes_on_after: ClassVar[frozenset[Status]] = frozenset({Status.SUCCESS})
+    goes_on_after: ClassVar[tuple[Status, ...]] = (Status.SUCCESS,)
     children: list[Behaviour]
     _index: int = field(default=0, init=False)
 
@@ -109,7 +109,7 @@ class MemorySelector(MemoryComposite):
     children lead to the same goal: after a failure that is final for one, the others are passed over.
     """
 
-    goes_on_after = frozenset({Status.FAILURE})
+    goes_on_after: ClassVar[tuple[Status, ...]] = (Status.FAILURE,)
     exhausted_cause: Cause | None = None
     exhausted_message: str = ""
     one_goal: bool = False
@@ -145,7 +145,7 @@ class MemoryRound(MemorySelector):
     tick. After the last: SUCCESS with the sentences of those that worked when any did, else FAILURE as a selector.
     """
 
-    goes_on_after = frozenset({Status.SUCCESS, Status.FAILURE})
+    goes_on_after = (Status.SUCCESS, Status.FAILURE)
 
     def _take_over(self, child: Behaviour) -> None:
         done = [one for one in self.children if one.status == Status.SUCCESS]

@@ -81,9 +81,12 @@ class Condition(ABC):
 
     def violated(self, context: RunContext) -> Verdict:
         """What speaks against going on, None when nothing does. Called before each tick of the subtree."""
-        now_s, fresh, policy = context.clock.now(), self.freshness, self.stale or self.freshness.policy
+        fresh, policy = self.freshness, self.stale or self.freshness.policy
+        if policy is StaleData.ACCEPT:
+            return self.judged(context)
+        now_s = context.clock.now()
         age_s = now_s - self.stamp_s(context)
-        if age_s <= fresh.max_age_s or policy is StaleData.ACCEPT:
+        if age_s <= fresh.max_age_s:
             self._stale_since_s = None
             return self.judged(context)
         self._stale_since_s = now_s if self._stale_since_s is None else self._stale_since_s

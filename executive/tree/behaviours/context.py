@@ -105,5 +105,5 @@ class RunContext(SkillContext):
 
     def for_skill(self, path_id: str) -> SkillContext:
         """The part of it that a skill may touch, with a seed of its own."""
-        lent = {each.name: getattr(self, each.name) for each in fields(SkillContext)}
+        lent = {each.name: getattr(self, each.name) for each in fields(SkillContext) if each.init}
         return SkillContext(**{**lent, "seed": leaf_seed(self.seed, path_id)})

@@ -28,6 +28,17 @@ class ExplainedDecorator(ExplainedNode, Decorator):
     def __post_init__(self) -> None:
         Decorator.__init__(self, self.name, self.child)
 
+    def tick(self) -> Iterator[Behaviour]:
+        """Tick the child, then judge. As the library's, which also writes debug texts and checks the status' type."""
+        if self.status != Status.RUNNING:
+            self.initialise()
+        yield from self.decorated.tick()
+        status = self.update()
+        if status != Status.RUNNING:
+            self.stop(status)
+        self.status = status
+        yield self
+
     def stop(self, new_status: Status) -> None:
         """Interrupted while running: stop the child and say so. Reset: reset the child too."""
         interrupted = new_status == Status.INVALID and self.status == Status.RUNNING

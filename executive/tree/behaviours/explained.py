@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from py_trees.behaviour import Behaviour
@@ -50,6 +51,16 @@ class ExplainedLeaf(ExplainedNode, Behaviour):
 
     def __post_init__(self) -> None:
         Behaviour.__init__(self, self.name)
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Do the work of a tick. As the library's, which also writes debug texts and checks the status' type."""
+        if self.status != Status.RUNNING:
+            self.initialise()
+        status = self.update()
+        if status != Status.RUNNING:
+            self.stop(status)
+        self.status = status
+        yield self
 
 
 def cause_of(node: Behaviour) -> Cause:

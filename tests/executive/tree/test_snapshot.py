@@ -1,9 +1,11 @@
-"""What counts as news between two snapshots of a tree."""
+"""What counts as news between two snapshots of a tree, and which nodes are looked at for it."""
 
 import pytest
 from py_trees.common import Status
 
-from executive.tree.snapshot import Change, NodeState
+from executive.tree.behaviours.composites import MemorySequence
+from executive.tree.snapshot import Change, NodeState, Observed
+from tests.executive.tree.behaviours.scripted import Leaf
 
 GOING = NodeState(Status.RUNNING, None, "going, 2.5 m to go")
 
@@ -21,3 +23,56 @@ GOING = NodeState(Status.RUNNING, None, "going, 2.5 m to go")
 )
 def test_new_words_of_a_running_node_are_news_and_new_numbers_are_not(before, after, new):
     assert Change("alice/go", before, after).is_activity is new
+
+
+@pytest.fixture
+def no_change_is_missed():
+    """Here a node is changed by hand, too."""
+
+
+@pytest.fixture
+def walk():
+    """A sequence of two leaves, "one" for two ticks and "two" for as long as it is ticked."""
+    leaves = Leaf("RS", "one"), Leaf("R", "two")
+    return MemorySequence(path_id="alice/walk", name="walk", children=leaves)
+
+
+def changed(observed, **how):
+    return {change.path_id: change.after.status for change in observed.changes(**how)}
+
+
+def test_only_nodes_that_were_ticked_or_stopped_are_looked_at(walk):
+    observed = Observed(walk)
+    observed.tick(walk)
+    assert changed(observed) == {"alice/walk": Status.RUNNING, "alice/one": Status.RUNNING}
+    idle = walk.children[1]
+    idle.message = "set by hand"
+    observed.tick(walk.children[0])
+    assert changed(observed) == {"alice/one": Status.SUCCESS}
+    assert changed(observed, of_all=True) == {"alice/two": Status.INVALID}
+    assert observed.states["alice/two"].message == "set by hand"
+
+
+def test_nodes_that_are_stopped_from_outside_are_looked_at(walk):
+    observed = Observed(walk)
+    for _ in range(2):
+        observed.tick(walk)
+    assert changed(observed)["alice/two"] is Status.RUNNING
+    walk.stop(Status.INVALID)
+    assert changed(observed) == {"alice/walk": Status.INVALID, "alice/two": Status.INVALID}
+    assert changed(observed) == {}
+
+
+def test_changes_come_in_the_order_of_the_tree(walk):
+    observed = Observed(walk)
+    observed.tick(walk)
+    assert [change.path_id for change in observed.changes()] == ["alice/walk", "alice/one"]
+
+
+def test_a_node_that_an_exception_kept_from_its_end_is_found_among_all(walk):
+    observed = Observed(walk)
+    walk.children[0].update = lambda: 1 / 0
+    with pytest.raises(ZeroDivisionError):
+        observed.tick(walk)
+    walk.status = Status.RUNNING
+    assert changed(observed, of_all=True) == {"alice/walk": Status.RUNNING}

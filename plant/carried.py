@@ -30,6 +30,8 @@ WITH_HAND_M_S: Final = 0.02
 """What moves against the hand by less than this moves with it."""
 FASTEST_SPIN_RAD_S: Final = 25.0
 """A third of a radian in a step of 12.5 ms."""
+_FASTEST_ALONG_RAD_S: Final = FASTEST_SPIN_RAD_S / 3.0**0.5
+"""What spins no faster about any axis cannot be too fast."""
 _AT_HAND_M: Final = 0.5
 
 
@@ -40,19 +42,23 @@ class Carried:
         self._plant, self._context = plant, context
         self._loose = [body for body in loose if body.is_floating_base_body()]
         starts = [body.floating_velocities_start_in_v() for body in self._loose]
+        places = [body.floating_positions_start() + 4 for body in self._loose]
+        self._places = np.array([range(start, start + 3) for start in places], dtype=np.int64).reshape(-1, 3)
         self._spins = np.array([range(start, start + 3) for start in starts], dtype=np.int64).reshape(-1, 3)
 
     def after_step(self, hand: RigidBody, dt_s: float) -> None:
         """Move what the hand carries along its arc; dt_s is the length of the step."""
         plant, context = self._plant, self._context
         p_WH = plant.EvalBodyPoseInWorld(context, hand).translation()
+        places_W = plant.GetPositions(context)[self._places]
+        near = np.flatnonzero(np.abs(places_W - p_WH).max(axis=1) <= _AT_HAND_M)
+        if len(near) == 0:
+            return
         V_WH = plant.EvalBodySpatialVelocityInWorld(context, hand)
-        for body in self._loose:
-            p_WO = plant.EvalBodyPoseInWorld(context, body).translation()
-            if np.abs(p_WO - p_WH).max() > _AT_HAND_M:
-                continue
+        for number in near:
+            body, p_WO = self._loose[number], places_W[number]
             v_WO = plant.EvalBodySpatialVelocityInWorld(context, body).translational()
-            with_hand = V_WH.translational() + np.cross(V_WH.rotational(), p_WO - p_WH)
+            with_hand = V_WH.translational() + _cross(V_WH.rotational(), p_WO - p_WH)
             if np.linalg.norm(v_WO - with_hand) < WITH_HAND_M_S:
                 self._shift(body, arc_m(self._bias_m_s2(hand, p_WO), dt_s))
 
@@ -68,7 +74,7 @@ class Carried:
         """Slow down the free bodies that spin faster than `FASTEST_SPIN_RAD_S`."""
         velocities = self._plant.GetVelocities(self._context)
         spins = velocities[self._spins]
-        if spins.size and (spins * spins).sum(axis=1).max() > FASTEST_SPIN_RAD_S**2:
+        if spins.size and np.abs(spins).max() > _FASTEST_ALONG_RAD_S:
             rates = np.linalg.norm(spins, axis=1, keepdims=True)
             velocities[self._spins] = spins * np.minimum(1.0, FASTEST_SPIN_RAD_S / np.maximum(rates, 1e-9))
             self._plant.SetVelocities(self._context, velocities)
@@ -83,3 +89,9 @@ class Carried:
 def arc_m(acceleration_W: FloatArray, dt_s: float) -> FloatArray:
     """How far (m) a point that accelerates (m/s^2) is off its tangent after dt_s."""
     return np.asarray(0.5 * dt_s**2 * acceleration_W)
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """The product a x b of two vectors (3,)."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

@@ -16,7 +16,7 @@ EASY_PERIOD_WALL_S = 0.7
 
 
 class LiveScene:
-    """Shows the plant's positions; call it after every step, from the thread that made it.
+    """Shows the plant's positions; call it after every tick, from the thread that made it.
 
     It reads the plant's context and changes nothing there: a run is the same with it and without.
     """

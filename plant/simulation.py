@@ -128,27 +128,58 @@ class Engine:
         return self._steps * TIME_STEP_S
 
     def advance(self, dt_s: float) -> None:
-        """Step the plant by dt_s, rounded to whole steps (at least one)."""
-        for _ in range(max(1, round(dt_s / TIME_STEP_S))):
+        """Step the plant by dt_s, rounded to whole steps (at least one), and take readings."""
+        self.step(dt_s)
+        self.sense()
+
+    def step(self, dt_s: float) -> None:
+        """Step the plant by dt_s, rounded to whole steps (at least one); the robots' readings stay as they are."""
+        holding = [name for name, robot in self._robots.items() if robot.gripper().holding]
+        until = self._steps + max(1, round(dt_s / TIME_STEP_S))
+        while self._steps < until:
             if self._steps % SLEEP_PERIOD_STEPS == 0:
                 self._sleepers.update(self.now())
             if self._steps % CONTROL_STEPS == 0:
                 self._command_robots()
-            holding = [name for name, robot in self._robots.items() if robot.gripper().holding]
-            self.walkers.before_step(TIME_STEP_S, standing=self.receivers.busy)
-            self.receivers.before_step(self.now(), TIME_STEP_S, holding)
-            self.doors.before_step(self.now(), TIME_STEP_S)
-            if self.moves is not None:
-                self.moves.before_step(self.now(), self._hands_W, holding)
-            self._steps += 1
-            self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
+            self._before_step(0, holding)
+            steps = min(CONTROL_STEPS - self._steps % CONTROL_STEPS, until - self._steps)
+            if steps > 1 and self._only_robots_move(holding):
+                for later in range(1, steps):
+                    self._before_step(later, holding)
+            else:
+                steps = 1
+            self._do_steps(steps, holding)
+
+    def _before_step(self, later: int, holding: Sequence[str]) -> None:
+        """Move people, doors and what somebody moves, before the next step or a `later` one."""
+        now_s = (self._steps + later) * TIME_STEP_S
+        self.walkers.before_step(TIME_STEP_S, standing=self.receivers.busy)
+        self.receivers.before_step(now_s, TIME_STEP_S, holding)
+        self.doors.before_step(now_s, TIME_STEP_S)
+        if self.moves is not None:
+            self.moves.before_step(now_s, self._hands_W, holding)
+
+    def _only_robots_move(self, holding: Sequence[str]) -> bool:
+        """Whether nothing is to be done or seen between two steps of one control period."""
+        seen = any(every % CONTROL_STEPS for every, _ in self._observers)
+        still = self.walkers.still and self.doors.still and self.moves is None and not self.receivers.busy
+        return still and not seen and not holding and self._sleepers.all_asleep
+
+    def _do_steps(self, steps: int, holding: Sequence[str]) -> None:
+        """Let the plant do one step, or several in one go where nothing is to be done between them."""
+        self._steps += steps
+        self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
+        if not self._sleepers.all_asleep:
             self._carried.limit_spin()
-            for name in holding:
-                self._carried.after_step(self._hands[name], TIME_STEP_S)
-            self.work["plant_steps"] += 1
-            for every, observer in self._observers:
-                if self._steps % every == 0:
-                    observer(self.now())
+        for name in holding:
+            self._carried.after_step(self._hands[name], TIME_STEP_S)
+        self.work["plant_steps"] += steps
+        for every, observer in self._observers:
+            if self._steps % every == 0:
+                observer(self.now())
+
+    def sense(self) -> None:
+        """Let all robots take readings."""
         for robot in self._robots.values():
             robot.sense(self.now())
         for listener in self._after_advance:
@@ -374,7 +405,7 @@ class Simulation:
     def show_live(self) -> LiveScene:
         """Show the world in a browser from now on. Raises RuntimeError when no port is free."""
         scene = LiveScene(self.engine.world, self.engine.context, self._overview())
-        self.engine.observe(scene)
+        self.engine.after_advance(lambda: scene(self.engine.now()))
         return scene
 
     def save_recording(self, path: Path) -> None:

@@ -76,7 +76,7 @@ class Sleepers:
     """Puts the loose objects of one plant to sleep and wakes them; call `update` regularly, before the plant steps."""
 
     def __init__(self, world: WorldDiagram, root_context: Context, limits: SleepLimits | None = None) -> None:
-        """All objects are awake at first."""
+        """All objects are awake at first; `all_asleep` says whether no loose body can move now."""
         plant, inspector = world.plant, world.scene_graph.model_inspector()
         self._plant, self._limits = plant, limits or SleepLimits()
         self._context = plant.GetMyMutableContextFromRoot(root_context)
@@ -95,6 +95,11 @@ class Sleepers:
         starts = [each.body.floating_positions_start() for each in self._objects]
         self._places = np.array([range(start, start + 7) for start in starts], dtype=np.int64).reshape(-1, 7)
         self._asleep = np.zeros(len(self._objects), dtype=bool)
+        loose = (
+            body for body in _moving_bodies(plant) if int(body.model_instance()) in map(int, world.models.values())
+        )
+        self._restless = sum(body.is_floating_base_body() for body in loose) - len(self._objects)
+        self.all_asleep = False
         self._lift = np.zeros(plant.num_velocities())
         self._still_s = np.zeros(len(self._objects))
         self._last: tuple[float, FloatArray, FloatArray] | None = None
@@ -165,6 +170,7 @@ class Sleepers:
             plant.SetVelocities(self._context, velocities)
         plant.get_applied_generalized_force_input_port().FixValue(self._context, self._lift)
         self._asleep[number] = not self._asleep[number]
+        self.all_asleep = self._restless == 0 and bool(self._asleep.all())
 
 
 def _objects(

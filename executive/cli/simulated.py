@@ -22,8 +22,11 @@ from executive.record.profile import Profile
 from executive.run.control import Control
 from executive.run.outcome import RobotResult
 from executive.run.runner import Observer, RunEntry
+from executive.run.worker import WorkThread
 from executive.tree.compiler import CompiledTree
+from plant.pipeline import Pipeline
 from plant.referee import Referee
+from plant.simulation import Simulation
 from plant.variation import AS_IT_IS, Variation
 from plant.worlds.world import World
 from skills.files.errors import InputError
@@ -47,17 +50,24 @@ class SimulatedBackend:
         """Build the plant, things set by the seed. Raises InputError when they do not fit into the world."""
         self._world, self._robots, self._record = world, robots, record
         self._simulation = simulate(world, robots, seed=seed, record=record, variation=variation)
+        self._steps = WorkThread("errand-plant")
+        self._pipeline = Pipeline(self._simulation.engine, self._steps.do)
         self._keep: Callable[[], None] | None = None
 
     @property
     def clock(self) -> Clock:
         """The plant's clock, which steps it."""
-        return self._simulation.clock
+        return self._pipeline
 
     @property
     def referee(self) -> Referee:
         """The plant's referee."""
-        return self._simulation.referee
+        return self._settled().referee
+
+    def _settled(self) -> Simulation:
+        """The simulation, once no step is under way."""
+        self._pipeline.settle()
+        return self._simulation
 
     def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
         """The robot with its estimators; the plant's state is taken up and kept where `durable` says so."""
@@ -65,34 +75,41 @@ class SimulatedBackend:
         if robot is None:
             hint = f"known: {', '.join(self._robots)}"
             raise InputError(f"there is no robot '{tree.robot_name}' in {self._world.name}", hint=hint)
+        driven = self._pipeline.robots[tree.robot_name]
         if durable is None:
-            return run_entry(self._simulation, self._world, tree, robot.stack, told=robot.told)
+            return replace(run_entry(self._simulation, self._world, tree, robot.stack, told=robot.told), robot=driven)
         told, believed = robot.told and not durable.take_up, durable.poses.get(tree.robot_name)
         entry = run_entry(self._simulation, self._world, tree, robot.stack, believed=believed, told=told)
         journal = durable.journals[tree.robot_name]
         journal.keep_world = self._keeping(durable)
-        return replace(entry, journal=journal)
+        return replace(entry, robot=driven, journal=journal)
 
     def _keeping(self, durable: Durable) -> Callable[[], None]:
         """Keeps the plant's state, which the first robot to be had takes up where `durable` says so."""
         if self._keep is None:
             if durable.take_up:
                 take_up_plant(self._simulation, durable.plant, label=durable.take_up_label)
-            self._keep = self._simulation.keep_in(durable.plant, label=durable.label)
+            keep = self._simulation.keep_in(durable.plant, label=durable.label)
+
+            def keep_settled() -> None:
+                self._pipeline.settle()
+                keep()
+
+            self._keep = keep_settled
         return self._keep
 
     def happened(self) -> Sequence[tuple[float, str]]:
         """What doors did, and what somebody moved."""
-        return self._simulation.clock.happened
+        return self._pipeline.happened
 
     def work(self) -> Mapping[str, int]:
         """The plant's counters."""
-        counts: Mapping[str, int] = self._simulation.work()
+        counts: Mapping[str, int] = self._settled().work()
         return counts
 
     def attach(self, profile: Profile) -> None:
         """Time the plant's steps, the referee, and each robot's control, sensors and pictures."""
-        profile.attach("plant", self._simulation.clock, "advance")
+        profile.attach("plant", self._simulation.engine, "step")
         profile.attach("referee", self._simulation.referee, "observe")
         for robot in self._simulation.robots.values():
             profile.attach("joint control", robot, "control")
@@ -108,14 +125,14 @@ class SimulatedBackend:
         self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
     ) -> RefereeReport:
         """What the plant's referee saw."""
-        verdict = judge(self._simulation, tree, result, before=before, since_s=since_s)
+        verdict = judge(self._settled(), tree, result, before=before, since_s=since_s)
         return RefereeReport(**asdict(verdict), events=self._simulation.referee.events)
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Write recording and pictures, where the run was recorded."""
         if not self._record:
             return None
-        self._simulation.save_recording(out / "recording.html")
+        self._settled().save_recording(out / "recording.html")
         draw_artifacts(artifacts, self._simulation, sorted(self._robots), out)
         return out / "recording.html"
 

@@ -28,7 +28,7 @@ def in_lock_step_job() -> bool:
     return threading.current_thread().name == _LOCK_STEP_THREAD
 
 
-class _Thread:
+class WorkThread:
     """Does one piece of work after the other; ends when it is closed or let go of."""
 
     def __init__(self, name: str) -> None:
@@ -151,7 +151,7 @@ class LockStepWorker:
     """
 
     def __init__(self, clock: Clock) -> None:
-        self._clock, self._thread = clock, _Thread(_LOCK_STEP_THREAD)
+        self._clock, self._thread = clock, WorkThread(_LOCK_STEP_THREAD)
 
     def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
         """Start `work`. What it raises is raised by `result`. Raises ValueError for a negative latency."""
@@ -191,7 +191,7 @@ class ThreadWorker:
     """Runs work in one thread beside the ticks, one piece after the other; for real time. Latencies are its own."""
 
     def __init__(self) -> None:
-        self._thread = _Thread(_REAL_TIME_THREAD)
+        self._thread = WorkThread(_REAL_TIME_THREAD)
 
     def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
         """Hand `work` to the thread."""

@@ -34,50 +34,12 @@ class Active(Generic[PayloadT]):
     until_s: float
 
 
-class CommandTable:
-    """The running command of each part, and the last that are over.
-
-    Of one that was over long ago it is only known that it is over.
-    """
+class CommandStatuses:
+    """The statuses of the last commands. Of one that was over long ago it is only known that it is over."""
 
     def __init__(self) -> None:
         self._statuses: dict[CommandId, CommandStatus] = {}
-        self._running: dict[Part, Active[object]] = {}
         self._given = 0
-
-    def begin(self, part: Part, payload: object, now_s: float, until_s: float) -> CommandId:
-        """Start a command in place of the part's running one."""
-        command = self._new_id()
-        self.finish(part, CommandState.STOPPED, f"replaced by command {command}")
-        self._statuses[command] = CommandStatus(CommandState.RUNNING)
-        self._running[part] = Active(command, payload, now_s, until_s)
-        return command
-
-    def refuse(self, reason: str) -> CommandId:
-        """A command that never started."""
-        command = self._new_id()
-        self._statuses[command] = CommandStatus(CommandState.REFUSED, reason)
-        return command
-
-    def note(self, state: CommandState, reason: str = "") -> CommandId:
-        """A command that is over as soon as it is given."""
-        command = self._new_id()
-        self._statuses[command] = CommandStatus(state, reason)
-        return command
-
-    def finish(self, part: Part, state: CommandState, reason: str = "") -> None:
-        """End the part's running command, if any."""
-        active = self._running.pop(part, None)
-        if active is not None:
-            self._statuses[active.id] = CommandStatus(state, reason)
-
-    def running(self, part: Part) -> Active[object] | None:
-        """The part's running command."""
-        return self._running.get(part)
-
-    def part_of(self, command: CommandId) -> Part | None:
-        """The part that runs `command` now, or None."""
-        return next((part for part, active in self._running.items() if active.id == command), None)
 
     def status(self, command: CommandId) -> CommandStatus:
         """State of a command. Raises KeyError for an id never given."""
@@ -86,11 +48,53 @@ class CommandTable:
             raise KeyError(command)
         return known or CommandStatus(CommandState.STOPPED, "it was over long ago")
 
-    def _new_id(self) -> CommandId:
+    def add(self, status: CommandStatus) -> CommandId:
+        """A new command in this state."""
         self._given += 1
         if len(self._statuses) > MOST_KEPT:
-            running = {active.id for active in self._running.values()}
-            old = [each for each in list(self._statuses)[: MOST_KEPT // 2] if each not in running]
-            for each in old:
-                del self._statuses[each]
+            for each in list(self._statuses)[: MOST_KEPT // 2]:
+                if self._statuses[each].state is not CommandState.RUNNING:
+                    del self._statuses[each]
+        self._statuses[CommandId(self._given)] = status
         return CommandId(self._given)
+
+    def change(self, command: CommandId, status: CommandStatus) -> None:
+        """The state of a command is another now."""
+        self._statuses[command] = status
+
+
+class CommandTable(CommandStatuses):
+    """The running command of each part, and the last that are over."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._running: dict[Part, Active[object]] = {}
+
+    def begin(self, part: Part, payload: object, now_s: float, until_s: float) -> CommandId:
+        """Start a command in place of the part's running one."""
+        command = self.add(CommandStatus(CommandState.RUNNING))
+        self.finish(part, CommandState.STOPPED, f"replaced by command {command}")
+        self._running[part] = Active(command, payload, now_s, until_s)
+        return command
+
+    def refuse(self, reason: str) -> CommandId:
+        """A command that never started."""
+        return self.add(CommandStatus(CommandState.REFUSED, reason))
+
+    def note(self, state: CommandState, reason: str = "") -> CommandId:
+        """A command that is over as soon as it is given."""
+        return self.add(CommandStatus(state, reason))
+
+    def finish(self, part: Part, state: CommandState, reason: str = "") -> None:
+        """End the part's running command, if any."""
+        active = self._running.pop(part, None)
+        if active is not None:
+            self.change(active.id, CommandStatus(state, reason))
+
+    def running(self, part: Part) -> Active[object] | None:
+        """The part's running command."""
+        return self._running.get(part)
+
+    def part_of(self, command: CommandId) -> Part | None:
+        """The part that runs `command` now, or None."""
+        return next((part for part, active in self._running.items() if active.id == command), None)

@@ -46,7 +46,7 @@ class ActuatedJoints:
         self, desired: FloatArray, feed_forward: FloatArray, positions: FloatArray, rates: FloatArray
     ) -> FloatArray:
         """Efforts of the actuators in a state, for a desired state and feed-forward efforts."""
-        goals, goal_rates = np.split(desired, 2)
+        goals, goal_rates = desired[: len(self.names)], desired[len(self.names) :]
         wanted = self.stiffness * (goals - positions) + self._damping * (goal_rates - rates) + feed_forward
-        efforts: FloatArray = np.clip(wanted, -self.efforts, self.efforts)
+        efforts: FloatArray = np.minimum(np.maximum(wanted, -self.efforts), self.efforts)
         return efforts

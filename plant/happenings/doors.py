@@ -90,6 +90,11 @@ class Doors:
         self._closing = {name: share == 1.0 for name, share in self._shares.items()}
         self._history: dict[str, list[tuple[float, float]]] = {name: [(0.0, s)] for name, s in self._shares.items()}
 
+    @property
+    def still(self) -> bool:
+        """Whether there is no door that moves."""
+        return not self._doors
+
     def history(self) -> Mapping[tuple[float, float], Sequence[tuple[float, float]]]:
         """Changes of each door by its position (x, y): time (s) and closed share, 0 open, 1 closed, 0.5 moving."""
         return {door.at: tuple(self._history[name]) for name, door in self._doors.items()}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -46,6 +47,11 @@ class LegKinematics:
             shin_m=-facts["foot"]["xyz"][2],
         )
 
+    @cached_property
+    def _thigh(self) -> tuple[float, float]:
+        """Length of the thigh (m) and its angle to the link's vertical (rad)."""
+        return math.hypot(self.thigh_x_m, self.thigh_z_m), math.atan2(self.thigh_x_m, self.thigh_z_m)
+
     def foot(self, hx_rad: float, hy_rad: float, kn_rad: float) -> FloatArray:
         """p_BFoot, the foot's centre in the body frame, shape (3,)."""
         shin_x, shin_z = -self.shin_m * math.sin(kn_rad), -self.shin_m * math.cos(kn_rad)
@@ -67,11 +73,11 @@ class LegKinematics:
             raise UnreachableFootError(f"foot at {p_BFoot} lies beside the hip")
         drop = -math.sqrt(drop_squared)
         hx = math.atan2(z, y) - math.atan2(drop, self.side_m)
-        thigh = math.hypot(self.thigh_x_m, self.thigh_z_m)
+        thigh, bend = self._thigh
         cosine = (x * x + drop_squared - thigh**2 - self.shin_m**2) / (2 * thigh * self.shin_m)
         if abs(cosine) > 1.0:
             raise UnreachableFootError(f"foot at {p_BFoot} is out of the leg's reach")
-        kn = -math.acos(cosine) - math.atan2(self.thigh_x_m, self.thigh_z_m)
+        kn = -math.acos(cosine) - bend
         u_x = self.thigh_x_m - self.shin_m * math.sin(kn)
         u_z = -self.thigh_z_m - self.shin_m * math.cos(kn)
         hy = math.atan2(u_x, -u_z) - math.atan2(x, -drop)

@@ -63,6 +63,11 @@ class Walkers:
         """The walk of one of them. Raises KeyError."""
         return self._walks[name]
 
+    @property
+    def still(self) -> bool:
+        """Whether nobody walks at all."""
+        return not self._walks
+
     def places_W(self) -> Iterator[Point]:
         """Where everybody is, (x, y)."""
         yield from (walk.place_W for walk in self._walks.values())

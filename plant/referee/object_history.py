@@ -218,6 +218,16 @@ class ObjectHistory:
         self._note_fall(sample)
         self._note_rest(sample)
 
+    def stay(self, time_s: float) -> None:
+        """Take in that all is as it was in the last sample."""
+        last, since_s = self.last, self._still_since_s
+        rests = since_s is not None and time_s - since_s > 2.0 * REST_S and self.speed_m_s == 0.0
+        if not (rests and last.supported and last.gripper is None and last.tray_of is None and not self._carried):
+            self.take(replace(last, time_s=time_s))
+            return
+        self._last = ObjectSample(time_s, last.p_WO, None, last.X_WH, supported=True, on_floor=last.on_floor)
+        self._supported_s = time_s
+
     def moved_by_others(self, p_WO: FloatArray, time_s: float) -> None:
         """Somebody who is no robot has put it at p_WO: no fall, no knock, and no robot's doing."""
         self._last = replace(self.last, time_s=time_s, p_WO=p_WO, gripper=None, X_WH=None, tray_of=None)

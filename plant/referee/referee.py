@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -115,7 +114,7 @@ class Referee:
         for name, body in self._entities.objects.items():
             history, touches = self._histories[name], neighbours.get(int(body.index()), {})
             if name in asleep:
-                history.take(replace(history.last, time_s=time_s))
+                history.stay(time_s)
             else:
                 history.take(self._sample(plant_context, time_s, self._position(plant_context, body), touches))
         self._note_given(time_s)

@@ -45,7 +45,7 @@ class BatteryModel(NoisySensor):
         else:
             self._charge = discharged(self._charge, elapsed, load, self._spec)
         read = self._charge + float(self._rng.normal(0.0, self._spec.sigma))
-        return Battery(stamp_s, float(np.clip(round(read, 3), 0.0, 1.0)))
+        return Battery(stamp_s, min(max(round(read, 3), 0.0), 1.0))
 
 
 def discharged(charge: float, elapsed_s: float, load: float, spec: BatterySpec) -> float:

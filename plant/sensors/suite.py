@@ -101,7 +101,8 @@ class SensorSuite(ABC):
         w_WB, v_WB = _array(V_WB.rotational()), _array(V_WB.translational())
         self.odometry: Odometry = self._odometry_model.update(now_s, self._reckoned(X_WB), w_WB, v_WB)
         self.imu: Imu = self._imu_model.update(now_s, X_WB, w_WB, v_WB)
-        positions = _array(plant.GetPositions(self._context)[index.positions])
+        self._whole = _array(plant.GetPositions(self._context))
+        positions = self._whole[index.positions]
         rates = _array(plant.GetVelocities(self._context)[index.velocities])
         efforts = self._efforts(positions, rates)
         self.joints: Joints = self._joint_model.update(now_s, positions, rates, efforts)
@@ -168,7 +169,7 @@ class SensorSuite(ABC):
         }
 
     def image(self, source: str, *, visual: bool, depth: bool) -> Image:
-        """Render a picture, its depth, or both.
+        """Render a picture, its depth, or both, as all was at the last `update`.
 
         Raises:
             ValueError: the source is unknown.
@@ -178,7 +179,7 @@ class SensorSuite(ABC):
             raise ValueError(f"{self._body.name} has no camera {source!r}; it has {', '.join(self._cameras)}")
         if self._scene is None:
             raise LookupError("nothing is rendered: build the Diagram with render=True")
-        query = self._scene.query_at(self._body.plant.GetPositions(self._context))
+        query = self._scene.query_at(self._whole)
         return self._cameras[source].take(query, self._now_s, self._frames(), visual=visual, depth=depth)
 
     def _frames(self) -> FrameTree:

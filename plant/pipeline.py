@@ -1,0 +1,228 @@
+"""The plant steps towards the next tick while this one is computed, as the world does not wait for a robot's computer.
+
+What a tick commands begins when the step under way is done: one period late, as over a radio link. Readings are those
+of the tick's beginning. Whether a thread does the step or `advance` itself, the same calls give the same run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from functools import partial
+
+from plant.control.commands import CommandStatuses
+from plant.simulation import Engine
+from skills.robot import (
+    ArmTrajectory,
+    Battery,
+    Capabilities,
+    CommandId,
+    CommandState,
+    CommandStatus,
+    Gripper,
+    Image,
+    Imu,
+    Joints,
+    Lease,
+    Odometry,
+    Robot,
+    Scan,
+)
+
+Background = Callable[[Callable[[], None]], "Future[None]"]
+"""Begins work beside the caller's."""
+
+_EXACT_S = 1e-9
+
+
+class Pipeline:
+    """The clock of an engine that steps ahead, and its robots; implements the Clock protocol."""
+
+    def __init__(self, engine: Engine, background: Background | None = None) -> None:
+        """`background` does the steps beside the ticks; without one `advance` does them."""
+        self._engine, self._background = engine, background or _at_once
+        self._robots = {name: PipelinedRobot(robot, self.settle) for name, robot in engine.robots.items()}
+        self._now_s: float | None = None
+        self._under_way: Future[None] | None = None
+
+    @property
+    def robots(self) -> Mapping[str, Robot]:
+        """The robots by name."""
+        return self._robots
+
+    @property
+    def happened(self) -> Sequence[tuple[float, str]]:
+        """What doors did, and what somebody moved, by now: the time (s) and a sentence each."""
+        return [(time_s, sentence) for time_s, sentence in self._engine.happened if time_s <= self.now() + _EXACT_S]
+
+    def now(self) -> float:
+        """Simulated seconds since the start, as of the last readings."""
+        return self._engine.now() if self._now_s is None else self._now_s
+
+    def advance(self, dt_s: float) -> None:
+        """Let dt_s pass: end the step under way, take readings, begin what was commanded, and step on by as much.
+
+        Raises what went wrong in the step. Raises ValueError: that step is longer than dt_s.
+        """
+        until_s = self.now() + dt_s
+        self.settle()
+        left_s = until_s - self._engine.now()
+        if left_s < -dt_s / 2.0:
+            raise ValueError(f"the plant has stepped to {self._engine.now():.3f} s, beyond {until_s:.3f} s")
+        if left_s > dt_s / 2.0:
+            self._engine.step(left_s)
+        self._engine.sense()
+        self._now_s = self._engine.now()
+        for robot in self._robots.values():
+            robot.begin_commands()
+        self._under_way = self._background(partial(self._engine.step, dt_s))
+
+    def settle(self) -> None:
+        """Wait until no step is under way. Raises what went wrong in it."""
+        under_way, self._under_way = self._under_way, None
+        if under_way is not None:
+            under_way.result()
+
+
+class PipelinedRobot:
+    """A robot whose commands begin when the step under way is done; until then they count as running."""
+
+    def __init__(self, robot: Robot, settle: Callable[[], None]) -> None:
+        """`settle` waits until no step is under way; verbs of the lease do, since they are answered at once."""
+        self._robot, self._settle = robot, settle
+        self._statuses = CommandStatuses()
+        self._commanded: list[tuple[CommandId, Callable[[], CommandId]]] = []
+        self._running: dict[CommandId, CommandId] = {}  # by the ids given here, those of the robot
+
+    def begin_commands(self) -> None:
+        """Give the robot what was commanded; no step may be under way."""
+        for command, begin in self._commanded:
+            self._running[command] = begin()
+        self._commanded = []
+        for command, inner in list(self._running.items()):
+            status = self._robot.command_status(inner)
+            if status.state is not CommandState.RUNNING:
+                self._statuses.change(command, status)
+                del self._running[command]
+
+    def _later(self, begin: Callable[[], CommandId]) -> CommandId:
+        command = self._statuses.add(CommandStatus(CommandState.RUNNING))
+        self._commanded.append((command, begin))
+        return command
+
+    def _settled(self) -> Robot:
+        """The robot, once no step is under way and it has all that was commanded."""
+        self._settle()
+        self.begin_commands()
+        return self._robot
+
+    # -- know and sense -------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self._robot.name
+
+    def capabilities(self) -> Capabilities:
+        """What this robot is and can do."""
+        return self._robot.capabilities()
+
+    def odometry(self) -> Odometry:
+        """Latest dead reckoning."""
+        return self._robot.odometry()
+
+    def imu(self) -> Imu:
+        """Latest inertial measurement."""
+        return self._robot.imu()
+
+    def scan(self) -> Scan | None:
+        """Latest LiDAR revolution, None before the first."""
+        return self._robot.scan()
+
+    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
+        """Take a picture as of the last readings. Raises ValueError for an unknown source."""
+        return self._robot.image(source, visual=visual, depth=depth)
+
+    def joints(self) -> Joints:
+        """Latest joint state."""
+        return self._robot.joints()
+
+    def gripper(self) -> Gripper:
+        """Latest gripper state."""
+        return self._robot.gripper()
+
+    def battery(self) -> Battery:
+        """Latest battery state."""
+        return self._robot.battery()
+
+    def faults(self) -> tuple[str, ...]:
+        """Present faults, empty when well."""
+        return self._robot.faults()
+
+    # -- act ------------------------------------------------------------------------------------------------------
+
+    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Move at a body-frame velocity until the clock reads until_s."""
+        return self._later(partial(self._robot.drive, vx, vy, wz, until_s=until_s, lease=lease))
+
+    def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Hold the body origin at a height above the floor and a pitch."""
+        return self._later(partial(self._robot.stand, height_m, pitch_rad, until_s=until_s, lease=lease))
+
+    def sit(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Lower the body to the floor."""
+        return self._later(partial(self._robot.sit, until_s=until_s, lease=lease))
+
+    def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
+        """Follow a joint trajectory; done when its end is reached and the arm is still."""
+        return self._later(partial(self._robot.move_arm, trajectory, until_s=until_s, lease=lease))
+
+    def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Turn the head, if there is one; done when it is there and still."""
+        return self._later(partial(self._robot.point_head, pan_rad, tilt_rad, until_s=until_s, lease=lease))
+
+    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Move the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
+        return self._later(partial(self._robot.set_gripper, opening, force_n, until_s=until_s, lease=lease))
+
+    def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
+        """Stop all motion, or only the given command if it still runs."""
+        return self._later(lambda: self._stop(lease, only))
+
+    def _stop(self, lease: Lease, only: CommandId | None) -> CommandId:
+        inner = None if only is None else self._running.get(only, CommandId(0))  # what is over is none of its commands
+        return self._robot.stop(lease=lease, only=inner)
+
+    def command_status(self, command: CommandId) -> CommandStatus:
+        """What became of a command, as of the last readings. Raises KeyError for an id never given."""
+        return self._statuses.status(command)
+
+    # -- own ------------------------------------------------------------------------------------------------------
+
+    def lease_holder(self) -> Lease | None:
+        """The lease that counts now; None while it is free."""
+        return self._robot.lease_holder()
+
+    def acquire_lease(self, holder: str) -> Lease:
+        """Take a free lease. Raises LeaseError when another holds it."""
+        return self._settled().acquire_lease(holder)
+
+    def take_lease(self, holder: str) -> Lease:
+        """Take the lease from the one that holds it; the robot stops."""
+        return self._settled().take_lease(holder)
+
+    def return_lease(self, lease: Lease) -> None:
+        """Give the lease back; the robot stops. A lease that was taken away is ignored."""
+        self._settled().return_lease(lease)
+
+
+def _at_once(work: Callable[[], None]) -> Future[None]:
+    """Do the work now."""
+    done: Future[None] = Future()
+    try:
+        work()
+    except Exception as error:
+        done.set_exception(error)
+    else:
+        done.set_result(None)
+    return done

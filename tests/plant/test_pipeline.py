@@ -1,0 +1,163 @@
+"""The plant steps towards the next tick while this one is computed; commands begin one period late."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from executive.run.worker import WorkThread
+from executive.testing.small_room import write_small_room
+from plant.pipeline import Pipeline
+from plant.simulation import Simulation
+from plant.worlds.world import World, load_world
+from skills.robot import CommandState, Lease, LeaseError
+
+TICK_S = 0.05
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory) -> World:
+    return load_world(write_small_room(tmp_path_factory.mktemp("room"), can=False))
+
+
+@pytest.fixture
+def engine(world):
+    return Simulation(world, seed=1, visuals=False).engine
+
+
+def test_a_command_begins_when_the_step_under_way_is_done(engine):
+    pipeline = Pipeline(engine)
+    robot = pipeline.robots["Alice"]
+    lease = robot.acquire_lease("test")
+    pipeline.advance(TICK_S)
+    stood_m = _x_m(engine)
+    robot.drive(1.0, 0.0, 0.0, until_s=10.0, lease=lease)
+    pipeline.settle()
+    assert _x_m(engine) == pytest.approx(stood_m, abs=1e-4)
+    pipeline.advance(TICK_S)
+    pipeline.settle()
+    assert _x_m(engine) > stood_m + 1e-3
+
+
+def test_a_thread_and_steps_in_turn_give_the_same_run(world):
+    thread = WorkThread("test-plant")
+    runs = [_drive_about(Pipeline(Simulation(world, seed=1, visuals=False).engine, each)) for each in (thread.do, None)]
+    thread.close(10.0)
+    assert runs[0] == runs[1]
+
+
+def test_a_picture_shows_the_world_as_of_the_last_readings(world):
+    pictures = []
+    for piped in (True, False):
+        engine = Simulation(world, seed=1, visuals=False).engine
+        robot = engine.robots["Alice"]
+        robot.drive(0.0, 0.0, 1.5, until_s=10.0, lease=robot.acquire_lease("test"))
+        clock = Pipeline(engine) if piped else engine
+        for _ in range(8):
+            clock.advance(TICK_S)
+        pictures.append(robot.image("frontleft", visual=False))
+    assert pictures[0].stamp_s == pictures[1].stamp_s == pytest.approx(8 * TICK_S)
+    assert np.array_equal(pictures[0].depth_m, pictures[1].depth_m)
+
+
+def test_time_stands_still_between_two_ticks_whatever_the_lease_waits_for(engine):
+    pipeline = Pipeline(engine)
+    robot = pipeline.robots["Alice"]
+    pipeline.advance(TICK_S)
+    lease = robot.acquire_lease("test")
+    assert pipeline.now() == pytest.approx(TICK_S)
+    with pytest.raises(LeaseError, match="held by 'test'"):
+        robot.acquire_lease("another")
+    robot.return_lease(lease)
+    assert robot.lease_holder() is None
+    pipeline.advance(TICK_S)
+    assert pipeline.now() == pytest.approx(2 * TICK_S) == robot.odometry().stamp_s
+
+
+def test_what_is_commanded_before_the_lease_is_returned_is_begun_before(engine):
+    pipeline = Pipeline(engine)
+    robot = pipeline.robots["Alice"]
+    lease = robot.acquire_lease("test")
+    pipeline.advance(TICK_S)
+    command = robot.drive(1.0, 0.0, 0.0, until_s=10.0, lease=lease)
+    robot.return_lease(lease)
+    pipeline.advance(TICK_S)
+    status = robot.command_status(command)
+    assert (status.state, status.reason) == (CommandState.STOPPED, "the lease was returned")
+
+
+def test_a_refusal_is_known_at_the_next_tick(engine):
+    pipeline = Pipeline(engine)
+    robot = pipeline.robots["Alice"]
+    pipeline.advance(TICK_S)
+    command = robot.drive(1.0, 0.0, 0.0, until_s=10.0, lease=Lease("Alice", "nobody", 7))
+    assert robot.command_status(command).state is CommandState.RUNNING
+    pipeline.advance(TICK_S)
+    assert robot.command_status(command).state is CommandState.REFUSED
+    with pytest.raises(KeyError):
+        robot.command_status(command + 1)
+
+
+def test_stopping_one_command_leaves_the_others(engine):
+    pipeline = Pipeline(engine)
+    robot = pipeline.robots["Alice"]
+    lease = robot.acquire_lease("test")
+    drive = robot.drive(1.0, 0.0, 0.0, until_s=10.0, lease=lease)
+    stand = robot.stand(0.5, 0.2, until_s=10.0, lease=lease)
+    pipeline.advance(TICK_S)
+    robot.stop(lease=lease, only=drive)
+    pipeline.advance(TICK_S)
+    states = [robot.command_status(each).state for each in (drive, stand)]
+    assert states == [CommandState.STOPPED, CommandState.RUNNING]
+
+
+def test_what_happens_in_the_step_under_way_is_told_at_the_next_tick(engine):
+    pipeline = Pipeline(engine)
+    pipeline.advance(TICK_S)
+    engine.note("the lamp falls over")  # the engine is a tick ahead by now
+    assert list(pipeline.happened) == []
+    pipeline.advance(TICK_S)
+    assert list(pipeline.happened) == [(2 * TICK_S, "the lamp falls over")]
+
+
+def test_what_goes_wrong_in_a_step_is_raised_where_time_is_advanced(engine):
+    def fail(now_s: float) -> None:
+        raise ArithmeticError("nothing is finite")
+
+    thread = WorkThread("test-plant")
+    pipeline = Pipeline(engine, thread.do)
+    pipeline.advance(TICK_S)
+    pipeline.settle()
+    engine.observe(fail)
+    pipeline.advance(TICK_S)
+    with pytest.raises(ArithmeticError):
+        pipeline.advance(TICK_S)
+    thread.close(10.0)
+
+
+def test_a_tick_shorter_than_the_step_under_way_is_refused(engine):
+    pipeline = Pipeline(engine)
+    pipeline.advance(0.2)
+    with pytest.raises(ValueError, match="beyond"):
+        pipeline.advance(TICK_S)
+
+
+def _x_m(engine) -> float:
+    body = engine.world.robots["Alice"].body
+    return float(engine.world.plant.EvalBodyPoseInWorld(engine.context, body).translation()[0])
+
+
+def _drive_about(pipeline: Pipeline) -> list[str]:
+    """Readings of a short drive, with a lease that is given back and taken on the way."""
+    robot = pipeline.robots["Alice"]
+    lease, readings = robot.acquire_lease("test"), []
+    for tick in range(30):
+        pipeline.advance(TICK_S)
+        scan = robot.scan()
+        ranges = b"" if scan is None else scan.ranges_m.tobytes()
+        readings.append(repr((pipeline.now(), robot.odometry(), robot.imu(), robot.joints(), hash(ranges))))
+        robot.drive(0.4, 0.1, 0.5, until_s=pipeline.now() + 0.3, lease=lease)
+        if tick == 12:
+            robot.return_lease(lease)
+            lease = robot.acquire_lease("again")
+    return readings

@@ -292,6 +292,15 @@ class Scan:
     X_BL: RigidTransform
     X_OB: RigidTransform
 
+    def repeats(self, other: Scan) -> bool:
+        """Whether all ranges are those of another scan, noise and all."""
+        ranges, others = self.ranges_m, other.ranges_m
+        if ranges is others:
+            return True
+        first = slice(0, 1)  # as a rule noise differs in the first ring already
+        equal = (np.array_equal(ranges[part], others[part], equal_nan=True) for part in (first, slice(None)))
+        return all(equal)
+
     def points_B(self) -> FloatArray:
         """The valid returns as an (N, 3) array in the body frame."""
         ranges = self.ranges_m.astype(np.float64)

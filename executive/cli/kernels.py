@@ -95,6 +95,7 @@ def compile_kernels() -> None:
             _begin(drive, Path(folder) / str(number))
     _search()
     _bend_arm()
+    _see_cells()
     _survey()
 
 
@@ -135,6 +136,19 @@ def _bend_arm() -> None:
     scene.set_boxes([box])
     scene.edge_free(q_rad, q_rad)
     gaps_m(box, [box], np.zeros((1, 3)))
+
+
+def _see_cells() -> None:
+    """Take in a depth picture for the arm."""
+    from pydrake.math import RigidTransform
+
+    from skills.arm.solid_cells import Outline, with_picture
+    from skills.robot import FrameTree, Image, Intrinsics
+
+    lens, depth_m = Intrinsics(2, 2, 1.0, 1.0, 1.0, 1.0), np.ones((2, 2), dtype=np.float32)
+    image = Image(0.0, "hand", "odom", lens, lens, None, np.zeros((2, 2), dtype=np.uint8), depth_m, FrameTree({}))
+    own = Outline(RigidTransform(), np.zeros(2), np.zeros(2))
+    with_picture(np.empty((0, 3), dtype=np.int64), image, RigidTransform(), own)
 
 
 def _survey() -> None:

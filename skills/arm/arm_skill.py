@@ -19,7 +19,7 @@ from skills.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.arm.kinematics import ArmModel, arm_model
 from skills.arm.poses import UP_B, look_configuration, towards_shoulder
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
-from skills.arm.solid_cells import solid_boxes, with_picture, with_view
+from skills.arm.solid_cells import Outline, solid_boxes, with_picture, with_view
 from skills.estimate.self_filter import segment_distance
 from skills.patience import PATIENCE_S
 from skills.perception.at_rest import APART_S, at_rest
@@ -222,13 +222,13 @@ class ArmSkill(RoutineSkill[InputsT]):
         X_WB, q_rad = self.X_WB(), self.q_rad()
         arm_W = self.model.points_B(q_rad) @ X_WB.rotation().matrix().T + X_WB.translation()
         tip_W = X_WB @ self.model.X_BH(q_rad) @ np.array([self.gripper.length_m, 0.0, 0.0])
-        segments = list(pairwise([*arm_W, tip_W]))
+        segments, own = list(pairwise([*arm_W, tip_W])), self._own()
 
         def left_out(points_W: FloatArray) -> NDArray[np.bool_]:
             out = np.any([segment_distance(points_W, *each) < _AT_ARM_M for each in segments], axis=0)
             for low, high in self.known_W:
                 out |= np.all((points_W > low) & (points_W < high), axis=1)
-            return np.asarray(out | self._own(points_W))
+            return np.asarray(out | own.holds(points_W))
 
         return solid_boxes(self.context.solid.cells, X_WB, self._reach_m() + beyond_m, left_out)
 
@@ -242,12 +242,10 @@ class ArmSkill(RoutineSkill[InputsT]):
         arm = self.context.robot.capabilities().arm
         return _BEYOND_M + (0.0 if arm is None else arm.max_reach_m)
 
-    def _own(self, points_W: FloatArray) -> NDArray[np.bool_]:
-        """Which world points (N, 3) lie within the body's outline."""
+    def _own(self) -> Outline:
+        """The body's outline, a little wider."""
         corners = np.array(self.context.robot.capabilities().footprint_m)
-        points_B = (points_W - self.X_WB().translation()) @ self.X_WB().rotation().matrix()
-        inside = (points_B[:, :2] > corners.min(axis=0) - 0.05) & (points_B[:, :2] < corners.max(axis=0) + 0.05)
-        return np.asarray(np.all(inside, axis=1))
+        return Outline(self.X_WB(), corners.min(axis=0) - 0.05, corners.max(axis=0) + 0.05)
 
     def from_a_height(
         self, heights_m: Sequence[float], message: str, attempt: Callable[[], Routine[PlannedT]]
@@ -502,7 +500,7 @@ class ArmSkill(RoutineSkill[InputsT]):
             image = without_arm(image, self.arm_points_B(), held_m)
         solid, X_WO = self.context.solid, self.context.localiser.estimate().X_WO
         solid.cells, solid.views = (
-            with_picture(solid.cells, image, X_WO, self._own),
+            with_picture(solid.cells, image, X_WO, self._own()),
             with_view(solid.views, image, X_WO),
         )
         return image

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.arm.collision import Box
-from skills.perception.point_cloud import camera_pose_W, cloud_from_image
+from skills.estimate.compiled import compiled
+from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, lens_rays
 from skills.robot import FloatArray, Image, Intrinsics
 
 CELL_M: Final = 0.04
@@ -26,24 +28,72 @@ _STRIDES = np.array([_SPAN**2, _SPAN, 1])
 _THINNED, _VIEWS_KEPT = 8, 32
 
 Cells = NDArray[np.int64]
-Run = tuple[int, int]
 View = tuple[Image, RigidTransform]
 """A depth picture and the X_WO of its time."""
 
 
-def with_picture(
-    cells: Cells, image: Image, X_WO: RigidTransform, own: Callable[[FloatArray], NDArray[np.bool_]]
-) -> Cells:
+@dataclass(frozen=True)
+class Outline:
+    """What is the robot's own, from above: all between two corners (2,) of the body frame at a pose X_WB."""
+
+    X_WB: RigidTransform
+    low_m: FloatArray
+    high_m: FloatArray
+
+    def holds(self, points_W: FloatArray) -> NDArray[np.bool_]:
+        """Which world points (N, 3) lie within."""
+        points_B = (points_W - self.X_WB.translation()) @ self.X_WB.rotation().matrix()[:, :2]
+        return np.asarray(np.all((points_B > self.low_m) & (points_B < self.high_m), axis=1))
+
+
+def with_picture(cells: Cells, image: Image, X_WO: RigidTransform, own: Outline) -> Cells:
     """The cells (N, 3) of before without those that a depth picture sees past, and those in which it has points.
 
-    `own` says which world points (N, 3) belong to the robot.
+    Points of the robot's own are passed over.
     """
-    points = cloud_from_image(image, X_WO, _FURTHEST_M, (_FLOOR_M, np.inf)).p_W
-    eye_W = camera_pose_W(image, X_WO).translation()
-    points = points[np.linalg.norm(points - eye_W, axis=1) > _NEAREST_M]
-    found, counts = _unique(np.floor(points[~own(points)] / CELL_M).astype(np.int64))
+    X_WC, (x_C, y_C) = camera_pose_W(image, X_WO), lens_rays(image.depth_intrinsics)
+    eye, body = X_WC.GetAsMatrix34(), own.X_WB.GetAsMatrix34()
+    keys, counts = np.unique(_keys(image.depth_m, x_C, y_C, eye, body, own.low_m, own.high_m), return_counts=True)
     kept = cells[~_seen_past(cells, image, X_WO)]
-    return _unique(np.vstack([kept, found[counts >= _FEWEST_POINTS]]))[0]
+    return _unique(np.vstack([kept, _cells(keys[counts >= _FEWEST_POINTS])]))
+
+
+@compiled
+def _keys(
+    depth_m: NDArray[np.float32],
+    x_C: FloatArray,
+    y_C: FloatArray,
+    X_WC: FloatArray,
+    X_WB: FloatArray,
+    low_B: FloatArray,
+    high_B: FloatArray,
+) -> NDArray[np.int64]:
+    """The keys of the cells of all points of a depth picture but the robot's own; poses are (3, 4) matrices.
+
+    `x_C` and `y_C` are x/z of each column and y/z of each row.
+    """
+    keys = np.empty(depth_m.size, dtype=np.int64)
+    found = 0
+    for v in range(depth_m.shape[0]):
+        for u in range(depth_m.shape[1]):
+            z = np.float64(depth_m[v, u])
+            if not MIN_DEPTH_M < z < _FURTHEST_M:
+                continue
+            dx = z * (X_WC[0, 0] * x_C[u] + X_WC[0, 1] * y_C[v] + X_WC[0, 2])
+            dy = z * (X_WC[1, 0] * x_C[u] + X_WC[1, 1] * y_C[v] + X_WC[1, 2])
+            dz = z * (X_WC[2, 0] * x_C[u] + X_WC[2, 1] * y_C[v] + X_WC[2, 2])
+            x, y, height = dx + X_WC[0, 3], dy + X_WC[1, 3], dz + X_WC[2, 3]
+            if height <= _FLOOR_M or dx * dx + dy * dy + dz * dz <= _NEAREST_M * _NEAREST_M:
+                continue
+            bx, by, bz = x - X_WB[0, 3], y - X_WB[1, 3], height - X_WB[2, 3]
+            ahead = bx * X_WB[0, 0] + by * X_WB[1, 0] + bz * X_WB[2, 0]
+            left = bx * X_WB[0, 1] + by * X_WB[1, 1] + bz * X_WB[2, 1]
+            if low_B[0] < ahead < high_B[0] and low_B[1] < left < high_B[1]:
+                continue
+            i, j, k = math.floor(x / CELL_M), math.floor(y / CELL_M), math.floor(height / CELL_M)
+            keys[found] = ((i + _OFFSET) * _SPAN + j + _OFFSET) * _SPAN + k + _OFFSET
+            found += 1
+    return keys[:found]
 
 
 def solid_boxes(
@@ -79,10 +129,14 @@ def _middles(cells: Cells) -> FloatArray:
     return np.asarray((cells + 0.5) * CELL_M, dtype=np.float64)
 
 
-def _unique(cells: Cells) -> tuple[Cells, NDArray[np.int64]]:
-    """Each cell once, in order, and how often it was there."""
-    keys, counts = np.unique(((cells + _OFFSET) * _STRIDES).sum(axis=1), return_counts=True)
-    return np.stack([keys // _STRIDES[0], keys // _STRIDES[1] % _SPAN, keys % _SPAN], axis=1) - _OFFSET, counts
+def _unique(cells: Cells) -> Cells:
+    """Each cell once, in order."""
+    return _cells(np.unique(((cells + _OFFSET) * _STRIDES).sum(axis=1)))
+
+
+def _cells(keys: NDArray[np.int64]) -> Cells:
+    """The cells (N, 3) of keys (N,)."""
+    return np.stack([keys // _STRIDES[0], keys // _STRIDES[1] % _SPAN, keys % _SPAN], axis=1) - _OFFSET
 
 
 def with_view(views: Sequence[View], image: Image, X_WO: RigidTransform) -> tuple[View, ...]:
@@ -135,30 +189,24 @@ def _at_pixels(
 
 def merged(cells: Cells) -> list[tuple[Cells, Cells]]:
     """Few boxes (first cell, cell after the last) that cover exactly these cells: runs, joined where they are equal."""
-    columns: dict[tuple[int, int], list[int]] = {}
-    for x, y, z in _unique(cells)[0].tolist():
-        columns.setdefault((x, y), []).append(z)
-    rows: dict[tuple[int, Run], list[int]] = {}
-    for (x, y), heights in columns.items():
-        for run in _runs(heights):
-            rows.setdefault((x, run), []).append(y)
-    plates: dict[tuple[Run, Run], list[int]] = {}
-    for (x, height), ys in rows.items():
-        for run in _runs(ys):
-            plates.setdefault((run, height), []).append(x)
-    return [
-        (np.array([x0, y0, z0]), np.array([x1, y1, z1]))
-        for ((y0, y1), (z0, z1)), xs in sorted(plates.items())
-        for x0, x1 in _runs(xs)
-    ]
+    boxes = np.concatenate([cells, cells + 1], axis=1)
+    for axis, others in ((2, (0, 1, 3, 4)), (1, (0, 2, 3, 5)), (0, (1, 4, 2, 5))):
+        boxes = _joined(boxes, axis, others)
+    return [(low, high) for low, high in zip(boxes[:, :3], boxes[:, 3:], strict=True)]
 
 
-def _runs(numbers: Iterable[int]) -> list[Run]:
-    """First and after the last of each run of consecutive numbers."""
-    ordered = np.array(sorted(numbers))
-    cuts = np.flatnonzero(np.diff(ordered) > 1)
-    firsts, lasts = np.append(0, cuts + 1), np.append(cuts, len(ordered) - 1)
-    return [(int(ordered[a]), int(ordered[b]) + 1) for a, b in zip(firsts, lasts, strict=True)]
+def _joined(boxes: Cells, axis: int, others: Sequence[int]) -> Cells:
+    """Boxes (N, 6) joined along an axis where one begins in the other's last cell or after it and `others` are equal.
+
+    They come in the order of the columns `others`, then along the axis.
+    """
+    boxes = boxes[np.lexsort([boxes[:, each] for each in (axis, *reversed(others))])]
+    begins = np.ones(len(boxes), dtype=np.bool_)
+    begins[1:] = (boxes[1:, others] != boxes[:-1, others]).any(axis=1) | (boxes[1:, axis] > boxes[:-1, axis + 3])
+    firsts = np.flatnonzero(begins)
+    joined, lasts = boxes[firsts], np.append(firsts[1:], len(boxes))[: len(firsts)] - 1
+    joined[:, axis + 3] = boxes[lasts, axis + 3]
+    return joined
 
 
 def _box(low: Cells, high: Cells, X_BW: RigidTransform) -> Box:

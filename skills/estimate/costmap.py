@@ -117,8 +117,7 @@ class LayeredCostmap:
         scan = robot.scan()
         if scan is not None and scan.stamp_s > self._scan_stamp_s and localisation.localised:
             self._scan_stamp_s = scan.stamp_s
-            foreign = partial(self._filter.foreign, arm_F=self._arm_F(robot, scan), holding=robot.gripper().holding)
-            self._take_scan(scan, X_WO, foreign)
+            self._take_scan(scan, X_WO, partial(self._foreign, self._filter, robot, scan))
 
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
         """Take in (N, 3) points of a depth camera that lie on things in the way; leave out the floor before."""
@@ -152,6 +151,10 @@ class LayeredCostmap:
         if math.isinf(self._next_expiry_s):
             return np.empty((0, 2), dtype=np.int64)
         return np.argwhere(self._until_s > self._now_s)
+
+    def _foreign(self, own: SelfFilter, robot: Robot, scan: Scan, points_F: FloatArray) -> NDArray[np.bool_]:
+        """Which points (N, 3) in the levelled body frame are none of the robot's."""
+        return own.foreign(points_F, self._arm_F(robot, scan), holding=robot.gripper().holding)
 
     def _arm_F(self, robot: Robot, scan: Scan) -> FloatArray:
         """The arm's segments in the levelled body frame."""

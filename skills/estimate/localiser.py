@@ -207,7 +207,7 @@ class ScanMatchingLocaliser:
     def _frozen(self, scan: Scan) -> bool:
         """Whether a scan repeats an earlier one, noise and all, although the robot has moved since."""
         last = self._scan
-        if last is None or not np.array_equal(scan.ranges_m, last.ranges_m, equal_nan=True):
+        if last is None or not scan.repeats(last):
             self._scan = scan
             return False
         step = relative(Pose2D.from_transform(last.X_OB), Pose2D.from_transform(scan.X_OB))

@@ -184,7 +184,7 @@ class Mapper:
     def _frozen(self, scan: Scan) -> bool:
         """Whether a scan repeats the last one, noise and all, although the robot has moved."""
         last = self._scan
-        if last is None or not np.array_equal(scan.ranges_m, last.ranges_m, equal_nan=True):
+        if last is None or not scan.repeats(last):
             return False
         step = relative(Pose2D.from_transform(last.X_OB), Pose2D.from_transform(scan.X_OB))
         return math.hypot(step.x_m, step.y_m) > _FROZEN_M or abs(step.yaw_rad) > _FROZEN_RAD

@@ -37,17 +37,13 @@ class ScanHealth:
         scan, now_s = self._context.robot.scan(), self._context.clock.now()
         if scan is None:
             return "The LiDAR gives no scans."
-        if np.mean(np.isfinite(scan.ranges_m)) < self._options.least_valid:
-            return "The LiDAR measures nothing: its ranges are invalid."
-        if self._last is None or not _repeats(scan, self._last):
-            self._last = scan
+        if scan is not self._last:
+            if np.mean(np.isfinite(scan.ranges_m)) < self._options.least_valid:
+                return "The LiDAR measures nothing: its ranges are invalid."
+            if self._last is None or not scan.repeats(self._last):
+                self._last = scan
         age_s = now_s - self._last.stamp_s
         if age_s > self._options.old_s:
             repeated = "repeats its last scan" if scan.stamp_s > self._last.stamp_s else "gives no new scans"
             return f"The LiDAR {repeated}, which is {age_s:.1f} s old."
         return None
-
-
-def _repeats(scan: Scan, last: Scan) -> bool:
-    """Whether a scan is the last one, perhaps with a new stamp."""
-    return scan is last or np.array_equal(scan.ranges_m, last.ranges_m, equal_nan=True)

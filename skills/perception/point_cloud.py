@@ -47,7 +47,7 @@ def cloud_from_image(
     """All valid depth pixels between two heights as world points; those of a grey picture are grey."""
     colour = np.repeat(image.grey[..., None], 3, axis=2) if image.colour is None else image.colour
     depth, X_WC = image.depth_m, camera_pose_W(image, X_WO)
-    x_C, y_C = _rays(image.depth_intrinsics)
+    x_C, y_C = lens_rays(image.depth_intrinsics)
     R_WC, p_WC = X_WC.rotation().matrix(), X_WC.translation()
     height = depth * (R_WC[2, 0] * x_C + R_WC[2, 1] * y_C[:, None] + R_WC[2, 2]).astype(np.float32) + p_WC[2]
     low_m, high_m = heights_m
@@ -61,7 +61,7 @@ def cloud_from_image(
 
 
 @lru_cache(maxsize=8)
-def _rays(lens: Intrinsics) -> tuple[FloatArray, FloatArray]:
+def lens_rays(lens: Intrinsics) -> tuple[FloatArray, FloatArray]:
     """x/z of each column (W,) and y/z of each row (H,) of a lens."""
     return (np.arange(lens.width, dtype=np.float64) - lens.cx) / lens.fx, (
         np.arange(lens.height, dtype=np.float64) - lens.cy

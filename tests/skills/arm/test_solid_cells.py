@@ -4,10 +4,11 @@ import numpy as np
 from pydrake.math import RigidTransform
 from table_scene import CAMERA, TABLE, Can, scene
 
-from skills.arm.solid_cells import CELL_M, boxes_of, merged, never_seen, solid_boxes, with_picture, with_view
+from skills.arm.solid_cells import CELL_M, Outline, boxes_of, merged, never_seen, solid_boxes, with_picture, with_view
 
 NOTHING = np.empty((0, 3), dtype=np.int64)
 BODY = RigidTransform([0.0, 0.0, 0.5])
+NOTHING_OWN = Outline(RigidTransform(), np.zeros(2), np.zeros(2))
 
 
 def nothing_of(points):
@@ -26,7 +27,7 @@ def inside(boxes, p_W):
 
 def test_what_is_seen_is_solid_and_what_is_behind_it_too():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
-    boxes = solid_boxes(with_picture(NOTHING, picture(can), RigidTransform(), nothing_of), BODY, 2.0, nothing_of)
+    boxes = solid_boxes(with_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN), BODY, 2.0, nothing_of)
     assert inside(boxes, (0.97, 0.0, 0.9))
     assert inside(boxes, (1.15, 0.0, 0.9))
     assert not inside(boxes, (0.8, 0.0, 0.95))
@@ -34,22 +35,34 @@ def test_what_is_seen_is_solid_and_what_is_behind_it_too():
 
 def test_what_is_behind_it_ends_where_the_arm_does_not_reach():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
-    boxes = solid_boxes(with_picture(NOTHING, picture(can), RigidTransform(), nothing_of), BODY, 1.1, nothing_of)
+    boxes = solid_boxes(with_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN), BODY, 1.1, nothing_of)
     assert inside(boxes, (0.97, 0.0, 0.9))
     assert not inside(boxes, (1.15, 0.0, 0.9))
 
 
 def test_what_was_taken_away_is_forgotten_once_it_is_seen_past():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
-    cells = with_picture(NOTHING, picture(can), RigidTransform(), nothing_of)
-    cells = with_picture(cells, picture(), RigidTransform(), nothing_of)
+    cells = with_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
+    cells = with_picture(cells, picture(), RigidTransform(), NOTHING_OWN)
     assert not inside(solid_boxes(cells, BODY, 2.0, nothing_of), (0.97, 0.0, 0.95))
     assert inside(solid_boxes(cells, BODY, 2.0, nothing_of), (1.2, 0.2, TABLE.height_m - 0.005))
 
 
+def test_what_lies_within_the_own_outline_is_not_solid():
+    can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
+    own = Outline(RigidTransform([0.9, 0.1, 0.5]), np.array([0.0, -0.2]), np.array([0.2, 0.0]))
+    everything = with_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
+    rest = with_picture(NOTHING, picture(can), RigidTransform(), own)
+    middles = (everything + 0.5) * CELL_M
+    assert own.holds(middles).any()
+    kept = {tuple(cell) for cell in rest.tolist()}
+    assert kept < {tuple(cell) for cell in everything.tolist()}
+    assert not inside(solid_boxes(rest, BODY, 2.0, nothing_of), (0.97, 0.0, 0.9))
+
+
 def test_what_is_left_out_is_not_solid():
     boxes = solid_boxes(
-        with_picture(NOTHING, picture(), RigidTransform(), nothing_of), BODY, 2.0, lambda p: p[:, 2] < 0.8
+        with_picture(NOTHING, picture(), RigidTransform(), NOTHING_OWN), BODY, 2.0, lambda p: p[:, 2] < 0.8
     )
     assert boxes == []
 
@@ -91,7 +104,7 @@ def test_only_the_last_views_are_kept():
 
 def test_boxes_of_chosen_cells_have_nothing_behind_them():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
-    cells = with_picture(NOTHING, picture(can), RigidTransform(), nothing_of)
+    cells = with_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
     boxes = boxes_of(cells, BODY, lambda p: p[:, 2] > 0.85)
     assert inside(boxes, (0.97, 0.0, 0.9))
     assert not inside(boxes, (1.15, 0.0, 0.9))

@@ -9,11 +9,13 @@ executive's leaf wraps it once, turns exceptions into failures with cause ERROR 
 from __future__ import annotations
 
 import enum
+import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -431,11 +433,14 @@ class Skill(ABC, Generic[InputsT]):
     whether it does when it has succeeded; None: it does not matter, and nothing changes.
     `uses` are the parts of the robot that it uses: skills that share none may run side by side.
     `Options` is a frozen dataclass of what a stack file may set of the skill, all with defaults.
+    A class that does nothing may declare all this in the module `ports` of a skill's package; the class that does the
+    work derives from it and is named by `done_by` ("module:Class"). Then trees are compiled without its imports.
     `max_data_age_s` says how old (s) the data may be on which a success rests, by name: a sense verb (not `image`),
     "localisation", or an output port whose value has a `stamp_s`. A success on older data is a failed postcondition.
     """
 
     name: ClassVar[str]
+    done_by: ClassVar[str] = ""
     Inputs: ClassVar[type]
     outputs: ClassVar[Mapping[str, type]] = {}
     causes: ClassVar[Mapping[Cause, str]] = {}
@@ -447,6 +452,21 @@ class Skill(ABC, Generic[InputsT]):
     uses: ClassVar[frozenset[Part]] = WHOLE_ROBOT
     Options: ClassVar[type] = NoOptions
     checkpoint: Mapping[str, Any] = MappingProxyType({})
+
+    def __new__(cls, *_: Any, **__: Any) -> Self:
+        """A skill; of a class that only declares one, the skill that does the work."""
+        return object.__new__(cls.loaded())
+
+    @classmethod
+    def loaded(cls) -> type[Self]:
+        """The class that does the work, itself unless it only declares. Raises TypeError: `done_by` is none of it."""
+        module, _, name = cls.done_by.partition(":")
+        if not (module and inspect.isabstract(cls)):
+            return cls
+        found = getattr(import_module(module), name)
+        if not issubclass(found, cls):
+            raise TypeError(f"{cls.done_by} does not derive from {cls.__name__}, which names it")
+        return found  # type: ignore[no-any-return]
 
     def __init__(self, context: SkillContext, options: Any = None) -> None:
         self.context = context

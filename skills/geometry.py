@@ -6,7 +6,6 @@ import math
 from typing import TypeVar
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from skills.robot import FloatArray, Pose2D
@@ -52,5 +51,7 @@ def inside_polygon(
     xy: FloatArray, polygon: tuple[tuple[float, float], ...], margin_m: float = 0.0
 ) -> NDArray[np.bool_]:
     """Which rows of xy (N, 2) lie in a convex polygon grown by margin_m; corners in either order."""
+    import shapely  # commands that move nothing do without
+
     grown = shapely.Polygon(polygon).buffer(margin_m, join_style="mitre", mitre_limit=100.0)
     return np.asarray(shapely.contains_xy(grown, xy))

@@ -111,7 +111,6 @@ def _load(key: str, limit_s: float) -> None:
         raise InputError(f"there is no plug-in {key}")
     if entry.group == registry.GROUP:
         registry.skills_of([entry], limit_s=limit_s)
-        return
     try:
         run_plugin(entry, entry.load, limit_s=limit_s)
     except PluginDefect as defect:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -15,13 +15,14 @@ from executive.mission.request import Start
 from executive.mission.robots import RobotSetup, display_name
 from executive.mission.stack_file import load_stack
 from plant.kinds import robot_kind
-from plant.worlds.placement import people_stand_W, place_people
 from plant.worlds.world import World
-from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.files.errors import InputError
 from skills.navigate.footprint import Footprint
 from skills.robot import Capabilities, FloatArray, Pose2D
 from skills.stack import RobotStack
+
+if TYPE_CHECKING:
+    from skills.estimate.grid_map import GridMap
 
 __all__ = ["DEFAULT_KIND", "PlacedRobot", "alone", "knowledge_for", "placed_robots", "stand_at"]
 
@@ -61,6 +62,8 @@ def placed_robots(world: World, knowledge: Knowledge, setups: Mapping[str, Robot
     Raises:
         InputError: two overlap, a robot stands in something, a dock or a stack is none, or there is no room.
     """
+    from skills.estimate.grid_map import load_grid_map
+
     free = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     placed: dict[str, PlacedRobot] = {}
     told = {name: setup.start or (world.start if not number else None) for number, (name, setup) in _numbered(setups)}
@@ -98,6 +101,8 @@ def _free_start(free: GridMap, world: World, setup: RobotSetup, placed: Mapping[
 
     Raises InputError: there is none.
     """
+    from plant.worlds.placement import people_stand_W
+
     reach_m = _reach_m(setup.kind)
     places = free.centres(np.argwhere(free.distance > max(TURNING_M, reach_m)))
     for other in placed.values():
@@ -165,6 +170,9 @@ def stand_at(world: World, start: Start, seed: int) -> Pose2D:
     """
     if start.pose is not None:
         return start.pose
+    from plant.worlds.placement import place_people
+    from skills.estimate.grid_map import load_grid_map
+
     keepout = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     places = keepout.centres(np.argwhere(keepout.distance > TURNING_M))
     for person in place_people(world, seed):

@@ -16,7 +16,8 @@ from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from skills.api import Running, SkillContext
 from skills.navigate.giving_way import GivingWay
-from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.ports import NavigateInputs
+from skills.navigate.skill import Navigate
 
 __all__ = ["HOLDER", "Resting", "Spare", "SteppingAside", "WithoutWork"]
 

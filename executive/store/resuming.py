@@ -266,6 +266,7 @@ def resumed_skill(
     skill: type[Skill[Any]], path: str, ports: Mapping[str, Any], recollection: Recollection
 ) -> type[Skill[Any]]:
     """A stand-in for a skill at one place of a tree that goes on: gives its result from before, or does its work."""
+    skill.loaded()
 
     class Resumed(_Resumed):
         def __init__(self, context: SkillContext) -> None:

@@ -168,6 +168,7 @@ def stale_sensors(case: SuiteCase) -> Iterator[str]:
 
 def _recorded(skill: type[Skill[Any]], made: list[Skill[Any]]) -> type[Skill[Any]]:
     """The skill's class, which notes its instances."""
+    skill = skill.loaded()
 
     def init(self: Any, *arguments: Any, **options: Any) -> None:
         skill.__init__(self, *arguments, **options)

@@ -11,7 +11,9 @@ import dataclasses
 import inspect
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
 from typing import Any, Final
 
 from executive.tree.types import describe_type, field_types
@@ -129,7 +131,7 @@ def _only(entries: Sequence[EntryPoint], ours: Mapping[str, SkillClass], limit_s
 
 def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:
     try:
-        skill = run_plugin(entry, entry.load, limit_s=limit_s)
+        skill = run_plugin(entry, lambda: _class_of(entry), limit_s=limit_s)
         faults = run_plugin(entry, lambda: list(faults_of(skill, registered_as=entry.name)))
     except PluginDefect as defect:
         raise _error(
@@ -140,12 +142,25 @@ def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:
     return skill  # type: ignore[no-any-return]
 
 
+def _class_of(entry: EntryPoint) -> Any:
+    """The class that declares the skill's ports, where the module `ports` of its package has one, else the skill's own.
+
+    The one names the other by `done_by`; so the skill's module, and all that it imports, is loaded when it is used.
+    """
+    package = entry.module.rpartition(".")[0]
+    if package and find_spec(f"{package}.ports") is not None:
+        for kind in vars(import_module(f"{package}.ports")).values():
+            if inspect.isclass(kind) and issubclass(kind, Skill) and kind.done_by == entry.value:
+                return kind
+    return entry.load()
+
+
 def faults_of(skill: Any, *, registered_as: str) -> Iterator[tuple[str, str]]:
     """What a class lacks to be a skill, each with the hint."""
     if not (inspect.isclass(skill) and issubclass(skill, Skill)):
         yield "it is no subclass of skills.api.Skill", "register the skill's class"
         return
-    if inspect.isabstract(skill):
+    if inspect.isabstract(skill) and not skill.done_by:
         missing = ", ".join(sorted(skill.__abstractmethods__))
         yield f"it does not define {missing}", f"define {missing}"
     name = getattr(skill, "name", None)

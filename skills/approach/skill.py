@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from skills.api import FLOOR, Cause, ObjectObservation, Succeeded, Surface
+from skills.approach.ports import ApproachInputs, ApproachPorts
 from skills.approach.standing import Standing, free_places, go_to_one, is_comfortable, reachable
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.routine import Routine, SkillFailure
-from skills.detect.skill import Detect, DetectInputs
+from skills.detect.ports import DetectInputs
+from skills.detect.skill import Detect
 from skills.grasp.reach import body_heights_m, observed_target, reach_check
 from skills.grasp.refusals import without_grasp
 from skills.grasp.unseen import look_into_unseen
 from skills.navigate.footprint import Footprint
-from skills.navigate.skill import NavigateInputs
+from skills.navigate.ports import NavigateInputs
 from skills.quantities import Count, Length, Margin, Speed, Turn
 from skills.robot import FloatArray, Pose2D
 
 _STILL_BEFORE_M = 1.3
-
-
-@dataclass(frozen=True)
-class ApproachInputs:
-    """The object as it was seen, and the surfaces near it, including the one that it lies on."""
-
-    observation: ObjectObservation
-    surfaces: tuple[Surface, ...]
 
 
 @dataclass(frozen=True)
@@ -48,21 +41,11 @@ class ApproachOptions:
     good_grasp: Margin = 0.1
 
 
-class Approach(ArmSkill[ApproachInputs]):
-    """Drives slowly, arm stowed, to where the arm can grasp an object, and looks at the object again."""
+class Approach(ApproachPorts, ArmSkill[ApproachInputs]):
+    """The skill that `ApproachPorts` declares."""
 
-    name = "approach"
-    Inputs = ApproachInputs
     Options: ClassVar[type] = ApproachOptions
     options: ApproachOptions
-    outputs: ClassVar[Mapping[str, type]] = {"observation": ObjectObservation}
-    causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PLANNING: "no free place to stand is near enough to the object, or no path leads there",
-        Cause.EXECUTION: "the robot did not reach the place to stand",
-        Cause.POSTCONDITION: "the object is not seen again from there",
-    }
-    default_timeout_s = 150.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5, "observation": 3.0}
 
     def run(self, inputs: ApproachInputs) -> Routine[Succeeded]:
         """Choose a place, go, look again."""

@@ -14,7 +14,8 @@ from skills.api import Cause, Costmap, Running
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
-from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.ports import NavigateInputs
+from skills.navigate.skill import Navigate
 from skills.robot import ArmCapabilities, FloatArray, Pose2D
 
 BEARINGS = 24

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, Failed, Part, Running, Skill, SkillContext, Step, Succeeded
+from skills.api import Cause, Failed, Running, SkillContext, Step, Succeeded
+from skills.back_off.ports import BackOffInputs, BackOffPorts
 from skills.geometry import compose, relative
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
@@ -26,14 +26,6 @@ _STEP_M = 0.05
 
 
 @dataclass(frozen=True)
-class BackOffInputs:
-    """The distance (m), and the least distance (m) that counts as success."""
-
-    distance_m: Length = 0.4
-    least_m: Length = 0.15
-
-
-@dataclass(frozen=True)
 class BackOffOptions:
     """How fast the robot goes, how near the goal it stops (m), and how long it takes to come to rest (s)."""
 
@@ -42,21 +34,11 @@ class BackOffOptions:
     settle_s: Delay = 0.4
 
 
-class BackOff(Skill[BackOffInputs]):
-    """Moves a short way out of a tight place: straight, slowly, in the first direction with enough clearance."""
+class BackOff(BackOffPorts):
+    """The skill that `BackOffPorts` declares."""
 
-    name: ClassVar[str] = "back_off"
-    Inputs: ClassVar[type] = BackOffInputs
-    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
     Options: ClassVar[type] = BackOffOptions
     options: BackOffOptions
-    causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "the LiDAR does not work",
-        Cause.PLANNING: "there is no clearance in any direction",
-        Cause.EXECUTION: "the robot refuses to drive or makes no progress",
-    }
-    default_timeout_s: ClassVar[float] = 15.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
 
     def __init__(self, context: SkillContext) -> None:
         super().__init__(context)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -31,6 +31,7 @@ from skills.detect.messages import (
     object_to_detect_message,
     tracks_message,
 )
+from skills.detect.ports import DetectInputs, DetectPorts
 from skills.detect.unidentified import most_free_first, segments_3d, unnamed
 from skills.detect.viewpoints import in_plain_view, look_targets, surface_boxes
 from skills.detect.words import counted, describe, surface_names, wanted
@@ -42,7 +43,7 @@ from skills.perception.detection_3d import Detection3D, detections_3d, observati
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in, is_dark
 from skills.perception.surface_segmentation import Cluster, view_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
-from skills.quantities import Angle, Coordinate, Duration, Height, Length, Tries
+from skills.quantities import Angle, Duration, Length, Tries
 from skills.robot import FloatArray, Image
 
 _LEAST_SEEN = 0.02
@@ -52,28 +53,6 @@ _AVOIDED_M = 0.08
 _BELOW_TOP_M = 0.01
 _RAISED_M = 0.15
 """A head looks once more from a body that is higher by so much."""
-
-
-@dataclass(frozen=True)
-class DetectInputs:
-    """What to look for (any of `classes`, with all `attributes`) and on which surfaces.
-
-    The class "thing" is any object that stands there, whether the detector has a class for it or not; those where
-    one of `avoid` was seen are the last choice.
-
-    The search ends with the first `count` objects; a count of 0 searches all surfaces and counts all objects. With
-    `expected_W` it searches that place only, and only objects within 0.35 m of it count. With `floor`, objects on the
-    floor beside the surfaces count where they come into view.
-    """
-
-    classes: tuple[str, ...]
-    surfaces: tuple[Surface, ...]
-    attributes: tuple[str, ...] = ()
-    expected_W: tuple[Coordinate, Coordinate, Height] | None = None
-    count: Tries = 1
-    floor: bool = False
-    avoid: tuple[ObjectObservation, ...] = ()
-    seen_before: ObjectObservation | None = None
 
 
 @dataclass(frozen=True)
@@ -109,25 +88,11 @@ class DetectOptions:
     around_rad: tuple[Angle, ...] = (0.7, -0.7)
 
 
-class Detect(ArmSkill[DetectInputs]):
-    """Searches surfaces for objects from where the robot stands. Stows the arm when it finds nothing."""
+class Detect(DetectPorts, ArmSkill[DetectInputs]):
+    """The skill that `DetectPorts` declares."""
 
-    name = "detect"
-    Inputs = DetectInputs
     Options: ClassVar[type] = DetectOptions
     options: DetectOptions
-    outputs: ClassVar[Mapping[str, type]] = {
-        "observation": ObjectObservation,
-        "observations": tuple[ObjectObservation, ...],
-    }
-    causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "a class, attribute or surface cannot be searched for from here, or there is no arm",
-        Cause.PLANNING: "the arm reaches no viewpoint",
-        Cause.EXECUTION: "the arm did not reach its viewpoint, or the camera shows nothing",
-        Cause.POSTCONDITION: "no such object is seen, or fewer than asked for",
-    }
-    default_timeout_s = 90.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"observation": 3.0}
 
     def run(self, inputs: DetectInputs) -> Routine[Succeeded]:
         """Look at each surface in turn; an object counts when a second look from beside agrees."""

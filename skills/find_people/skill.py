@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import shapely
 
-from skills.api import Cause, ObjectObservation, Part, Running, Succeeded, Thing
+from skills.api import Cause, ObjectObservation, Running, Succeeded, Thing
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.words import counted
+from skills.find_people.ports import FindPeopleInputs, FindPeoplePorts
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.navigate.moving import MovingSkill
@@ -20,22 +21,11 @@ from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark
 from skills.perception.people import SeenPerson, merged, people_in_scan
 from skills.perception.people_watch import people_in_images
-from skills.quantities import Coordinate, Count, Delay, Length, Share, Tries, Turn, TurnRate
+from skills.quantities import Count, Delay, Length, Share, Turn, TurnRate
 from skills.robot import Image
 
 _SCAN_AGE_S, _AHEAD_RAD = 1.0, 0.2
 _SIZE_M = (0.5, 0.5, 1.7)
-
-
-@dataclass(frozen=True)
-class FindPeopleInputs:
-    """Where to look: the corners (x, y) of `area_W`, called `place`. `person` is who is looked for; the skill knows
-    nobody by face, so that anybody counts. A `count` of 0 counts all that are seen."""
-
-    area_W: tuple[tuple[Coordinate, Coordinate], ...]
-    place: str
-    person: str = PERSON
-    count: Tries = 1
 
 
 @dataclass(frozen=True)
@@ -55,25 +45,11 @@ class FindPeopleOptions:
     reach_m: Length = 6.0
 
 
-class FindPeople(MovingSkill[FindPeopleInputs]):
-    """Looks for people with body cameras and LiDAR; with the LiDAR alone where the detector knows no people."""
+class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
+    """The skill that `FindPeoplePorts` declares."""
 
-    name = "find_people"
-    Inputs = FindPeopleInputs
-    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
     Options: ClassVar[type] = FindPeopleOptions
     options: FindPeopleOptions
-    outputs: ClassVar[Mapping[str, type]] = {
-        "observation": ObjectObservation,
-        "observations": tuple[ObjectObservation, ...],
-    }
-    causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "there is no new scan",
-        Cause.EXECUTION: "it is too dark to see, a camera gives no picture, or the robot refuses to turn",
-        Cause.POSTCONDITION: "nobody is seen, or fewer than asked for",
-    }
-    default_timeout_s = 60.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"localisation": 1.0}
 
     def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
         """Look, turn, look again, until enough people were seen twice."""

@@ -4,28 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.grasp.candidates import GraspCandidate
-from skills.quantities import Coordinate, Cosine
+from skills.grasp.ports import TriedGrasp
 from skills.robot import FloatArray
 
 SAME_TURN_RAD = 0.35
 SAME_PLACE_M = 0.03
 
 Vector = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class TriedGrasp:
-    """A grasp in the world's axes: where the fingers point, how they close, the hand from the object (m)."""
-
-    pointing_W: tuple[Cosine, Cosine, Cosine]
-    closing_W: tuple[Cosine, Cosine, Cosine]
-    hand_from_thing_W: tuple[Coordinate, Coordinate, Coordinate]
 
 
 def tried_grasp(candidate: GraspCandidate, centre_B: tuple[float, float], X_WB: RigidTransform) -> TriedGrasp:

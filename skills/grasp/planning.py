@@ -13,12 +13,11 @@ from skills.arm.collision import ArmScene, Box, gaps_m
 from skills.arm.kinematics import ArmModel
 from skills.arm.poses import towards_shoulder
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
+from skills.grasp.ports import IN_THE_WAY
 from skills.quantities import Margin, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities
 from skills.stack import ArmPlanner
 
-IN_THE_WAY = "in_the_way"
-"""The output port of what stands in the way, also in a `PlanningError`."""
 PREGRASPS_M = (0.12, 0.07, 0.045)
 """How far before the grasp the straight approach begins, the best first."""
 LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0), (0.03, 0.0))

@@ -24,8 +24,9 @@ from skills.detect.viewpoints import surface_boxes
 from skills.grasp.candidates import THIN_M, GraspCandidate
 from skills.grasp.close_view import LOOK_HALF_SIDE_M, SURFACE_AROUND_M, CloseView, examine, square
 from skills.grasp.in_hand import held_box, turned_in_hand
-from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
-from skills.grasp.planning import IN_THE_WAY, PREGRASPS_M, GraspPlan, Surroundings, lifts
+from skills.grasp.memory import others_first, tried_grasp
+from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
+from skills.grasp.ports import IN_THE_WAY, GraspInputs, GraspPorts, TriedGrasp
 from skills.grasp.reach import WIDE, body_heights_m, reach_check, space_about, wide_share
 from skills.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
 from skills.grasp.servo import seen_shift, shifted
@@ -51,14 +52,6 @@ _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
 
 @dataclass(frozen=True)
-class GraspInputs:
-    """The object as it was seen; grasps like those in `avoid` are the last choice."""
-
-    observation: ObjectObservation
-    avoid: tuple[TriedGrasp, ...] = ()
-
-
-@dataclass(frozen=True)
 class GraspOptions:
     """How firmly is gripped (N), and when the object counts as lost.
 
@@ -72,32 +65,11 @@ class GraspOptions:
     pull_back_m: Margin = 0.12
 
 
-class Grasp(ArmSkill[GraspInputs]):
-    """Grasps an object and holds it near the body. On failure it opens the gripper and stows the arm.
+class Grasp(GraspPorts, ArmSkill[GraspInputs]):
+    """The skill that `GraspPorts` declares."""
 
-    The output `tried` is `avoid` and the grasp of this attempt, after a failure, too. After a failure for want of a
-    plan `in_the_way` are the objects without which there were a grasp, the nearest first; else it is empty.
-    """
-
-    name = "grasp"
-    Inputs = GraspInputs
     Options: ClassVar[type] = GraspOptions
     options: GraspOptions
-    outputs: ClassVar[Mapping[str, type]] = {
-        "tried": tuple[TriedGrasp, ...],
-        IN_THE_WAY: tuple[ObjectObservation, ...],
-    }
-    causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "the object is not where it was seen or too heavy, the gripper is full, or there is no arm",
-        Cause.PLANNING: "no grasp is within reach and free",
-        Cause.EXECUTION: "the arm or the gripper did not reach its goal",
-        Cause.POSTCONDITION: "the gripper closed on nothing, or the object slipped out",
-    }
-    default_timeout_s = 120.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
-    changes_world = True
-    gripper_before = False
-    gripper_after = True
 
     def undone(self, inputs: GraspInputs) -> str | None:
         """Judged by the gripper."""

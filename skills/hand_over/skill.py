@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -20,10 +20,11 @@ from skills.arm.pull import PullWatch
 from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
 from skills.hand_over.given import Seen, release_from, release_of
+from skills.hand_over.ports import HandOverInputs, HandOverPorts
 from skills.hand_over.verification import HandOverVerification
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
-from skills.navigate.skill import NavigateInputs
+from skills.navigate.ports import NavigateInputs
 from skills.patience import Patience
 from skills.perception.people import SeenPerson, people_in_scan
 from skills.quantities import Duration, Force, Height, Length
@@ -39,14 +40,6 @@ _LETS_GO, _KEEPS = "let go", "hold on"
 _POINTS_DOWN = 0.8
 _TRIES = 2
 _WIDE, _SHAKE_RAD, _SHAKE_RAD_S = 0.75, (0.35, -0.35, 0.35, -0.35), 3.0
-
-
-@dataclass(frozen=True)
-class HandOverInputs:
-    """Names of the person and of the object, for messages; the skill takes the nearest person in sight."""
-
-    person: str
-    thing: str = "object"
 
 
 @dataclass(frozen=True)
@@ -67,25 +60,11 @@ class HandOverOptions:
     wait_s: Duration = 20.0
 
 
-class HandOver(HandOverVerification[HandOverInputs]):
-    """Finds a person by LiDAR, goes there, holds the object out, lets go when they take it, and looks who has it."""
+class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
+    """The skill that `HandOverPorts` declares."""
 
-    name = "hand_over"
-    Inputs = HandOverInputs
     Options: ClassVar[type] = HandOverOptions
     options: HandOverOptions
-    causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "nothing is held, there is no new scan, or nobody is seen near",
-        Cause.PLANNING: "no free place before the person, or no free path for the arm",
-        Cause.EXECUTION: "the robot or its arm did not reach its goal",
-        Cause.POSTCONDITION: "the object was lost, is still in the gripper, or is not seen at rest with the person",
-        Cause.TIMEOUT: "the person did not take the object",
-    }
-    default_timeout_s = 180.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
-    changes_world = True
-    gripper_before = True
-    gripper_after = False
 
     def begin(self, inputs: HandOverInputs) -> None:
         """Forget an earlier attempt."""

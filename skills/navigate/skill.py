@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -15,10 +15,8 @@ from skills.api import (
     Failed,
     ForgettingCostmap,
     Job,
-    Part,
     PlanningError,
     Running,
-    Skill,
     SkillContext,
     Step,
     Succeeded,
@@ -33,32 +31,19 @@ from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
 from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
+from skills.navigate.ports import NavigateInputs, NavigatePorts
 from skills.navigate.scan_health import ScanHealth, ScanHealthOptions
 from skills.patience import PATIENCE_S
 from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_watch import PeopleOptions, PeopleWatch
-from skills.quantities import Coordinate, Delay, Duration, Length, Margin, Speed, Tries, Turn, TurnRate
+from skills.quantities import Delay, Duration, Margin, Speed, Tries, TurnRate
 from skills.robot import Pose2D
 from skills.stack import LocalController
 
 _STILL_THERE_M = 1.0
 _REVIEWED_M = 0.02
 _OUTLINE_PERIOD_S = 0.5
-
-
-@dataclass(frozen=True)
-class NavigateInputs:
-    """The goal (the body's pose in the world), tolerances and the maximum speed.
-
-    Poses at `nearby_m`, forward and left of the goal, will do as well: a failure is final only if none can be reached.
-    """
-
-    goal: Pose2D
-    position_tolerance_m: Length = 0.10
-    yaw_tolerance_rad: Turn = 0.10
-    max_speed_m_s: Speed = 0.8
-    nearby_m: tuple[tuple[Coordinate, Coordinate], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -93,23 +78,11 @@ class NavigateOptions:
     doors: DoorOptions = field(default_factory=DoorOptions)
 
 
-class Navigate(Skill[NavigateInputs]):
-    """Drives to a pose: plans a path for the whole footprint, follows it, and stands still at the goal."""
+class Navigate(NavigatePorts):
+    """The skill that `NavigatePorts` declares."""
 
-    name: ClassVar[str] = "navigate"
-    Inputs: ClassVar[type] = NavigateInputs
-    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
     Options: ClassVar[type] = NavigateOptions
-    outputs: ClassVar[Mapping[str, type]] = {}
-    causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "localisation is lost, the LiDAR does not work, or the robot refuses to drive",
-        Cause.PLANNING: "the goal is blocked, or there is no path, even after waiting for what stands there to move",
-        Cause.EXECUTION: "the robot makes no progress, loses localisation or its LiDAR, or refuses to drive on",
-        Cause.POSTCONDITION: "it stands still, but not at the goal",
-    }
-    default_timeout_s: ClassVar[float] = 180.0
     options: NavigateOptions
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
 
     def __init__(self, context: SkillContext, options: NavigateOptions | None = None) -> None:
         super().__init__(context, options)

@@ -6,16 +6,17 @@ import math
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 from skills.files.yaml_source import read_yaml
 from skills.perception.class_forms import class_forms
-from skills.perception.detection_3d import Detection3D
+
+if TYPE_CHECKING:
+    from skills.perception.detection_3d import Detection3D
 
 Colours = NDArray[np.uint8]
 _LEAST_SHARE: Final = 0.3
@@ -40,6 +41,8 @@ class ColourRange(BaseModel):
 
     def share(self, colours: Colours) -> float:
         """Share of colours (N, 3) RGB in the range."""
+        import cv2  # who only asks which words there are does without
+
         hsv = cv2.cvtColor(colours.reshape(1, -1, 3), cv2.COLOR_RGB2HSV_FULL)[0].astype(np.float64)
         hue, saturation, value = hsv[:, 0] * (360 / 255), hsv[:, 1] / 255, hsv[:, 2] / 255
         low, high = self.hue_deg

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
@@ -25,7 +25,7 @@ from skills.geometry import inside_polygon, wrap
 from skills.grasp.candidates import hand_rotation
 from skills.grasp.reach import body_heights_m
 from skills.navigate.arm_footprint import ArmFootprint
-from skills.navigate.skill import NavigateInputs
+from skills.navigate.ports import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
 from skills.place.free_spot import clear_spots, free_spots, roomiest_first, spaced_spots, spots, unseen_view
 from skills.place.placement import (
@@ -38,7 +38,8 @@ from skills.place.placement import (
     reaches,
     with_held,
 )
-from skills.quantities import Coordinate, Length, Tries, TurnRate
+from skills.place.ports import PlaceInputs, PlacePorts
+from skills.quantities import Length, Tries, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, Image, Pose2D
 
 _SURELY_FREE_M = 0.03
@@ -60,14 +61,6 @@ _SETTLES_WITHIN_S, _MOVES_ABOUT_M = 5.0, 0.2
 
 
 @dataclass(frozen=True)
-class PlaceInputs:
-    """The surface to put the object on; its middle comes to rest on none of the circles (x, y, radius) of the world."""
-
-    surface: Surface
-    clear_of: tuple[tuple[Coordinate, Coordinate, Length], ...] = ()
-
-
-@dataclass(frozen=True)
 class PlaceOptions:
     """How an object is put down.
 
@@ -80,24 +73,11 @@ class PlaceOptions:
     moves: Tries = 2
 
 
-class Place(ArmSkill[PlaceInputs]):
-    """Puts the held object down on a surface and stows the arm. Goes nearer when no free spot is in reach."""
+class Place(PlacePorts, ArmSkill[PlaceInputs]):
+    """The skill that `PlacePorts` declares."""
 
-    name = "place"
-    Inputs = PlaceInputs
     Options: ClassVar[type] = PlaceOptions
     options: PlaceOptions
-    causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "nothing is held",
-        Cause.PLANNING: "no free spot is seen within reach, or the arm finds no path to it",
-        Cause.EXECUTION: "the robot or its arm did not reach its goal",
-        Cause.POSTCONDITION: "the object is not seen at rest where it was put down, or is still in the gripper",
-    }
-    default_timeout_s = 150.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
-    changes_world = True
-    gripper_before = True
-    gripper_after = False
 
     def undone(self, inputs: PlaceInputs) -> str | None:
         """Judged by the gripper."""

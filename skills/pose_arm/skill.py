@@ -2,41 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
-
 import numpy as np
 
-from skills.api import Cause, Part, Succeeded
+from skills.api import Cause, Succeeded
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.routine import Routine, SkillFailure
-from skills.quantities import Angle, Turn
+from skills.pose_arm.ports import PoseArmInputs, PoseArmPorts
 
 _THERE_RAD = 0.05
 
 
-@dataclass(frozen=True)
-class PoseArmInputs:
-    """Joint angles from the shoulder on; the opening (0 closed): None, or something held, leaves it as it is."""
-
-    joints_rad: tuple[Angle, ...]
-    opening: Turn | None = None
-
-
-class PoseArm(ArmSkill[PoseArmInputs]):
-    """Moves the arm on a free path to joint angles, then the gripper to an opening."""
-
-    name = "pose_arm"
-    Inputs = PoseArmInputs
-    uses: ClassVar[frozenset[Part]] = frozenset({Part.ARM})
-    causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "the pose is not one of this robot's arm",
-        Cause.PLANNING: "the arm finds no free path",
-        Cause.EXECUTION: "the arm did not reach its goal",
-    }
-    default_timeout_s = 30.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5}
+class PoseArm(PoseArmPorts, ArmSkill[PoseArmInputs]):
+    """The skill that `PoseArmPorts` declares."""
 
     def run(self, inputs: PoseArmInputs) -> Routine[Succeeded]:
         """Move there."""

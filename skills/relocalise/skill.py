@@ -3,34 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, LocalisationEstimate, Localiser, Part, Running, SearchingLocaliser, Succeeded
+from skills.api import Cause, LocalisationEstimate, Localiser, Running, SearchingLocaliser, Succeeded
 from skills.arm.routine import Routine, SkillFailure
 from skills.navigate.low_obstacles import WatchOptions, low_points
 from skills.navigate.moving import MovingSkill
 from skills.patience import PATIENCE_S
-from skills.quantities import Delay, Length, Share, Speed, Tries, Turn, TurnRate
+from skills.quantities import Delay, Length, Share, Speed, Turn, TurnRate
 from skills.relocalise.free_space import FreeSpaceOptions, can_turn, free_m, obstacles_B
+from skills.relocalise.ports import RelocaliseInputs, RelocalisePorts
 from skills.robot import FloatArray, NoImageError, Scan
 
 _SCAN_PATIENCE_S = PATIENCE_S
 _LEAST_STEP_M = 0.15
-
-
-@dataclass(frozen=True)
-class RelocaliseInputs:
-    """`turns`: the most headings to search in, an eighth of a turn apart.
-
-    `drives`: how often it then drives a little and begins anew.
-    """
-
-    turns: Tries = 8
-    drives: Tries = 3
 
 
 @dataclass(frozen=True)
@@ -53,21 +42,11 @@ class RelocaliseOptions:
     low: WatchOptions = field(default_factory=WatchOptions)
 
 
-class Relocalise(MovingSkill[RelocaliseInputs]):
-    """Finds the robot's pose on the map again. A pose counts once new scans agree with it for a second."""
+class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
+    """The skill that `RelocalisePorts` declares."""
 
-    name: ClassVar[str] = "relocalise"
-    Inputs: ClassVar[type] = RelocaliseInputs
-    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
     Options: ClassVar[type] = RelocaliseOptions
     options: RelocaliseOptions
-    causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "there are no new scans, or this robot's localiser cannot search",
-        Cause.EXECUTION: "the robot refuses to move, or a camera gives no picture",
-        Cause.POSTCONDITION: "no pose on the map fits what the robot sees",
-    }
-    default_timeout_s: ClassVar[float] = 240.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"localisation": 1.0}
 
     def run(self, inputs: RelocaliseInputs) -> Routine[Succeeded]:
         """Search the whole map; turn a little, and again; after a round of that, from somewhere else."""

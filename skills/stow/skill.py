@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
-
 import numpy as np
 
-from skills.api import Cause, Part, Succeeded
+from skills.api import Cause, Succeeded
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.poses import carry_configuration
 from skills.arm.routine import Routine, SkillFailure
+from skills.stow.ports import StowInputs, StowPorts
 
 _NEAR_X_M, _NEAR_Z_M = 0.05, 0.06
 """A hand no farther than so beyond where it carries is near the body."""
@@ -19,23 +16,8 @@ _RAISED_M = 0.05
 """A body no more than so above its usual height is not raised."""
 
 
-@dataclass(frozen=True)
-class StowInputs:
-    """Nothing is needed."""
-
-
-class Stow(ArmSkill[StowInputs]):
-    """Brings the arm near the body, and the body to its usual height. An arm that is near the body stays there."""
-
-    name = "stow"
-    Inputs = StowInputs
-    uses: ClassVar[frozenset[Part]] = frozenset({Part.ARM})
-    causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PLANNING: "the arm finds no free path",
-        Cause.EXECUTION: "the arm did not reach its goal",
-    }
-    default_timeout_s = 30.0
-    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
+class Stow(StowPorts, ArmSkill[StowInputs]):
+    """The skill that `StowPorts` declares."""
 
     def run(self, inputs: StowInputs) -> Routine[Succeeded]:
         """Stow, or carry. From a raised body the arm comes near first: lowered, it would press on what is under it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from executive.language.foreign import foreign_reason
 from executive.language.normalise import clean, placeholder
@@ -14,12 +14,15 @@ from executive.language.questions import Answerer, ClarifyingQuestion, RefusalEr
 from executive.language.reference import Memory
 from executive.language.similar import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
-from executive.language.structure import Structured, structured
+from executive.language.structure.mention import mentions_structure
 from executive.language.wake import strip_wake
 from executive.mission.command import Command
 from executive.mission.file.model import MissionStep
 from executive.mission.knowledge import Knowledge
 from executive.mission.written import written
+
+if TYPE_CHECKING:
+    from executive.language.structure.sentence import Structured
 
 __all__ = ["Status", "Understanding", "parse_lines", "understand", "understand_asking"]
 
@@ -120,6 +123,10 @@ def _with_structure(
     plain: Trace, text: str, parser: DependencyParser, knowledge: Knowledge, memory: Memory | None
 ) -> Trace:
     """What a sentence that is no list of plain commands means, if it decides, repeats, waits, says or asks."""
+    if not mentions_structure(text):
+        return plain
+    from executive.language.structure.sentence import structured
+
     try:
         read = plain.refusal is None
         found = structured(text, parser=parser, knowledge=knowledge, memory=memory, plain=read)

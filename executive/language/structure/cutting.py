@@ -18,7 +18,6 @@ __all__ = [
     "Kind",
     "behind",
     "cut",
-    "mentions",
     "opens",
     "pattern",
     "reworded",
@@ -130,22 +129,10 @@ def _behind() -> tuple[tuple[Kind, re.Pattern[str]], ...]:
     )
 
 
-def mentions(text: str) -> bool:
-    """Whether anything in it may decide, repeat, wait, say or ask; else it is a sentence of plain commands."""
-    return _MENTIONED.search(text) is not None
-
-
 _ONE_VERB: Final = re.compile(r"(?:^|[\s,])(?:go|come|run|say)$", re.IGNORECASE)
 """Behind these "and" and "please" join no other clause: "go and charge"."""
 _ELSE: Final = re.compile(r"(?:or )?(?:else|otherwise)\b", re.IGNORECASE)
 _SOME: Final = re.compile(r"(?:some|any|every|no|body|thing|one|where|what|who)$", re.IGNORECASE)
-_MENTIONED: Final = re.compile(
-    r"\b(?:is it|are you|house|whole|everywhere|all over|move|if|unless|in case|otherwise|else|every|each|all"
-    r"|everyone|everybody|twice|times|once|while|as long as|until"
-    r"|till|soon|when|wait|stay|say|tell|announce|ask|greet|know|inform|remind|whatever|matter|regardless|failing|fail"
-    r"|fails|door|battery|charge|percent|repeat|holding|report|provided)\b",
-    re.IGNORECASE,
-)
 
 
 def reworded(text: str) -> str:

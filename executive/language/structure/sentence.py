@@ -17,7 +17,6 @@ from executive.language.structure.cutting import (
     Kind,
     behind,
     cut,
-    mentions,
     reworded,
 )
 from executive.language.structure.leaves import Leaves, State, at_start
@@ -50,7 +49,7 @@ class Structured:
 def structured(
     text: str, *, parser: DependencyParser, knowledge: Knowledge, memory: Memory | None, plain: bool = False
 ) -> Structured | None:
-    """The steps of a sentence that does more than to list plain commands; None where it does not.
+    """The steps of a sentence that `mentions_structure`; None where it lists plain commands nevertheless.
 
     `plain` says that it could be read as such a list, too: then only what certainly decides or repeats is read
     otherwise.
@@ -59,8 +58,6 @@ def structured(
         RefusalError: it decides, repeats, waits, says or asks something that is not surely understood; the message
             names the words.
     """
-    if not mentions(text):
-        return None
     clauses = cut(reworded(smoothed(text)))
     if plain and not any(one.kind is not None or behind(one.text) is not None for one in clauses):
         return None

@@ -32,6 +32,7 @@ _LEAST_PART = 0.15
 _GAP_PX = 11
 _APART_M = 0.035
 _COLUMN_M, _UNDER_HANGING_M, _LOWEST_HIDDEN_M = 0.04, 0.12, 0.28
+_COLUMN_STRIDES = np.array([1 << 20, 1])
 
 
 @dataclass(frozen=True)
@@ -76,15 +77,16 @@ def view_surfaces(
 
 def _view(cloud: PointCloud, p_WC: FloatArray, surface: Surface, margin_m: float) -> SurfaceView | None:
     above = cloud.p_W[:, 2] - surface.height_m
-    cloud = cloud.where((above > -_PLANE_BAND_M) & (above < _HIGHEST_M))
-    cloud = cloud.where(inside_polygon(cloud.p_W[:, :2], surface.polygon_W, margin_m))
+    over = (above > -_PLANE_BAND_M) & (above < _HIGHEST_M)
+    over[over] = inside_polygon(cloud.p_W[over, :2], surface.polygon_W, margin_m)
+    cloud = cloud.where(over)
     plane = fit_plane(cloud.p_W, surface.height_m)
     if plane is None:
         return None
     height = cloud.p_W[:, 2] - plane.z(cloud.p_W[:, :2])
-    raised = height > max(_LOWEST_M, 3.0 * plane.noise_m)
-    standing = cloud.where(raised).where(resting(cloud.p_W[raised, :2], height[raised]))
-    clusters = tuple(_cluster(points, surface.name, plane, p_WC) for points in _groups(standing))
+    standing = height > max(_LOWEST_M, 3.0 * plane.noise_m)
+    standing[standing] = resting(cloud.p_W[standing, :2], height[standing])
+    clusters = tuple(_cluster(points, surface.name, plane, p_WC) for points in _groups(cloud.where(standing)))
     return SurfaceView(plane, cloud.where(np.abs(height) < max(_LOWEST_M, 3.0 * plane.noise_m)), clusters)
 
 
@@ -93,10 +95,11 @@ def resting(xy: FloatArray, height_m: FloatArray) -> NDArray[np.bool_]:
 
     What hangs over it does not, as the board above on a shelf: there is a gap below it.
     """
-    columns = np.unique(np.floor(xy / _COLUMN_M).astype(int), axis=0, return_inverse=True)[1].reshape(-1)
+    columns = np.floor(xy / _COLUMN_M).astype(np.int64) @ _COLUMN_STRIDES
     order = np.lexsort((height_m, columns))
     column, height = columns[order], height_m[order]
-    first = np.diff(column, prepend=-1) > 0
+    first = np.ones(len(order), dtype=np.bool_)
+    first[1:] = column[1:] != column[:-1]
     gap = np.where(first, height > _LOWEST_HIDDEN_M, np.diff(height, prepend=0.0) > _UNDER_HANGING_M)
     gaps = np.cumsum(gap)
     before = np.maximum.accumulate(np.where(first, gaps - gap, 0))

@@ -14,6 +14,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
 from pydrake.systems.framework import Context
 
+from plant.sensors.camera_noise import NoiseTile
 from plant.sensors.noisy import NoisySensor
 from plant.sensors.ray_cast import NO_RETURN_M, cast_rays
 from plant.sensors.ray_shapes import RayScene
@@ -81,6 +82,7 @@ class Lidar(NoisySensor):
         self._scene = RayScene(plant, inspector, (body.model_instance(),) if unseen is None else unseen)
         self._elevations, self._turn = self.spec.elevations_rad(), self.spec.azimuths_rad()
         self._azimuths = self._turn[self.spec.seen()]
+        self._grain = NoiseTile(rng, len(self._elevations), len(self._azimuths))
 
     def scan(
         self, plant_context: Context, stamp_s: float, X_OB: RigidTransform, X_BL: RigidTransform | None = None
@@ -117,9 +119,8 @@ class Lidar(NoisySensor):
 
     def _measured(self, ranges_m: NDArray[np.float32]) -> NDArray[np.float32]:
         """Ranges with noise; NaN where lost or out of range."""
-        spec, shape = self.spec, ranges_m.shape
-        noisy = ranges_m + np.float32(spec.sigma_m) * self._rng.standard_normal(shape, dtype=np.float32)
-        lost = self._rng.random(shape, dtype=np.float32) < spec.dropout
-        lost |= (noisy < spec.min_range_m) | (noisy > min(spec.max_range_m, NO_RETURN_M / 2.0))
-        noisy[lost] = np.nan
-        return noisy
+        spec = self.spec
+        noisy = ranges_m + np.float32(spec.sigma_m) * self._grain.crop()[..., 0]
+        lost = (noisy < spec.min_range_m) | (noisy > min(spec.max_range_m, NO_RETURN_M / 2.0))
+        lost.reshape(-1)[self._rng.integers(0, lost.size, self._rng.binomial(lost.size, spec.dropout))] = True
+        return np.where(lost, np.float32(np.nan), noisy)

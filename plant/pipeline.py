@@ -10,6 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
 
+import numpy as np
+
+from plant.control.arm import arm_set_point
 from plant.control.commands import CommandStatuses
 from plant.simulation import Engine
 from skills.robot import (
@@ -32,7 +35,7 @@ from skills.robot import (
 Background = Callable[[Callable[[], None]], "Future[None]"]
 """Begins work beside the caller's."""
 
-_EXACT_S = 1e-9
+_EXACT_S, _LEAST_S = 1e-9, 1e-6
 
 
 class Pipeline:
@@ -41,7 +44,7 @@ class Pipeline:
     def __init__(self, engine: Engine, background: Background | None = None) -> None:
         """`background` does the steps beside the ticks; without one `advance` does them."""
         self._engine, self._background = engine, background or _at_once
-        self._robots = {name: PipelinedRobot(robot, self.settle) for name, robot in engine.robots.items()}
+        self._robots = {name: PipelinedRobot(robot, self) for name, robot in engine.robots.items()}
         self._now_s: float | None = None
         self._under_way: Future[None] | None = None
 
@@ -77,6 +80,10 @@ class Pipeline:
             robot.begin_commands()
         self._under_way = self._background(partial(self._engine.step, dt_s))
 
+    def reached_s(self) -> float:
+        """The time (s) that the plant has reached, once no step is under way."""
+        return self._engine.now()
+
     def settle(self) -> None:
         """Wait until no step is under way. Raises what went wrong in it."""
         under_way, self._under_way = self._under_way, None
@@ -85,11 +92,14 @@ class Pipeline:
 
 
 class PipelinedRobot:
-    """A robot whose commands begin when the step under way is done; until then they count as running."""
+    """A robot whose commands begin when the step under way is done; until then they count as running.
 
-    def __init__(self, robot: Robot, settle: Callable[[], None]) -> None:
-        """`settle` waits until no step is under way; verbs of the lease do, since they are answered at once."""
-        self._robot, self._settle = robot, settle
+    Verbs of the lease wait for that step, since they are answered at once. The time of an arm's trajectory counts from
+    its command: the arm takes it up where it should be by then.
+    """
+
+    def __init__(self, robot: Robot, pipeline: Pipeline) -> None:
+        self._robot, self._pipeline = robot, pipeline
         self._statuses = CommandStatuses()
         self._commanded: list[tuple[CommandId, Callable[[], CommandId]]] = []
         self._running: dict[CommandId, CommandId] = {}  # by the ids given here, those of the robot
@@ -112,7 +122,7 @@ class PipelinedRobot:
 
     def _settled(self) -> Robot:
         """The robot, once no step is under way and it has all that was commanded."""
-        self._settle()
+        self._pipeline.settle()
         self.begin_commands()
         return self._robot
 
@@ -175,7 +185,13 @@ class PipelinedRobot:
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follow a joint trajectory; done when its end is reached and the arm is still."""
-        return self._later(partial(self._robot.move_arm, trajectory, until_s=until_s, lease=lease))
+        commanded_s = self._pipeline.now()
+
+        def begin() -> CommandId:
+            late_s = self._pipeline.reached_s() - commanded_s
+            return self._robot.move_arm(_taken_up(trajectory, late_s), until_s=until_s, lease=lease)
+
+        return self._later(begin)
 
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Turn the head, if there is one; done when it is there and still."""
@@ -214,6 +230,14 @@ class PipelinedRobot:
     def return_lease(self, lease: Lease) -> None:
         """Give the lease back; the robot stops. A lease that was taken away is ignored."""
         self._settled().return_lease(lease)
+
+
+def _taken_up(trajectory: ArmTrajectory, late_s: float) -> ArmTrajectory:
+    """What is left of a trajectory that begins so late, from where the arm should be by then."""
+    left_s = trajectory.times_s - late_s
+    ahead = left_s > _LEAST_S
+    here, _ = arm_set_point(trajectory, late_s)
+    return ArmTrajectory(np.concatenate([[0.0], left_s[ahead]]), np.vstack([here, trajectory.positions_rad[ahead]]))
 
 
 def _at_once(work: Callable[[], None]) -> Future[None]:

@@ -7,10 +7,11 @@ import pytest
 
 from executive.run.worker import WorkThread
 from executive.testing.small_room import write_small_room
+from plant.diagram import TIME_STEP_S
 from plant.pipeline import Pipeline
 from plant.simulation import Simulation
 from plant.worlds.world import World, load_world
-from skills.robot import CommandState, Lease, LeaseError
+from skills.robot import ArmTrajectory, CommandState, Lease, LeaseError
 
 TICK_S = 0.05
 
@@ -96,6 +97,22 @@ def test_a_refusal_is_known_at_the_next_tick(engine):
     assert robot.command_status(command).state is CommandState.REFUSED
     with pytest.raises(KeyError):
         robot.command_status(command + 1)
+
+
+def test_the_time_of_a_trajectory_counts_from_its_command(engine):
+    pipeline = Pipeline(engine)
+    robot, servos = pipeline.robots["Alice"], engine.robots["Alice"]._arm
+    lease = robot.acquire_lease("test")
+    pipeline.advance(TICK_S)
+    rest_rad = servos.goal_rad
+    turned_rad = rest_rad + np.array([0.2, *[0.0] * (len(rest_rad) - 1)])
+    trajectory = ArmTrajectory(np.array([0.0, 1.0]), np.stack([rest_rad, turned_rad]))
+    robot.move_arm(trajectory, until_s=10.0, lease=lease)
+    for _ in range(4):
+        pipeline.advance(TICK_S)
+    pipeline.settle()
+    commanded_s, set_s = TICK_S, pipeline.reached_s() - 2 * TIME_STEP_S
+    assert servos.goal_rad[0] - rest_rad[0] == pytest.approx(0.2 * (set_s - commanded_s))
 
 
 def test_stopping_one_command_leaves_the_others(engine):

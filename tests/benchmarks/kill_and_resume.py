@@ -58,7 +58,7 @@ def trial(number: int, sentence: str, moment_s: float, seed: int, out: Path, rob
     asked += [] if robots is None else ["--robots", robots]
     with (out / "first.txt").open("wb") as told:
         process = subprocess.Popen([*command, *asked], stdout=told, stderr=subprocess.STDOUT)
-        killed = _kill_at(process, out / "missions.plant", moment_s)
+        killed = kill_at(process, out / "missions.plant", moment_s)
     if not killed:
         return trial(number, sentence, 0.7 * moment_s, seed, out / "earlier", robots)
     again = [*command, "resume", "--store", str(out / "missions.sqlite"), "--quiet", "--json"]
@@ -75,7 +75,7 @@ def trial(number: int, sentence: str, moment_s: float, seed: int, out: Path, rob
     return Trial(number, sentence, moment_s, seed, right and not _done_twice(out), lifts, wall_s, message)
 
 
-def _kill_at(process: subprocess.Popen[bytes], plant: Path, moment_s: float) -> bool:
+def kill_at(process: subprocess.Popen[bytes], plant: Path, moment_s: float) -> bool:
     """Kill the process when its plant's clock has come to the moment; False when it ended before."""
     while process.poll() is None:
         try:

@@ -49,6 +49,13 @@ def test_ticks_of_a_small_and_a_larger_tree_are_timed():
 
 
 @pytest.mark.nightly
+def test_a_run_is_equal_to_the_same_run_kept(tmp_path):
+    run = ("-m", "tests.benchmarks.equal_logs")
+    output_of(*run, "keep", str(tmp_path), "--only", "ask")
+    assert output_of(*run, "compare", str(tmp_path), "--only", "ask").startswith("ask: equal")
+
+
+@pytest.mark.nightly
 def test_a_narrow_world_without_map_is_driven_through(barn_folder):
     result = result_of("barn", barn_folder, "--jobs", 1)
     assert (result["runs"][0]["world"], result["success_rate"]) == (7, 1.0), result

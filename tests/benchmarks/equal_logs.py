@@ -1,0 +1,185 @@
+"""Twelve runs of fixed seeds, kept and compared: whether a change of the code changes what robots do.
+
+    python -m tests.benchmarks.equal_logs keep FOLDER [--only fetch,resume] [--jobs 2]
+    python -m tests.benchmarks.equal_logs compare FOLDER [--only fetch,resume] [--jobs 2]
+
+`keep` writes FOLDER/NAME.json.xz for each run: exit code, result, and what its logs tell but for pictures and wall
+time.
+`compare` does the runs again, prints `equal` or the first differences of each, and ends with 1 where one differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import lzma
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, Final
+
+from executive.record.reader import Event, read_events
+from tests.benchmarks.kill_and_resume import kill_at
+
+MOST_DIFFERENCES: Final = 5
+RESUMED_AT_S: Final = 50.0
+ROOT: Final = Path(__file__).parents[2]
+VOLATILE: Final = frozenset({"versions", "wall_time_s", "real_time_factor", "bytes_logged", "log", "report", "page"})
+"""What a result or a message tells that is not the same in two equal runs."""
+LEFT_OUT: Final = frozenset({"wall", "map"})
+"""Topics of wall time, and of what stands in the world's files anyway."""
+TOLD_WHOLE: Final = frozenset({"transitions", "answer", "speech", "run", "taskChannel", "missions"})
+"""Topics whose messages are kept, so that a difference can be shown; of all others a digest is."""
+
+Words = Sequence[str]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run: what `errand` is told, first what is queued; with `resumed` it is killed once and resumed."""
+
+    run: Words
+    queued: Sequence[Words] = ()
+    resumed: bool = False
+
+
+def _say(sentence: str, *more: str, seed: int = 1) -> Words:
+    return ("run", "--say", sentence, "--seed", str(seed), *more)
+
+
+CASES: Final[Mapping[str, Case]] = {
+    "fetch": Case(_say("fetch me a coke")),
+    "deliver": Case(("run", "missions/deliver.yaml", "--seed", "2")),
+    "decisions": Case(
+        _say("if there is a beer in the kitchen, take it to the coffee table, otherwise go to the office", seed=3)
+    ),
+    "together": Case(("run", "missions/speak_while_driving.yaml", "--seed", "4")),
+    "ask": Case(("run", "missions/tea_or_coffee.yaml", "--seed", "5", "--answer", "coffee", "--answer", "two")),
+    "two_robots": Case(("run", "missions/two_robots.yaml", "--seed", "6")),
+    "fleet": Case(
+        ("fleet", "run", "{out}", "--robots", "alice=spot,carol=spot,bob=fetch,dave=fetch", "--seed", "7"),
+        queued=tuple(
+            ("queue", "add", "--store", "{out}", "--say", sentence)
+            for sentence in ("go to the office", "take a coke to the desk", "go to the bedroom", "go to the hall")
+        ),
+    ),
+    "shop": Case(_say("bring me a beer", "--world", "shop", seed=8)),
+    "lab": Case(_say("go to the storage", "--world", "lab", seed=9)),
+    "resume": Case(_say("fetch me a drink from the kitchen", seed=10), resumed=True),
+    "fault": Case(_say("fetch me a coke", "--fault", "camera.hand: dropout 5 s at 20 s", seed=11)),
+    "question": Case(_say("is there a beer in the kitchen?", seed=12)),
+}
+
+
+def done(case: Case, out: Path) -> dict[str, Any]:
+    """Do a run in a new folder and return what came of it."""
+    for words in case.queued:
+        ended = _errand(words, out)
+        if ended.returncode != 0:
+            raise RuntimeError(ended.stderr)
+    fixed = ("--quiet", "--json", "--no-record")
+    told = (*fixed, "--out", str(out / "fleet" if case.queued else out))
+    if not case.resumed:
+        ended = _errand((*case.run, *told), out)
+    else:
+        process = subprocess.Popen(_command((*case.run, *told), out), cwd=ROOT, stdout=subprocess.DEVNULL)
+        if not kill_at(process, out / "missions.plant", RESUMED_AT_S):
+            raise RuntimeError(f"it was over before {RESUMED_AT_S} s")
+        ended = _errand(("resume", "--store", str(out / "missions.sqlite"), *fixed[:2]), out)
+    logs = sorted(out.rglob("log*.mcap"))
+    return {
+        "exit": ended.returncode,
+        "result": steady(json.loads(ended.stdout.splitlines()[-1])) if ended.stdout.strip() else ended.stderr,
+        "logs": [list(lines(read_events(log), str(out))) for log in logs],
+    }
+
+
+def _errand(words: Words, out: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(_command(words, out), cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def _command(words: Words, out: Path) -> list[str]:
+    return [sys.executable, "-m", "executive.cli", *(word.format(out=out) for word in words)]
+
+
+def steady(value: Any) -> Any:
+    """What a result or message tells, without what differs between two equal runs."""
+    if isinstance(value, Mapping):
+        return {key: steady(each) for key, each in value.items() if key not in VOLATILE}
+    return [steady(each) for each in value] if isinstance(value, list) else value
+
+
+def lines(events: Sequence[Event], out: str) -> Iterator[str]:
+    """A line for each event: its moment (s), its topic, and what it tells or a digest of that."""
+    for event in events:
+        if event.topic not in LEFT_OUT and event.data.get("format") not in ("jpeg", "png"):
+            told = json.dumps(steady(event.data), sort_keys=True, ensure_ascii=False).replace(out, "OUT")
+            kept = told if event.topic in TOLD_WHOLE else hashlib.sha256(told.encode()).hexdigest()[:12]
+            yield f"{event.stamp_s:.3f} {event.topic} {kept}"
+
+
+def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    """What differs between a run as it was kept and as it is, in lines of the form `- before`, `+ now`."""
+    for key in ("exit", "result"):
+        if before[key] != now[key]:
+            yield f"{key}\n  - {before[key]}\n  + {now[key]}"
+    if len(before["logs"]) != len(now["logs"]):
+        yield f"{len(before['logs'])} logs\n  + {len(now['logs'])}"
+    for number, (old, new) in enumerate(zip(before["logs"], now["logs"], strict=False)):
+        for line, (mine, other) in enumerate(zip_longest(old, new, fillvalue="(nothing)"), start=1):
+            if mine != other:
+                yield f"log {number}, event {line} of {len(old)} and {len(new)}\n  - {mine}\n  + {other}"
+
+
+def keep(folder: Path, name: str) -> str:
+    """Do a run and write what came of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    found = _timed(CASES[name])
+    (folder / f"{name}.json.xz").write_bytes(lzma.compress(json.dumps(found).encode()))
+    return f"{name}: exit {found['exit']}, {sum(map(len, found['logs']))} events"
+
+
+def compare(folder: Path, name: str) -> str:
+    """Do a run again and tell what differs."""
+    before = json.loads(lzma.decompress((folder / f"{name}.json.xz").read_bytes()))
+    found = list(differences(before, _timed(CASES[name])))
+    if not found:
+        return f"{name}: equal, {sum(map(len, before['logs']))} events"
+    return "\n".join([f"{name}: {len(found)} differences", *found[:MOST_DIFFERENCES]])
+
+
+def _timed(case: Case) -> dict[str, Any]:
+    begun = time.perf_counter()
+    with tempfile.TemporaryDirectory(prefix="errand-equal-") as folder:
+        found = done(case, Path(folder))
+    sys.stderr.write(f"{case.run[1]} {case.run[2]}: {time.perf_counter() - begun:.0f} s\n")
+    return found
+
+
+def main() -> int:
+    """Keep or compare runs."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=("keep", "compare"))
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", default=",".join(CASES))
+    parser.add_argument("--jobs", type=int, default=1)
+    options = parser.parse_args()
+    work: Callable[[Path, str], str] = keep if options.what == "keep" else compare
+    all_equal = True
+    with ThreadPoolExecutor(options.jobs) as threads:
+        for line in threads.map(lambda name: work(options.folder, name), options.only.split(",")):
+            sys.stdout.write(f"{line}\n")
+            sys.stdout.flush()
+            all_equal = all_equal and "differences" not in line.partition("\n")[0]
+    return 0 if all_equal else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

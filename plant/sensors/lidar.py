@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from pydrake.systems.framework import Context
 from plant.sensors.camera_noise import NoiseTile
 from plant.sensors.noisy import NoisySensor
 from plant.sensors.ray_cast import NO_RETURN_M, cast_rays
-from plant.sensors.ray_shapes import RayScene
+from plant.sensors.ray_shapes import RayScene, ShapeArrays
 from skills.robot import Scan
 
 
@@ -91,10 +91,17 @@ class Lidar(NoisySensor):
 
         `X_BL` is where the robot takes the lidar to be in its body frame, by default its pose on the body it is on.
         """
+        return self.revolution(plant_context, stamp_s, X_OB, X_BL)()
+
+    def revolution(
+        self, plant_context: Context, stamp_s: float, X_OB: RigidTransform, X_BL: RigidTransform | None = None
+    ) -> Callable[[], Scan]:
+        """Computes such a scan when it is called, of the state that the context has now; to be called once."""
         X_WL = self._plant.EvalBodyPoseInWorld(plant_context, self._body) @ self._X_BL
-        return Scan(
+        shapes = self._scene.world_shapes(plant_context)
+        return lambda: Scan(
             stamp_s=stamp_s,
-            ranges_m=self._measured(self.true_ranges(plant_context, X_WL)),
+            ranges_m=self._measured(self._ranges(shapes, X_WL)),
             elevations_rad=self._elevations,
             azimuths_rad=self._azimuths,
             X_BL=self._X_BL if X_BL is None else X_BL,
@@ -103,8 +110,11 @@ class Lidar(NoisySensor):
 
     def true_ranges(self, plant_context: Context, X_WL: RigidTransform) -> NDArray[np.float32]:
         """Ranges (rings, azimuths) without noise from a pose, `NO_RETURN_M` where nothing is hit."""
+        return self._ranges(self._scene.world_shapes(plant_context), X_WL)
+
+    def _ranges(self, shapes: ShapeArrays, X_WL: RigidTransform) -> NDArray[np.float32]:
+        """Ranges to shapes in the world."""
         self._work["lidar_rays"] += len(self._elevations) * len(self._turn)
-        shapes = self._scene.world_shapes(plant_context)
         ranges = cast_rays(
             shapes.kinds,
             shapes.half_extents_m,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,7 +85,9 @@ class SensorSuite(ABC):
             name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER, work=options.work)
             for name, spec in cameras.items()
         }
-        self.scan: Scan | None = None
+        self._scan: Scan | None = None
+        self._revolution: Callable[[], Scan] | None = None
+        self._scanned_s = -math.inf
         self.update(0.0)
 
     def _link_frame(self, link: str) -> FrameId:
@@ -109,8 +111,16 @@ class SensorSuite(ABC):
         self.gripper: Gripper = self._gripper_model.update(now_s, *self._gripper_feels(positions, rates, efforts))
         load = min(1.0, float(np.linalg.norm(v_WB)) + float(np.abs(rates[self._arm]).sum()) / 4.0)
         self.battery: Battery = self._battery_model.update(now_s, load, docked=self._docked(X_WB, v_WB))
-        if self.scan is None or now_s - self.scan.stamp_s >= self._lidar_period_s - 1e-6:
-            self.scan = self._lidar.scan(self._context, now_s, self.odometry.X_OB, self._X_BL())
+        if now_s - self._scanned_s >= self._lidar_period_s - 1e-6:
+            self._scanned_s = now_s
+            self._revolution = self._lidar.revolution(self._context, now_s, self.odometry.X_OB, self._X_BL())
+
+    @property
+    def scan(self) -> Scan | None:
+        """The latest revolution of the LiDAR, computed when it is first read: the plant may step by then."""
+        if self._revolution is not None:
+            self._scan, self._revolution = self._revolution(), None
+        return self._scan
 
     def _reckoned(self, X_WB: RigidTransform) -> RigidTransform:
         """The body's pose that odometry measures, but for its errors."""
@@ -154,7 +164,7 @@ class SensorSuite(ABC):
         """Go on from such a state, and take readings."""
         for name, part in self._parts().items():
             part.restore(state[name])
-        self.scan = None
+        self._scan, self._scanned_s = None, -math.inf
         self.update(now_s)
 
     def _parts(self) -> Mapping[str, NoisySensor]:

@@ -47,8 +47,8 @@ def test_a_thread_and_steps_in_turn_give_the_same_run(world):
     assert runs[0] == runs[1]
 
 
-def test_a_picture_shows_the_world_as_of_the_last_readings(world):
-    pictures = []
+def test_pictures_and_scans_show_the_world_as_of_the_last_readings(world):
+    pictures, scans = [], []
     for piped in (True, False):
         engine = Simulation(world, seed=1, visuals=False).engine
         robot = engine.robots["Alice"]
@@ -57,8 +57,11 @@ def test_a_picture_shows_the_world_as_of_the_last_readings(world):
         for _ in range(8):
             clock.advance(TICK_S)
         pictures.append(robot.image("frontleft", visual=False))
+        scans.append(robot.scan())
     assert pictures[0].stamp_s == pictures[1].stamp_s == pytest.approx(8 * TICK_S)
     assert np.array_equal(pictures[0].depth_m, pictures[1].depth_m)
+    assert scans[0].stamp_s == scans[1].stamp_s
+    assert np.array_equal(scans[0].ranges_m, scans[1].ranges_m, equal_nan=True)
 
 
 def test_time_stands_still_between_two_ticks_whatever_the_lease_waits_for(engine):

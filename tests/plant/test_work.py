@@ -6,9 +6,11 @@ from plant.worlds.world import load_world
 
 def counted():
     simulation = Simulation(load_world("flat"), seed=1, visuals=False)
+    robot = simulation.robots["Alice"]
+    robot.scan()
     before = simulation.work()
     simulation.clock.advance(0.5)
-    robot = simulation.robots["Alice"]
+    robot.scan()
     robot.image("frontleft", depth=False)
     robot.image("frontleft", visual=False)
     robot.image("hand")

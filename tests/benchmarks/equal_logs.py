@@ -66,7 +66,7 @@ CASES: Final[Mapping[str, Case]] = {
     "fleet": Case(
         ("fleet", "run", "{out}", "--robots", "alice=spot,carol=spot,bob=fetch,dave=fetch", "--seed", "7"),
         queued=tuple(
-            ("queue", "add", "--store", "{out}", "--say", sentence)
+            ("queue", "add", "--store", "{out}/missions.sqlite", "--say", sentence)
             for sentence in ("go to the office", "take a coke to the desk", "go to the bedroom", "go to the hall")
         ),
     ),

@@ -50,6 +50,9 @@ def render_command(
     out: Annotated[Path, typer.Option(help="Folder for the data set; one begun before is gone on with.")],
     images: Annotated[int, quantity_option(Pictures, help="How many pictures.")],
     seed: Annotated[int, quantity_option(Seed, help="The same seed gives the same pictures.")] = 1,
+    others: Annotated[
+        Path | None, typer.Option(help="Folder of models of no class, which lie about in the rooms to train on.")
+    ] = None,
     jobs: Annotated[int | None, quantity_option(Count, help="How many processes; all cores unless said.")] = None,
     workers: Annotated[int | None, quantity_option(Count, help="A local Dask cluster of so many workers.")] = None,
     scheduler: Annotated[
@@ -62,7 +65,7 @@ def render_command(
     began = time.monotonic()
     with refusals():
         pool = Pool(jobs or os.cpu_count() or 1, workers, scheduler)
-        summary = _rendered(out, images, seed, pool, console)
+        summary = _rendered(out, images, seed, others, pool, console)
     _show(console, out, summary, time.monotonic() - began)
     if as_json:
         print_json({"out": str(out), **asdict(summary)})
@@ -71,7 +74,7 @@ def render_command(
 Pictures = Annotated[int, Quantity(ge=1, le=10_000_000)]
 
 
-def _rendered(out: Path, images: int, seed: int, pool: Pool, console: Console) -> Summary:
+def _rendered(out: Path, images: int, seed: int, others: Path | None, pool: Pool, console: Console) -> Summary:
     from plant.dataset.shards import render
 
     columns = (
@@ -90,7 +93,7 @@ def _rendered(out: Path, images: int, seed: int, pool: Pool, console: Console) -
         try:
             with pool.opened() as workers:
                 given_out = partial(_given_out, workers)
-                return render(out, images=images, seed=seed, progress=show, give_out=given_out)
+                return render(out, images=images, seed=seed, progress=show, give_out=given_out, others=others)
         except DatasetError as error:
             raise InputError(error.message, hint=error.hint) from error
 

@@ -24,6 +24,8 @@ ATTEMPTS = 30
 CLEAR_M = 0.004
 LARGE_M = 0.45
 HELD_LONGEST_M = 0.40
+OTHERS_SHARE = 0.4
+"""How many of the distractors are models of other people, where there are some."""
 TOGETHER_SHARE, SPREAD_M = 0.6, 0.22
 
 
@@ -57,8 +59,8 @@ class Scene:
     crowded: bool = False
 
 
-def compose(rng: np.random.Generator, index: int, *, for_training: bool) -> Scene:
-    """The scene of a number. Every tenth holds distractors only.
+def compose(rng: np.random.Generator, index: int, *, for_training: bool, others: Sequence[ObjectModel] = ()) -> Scene:
+    """Compose the scene of a number. Every tenth holds distractors only; `others` are further distractors to train on.
 
     Many of those for training hold two to four times as much as those for validation, so that a picture teaches more.
     """
@@ -67,14 +69,16 @@ def compose(rng: np.random.Generator, index: int, *, for_training: bool) -> Scen
     rounds = int(rng.integers(2, MOST_ROUNDS + 1)) if for_training and rng.random() < CROWDED_SHARE else 1
     wanted = [] if bare else _class_models(rng, rounds, for_training=for_training)
     names = [str(name) for name in rng.choice(DISTRACTORS, int(rng.integers(6, 16)) * rounds)]
-    others = [_any_instance(rng, name, for_training) for name in names]
+    distractors = [_any_instance(rng, name, for_training) for name in names]
+    if for_training and others:
+        distractors = [_perhaps_another(rng, model, others) for model in distractors]
     table = _Table(room, rng, toppled=for_training)
     crowded = list(rng.permutation(len(room.supports)))[: int(rng.integers(2, 5))] if room.supports else []
-    for model in [*wanted, *others]:
+    for model in [*wanted, *distractors]:
         table.place(model, [room.supports[k] for k in crowded])
     held = None
     if rng.random() < 0.3:
-        held = _hold(rng, others[0] if bare else None, for_training=for_training)
+        held = _hold(rng, distractors[0] if bare else None, for_training=for_training)
     return Scene(room, tuple(table.objects), held, tuple(table.seats), rounds > 1)
 
 
@@ -89,6 +93,10 @@ def _class_models(rng: np.random.Generator, rounds: int, *, for_training: bool) 
 
 def _any_instance(rng: np.random.Generator, category: str, for_training: bool) -> ObjectModel:
     return instance(category, int(rng.choice(numbers(category, for_training=for_training))))
+
+
+def _perhaps_another(rng: np.random.Generator, model: ObjectModel, others: Sequence[ObjectModel]) -> ObjectModel:
+    return others[int(rng.integers(len(others)))] if rng.random() < OTHERS_SHARE else model
 
 
 def _hold(rng: np.random.Generator, other: ObjectModel | None, *, for_training: bool) -> Held | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -73,22 +73,28 @@ def views_in(index: int) -> int:
     return VALIDATION_VIEWS if is_validation(index) else TRAINING_VIEWS
 
 
-def render_scene(seed: int, index: int) -> list[Shot]:
-    """The pictures of a scene; the same for the same seed and number."""
+def render_scene(seed: int, index: int, others: Sequence[ObjectModel] = ()) -> list[Shot]:
+    """Render the pictures of a scene, with `others` as further distractors; the same for the same arguments."""
     rng = np.random.default_rng([seed, index, 71])
-    scene = compose(rng, index, for_training=not is_validation(index))
+    scene = compose(rng, index, for_training=not is_validation(index), others=others)
     lighting = random_lighting(rng, scene.room)
     with tempfile.TemporaryDirectory(prefix="errand-scene-") as folder:
         stage = Stage(scene, lighting, Path(folder), float(rng.uniform(0.8, 1.57)))
-        views = _views(rng, scene, views_in(index))
+        views = _views(rng, scene, views_in(index), others)
         return [_shot(rng, stage, view, scene, lighting, index, number) for number, view in enumerate(views)]
 
 
-def _views(rng: np.random.Generator, scene: Scene, count: int) -> list[View]:
-    """So many views: the objects of the classes take turns; where there is none, others do."""
+def _views(rng: np.random.Generator, scene: Scene, count: int, others: Sequence[ObjectModel]) -> list[View]:
+    """Choose so many views: the objects of the classes take turns; where there is none, distractors do.
+
+    A quarter of the turns is that of the `others` in the scene.
+    """
     specs = camera_specs()
     objects = [thing for thing in scene.objects if thing.model.class_id] or list(scene.objects)
     turns = [thing for thing in objects for _ in range(2 if thing.model.category in SELDOM_BY_CHANCE else 1)]
+    strange = [thing for thing in scene.objects if thing.model in others]
+    if strange and objects:
+        turns += [strange[int(k)] for k in rng.integers(len(strange), size=len(turns) // 3)]
     order = [turns[k] for k in rng.permutation(len(turns))]
     views: list[View] = []
     for attempt in range(3 * count):

@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
@@ -25,6 +25,7 @@ import cv2
 from plant.dataset.coco import counts, document
 from plant.dataset.errors import DatasetError
 from plant.dataset.objects import sources_digest
+from plant.dataset.objects.model import MODEL_FACTS, read_model
 from plant.dataset.overview import contact_sheet
 from plant.dataset.render import Shot, render_scene, views_in
 from plant.models.cache import kept_folder
@@ -68,18 +69,26 @@ def one_by_one(
 
 
 def render(
-    out: Path, *, images: int, seed: int, progress: Callable[[int, int], None], give_out: GiveOut = one_by_one
+    out: Path,
+    *,
+    images: int,
+    seed: int,
+    progress: Callable[[int, int], None],
+    give_out: GiveOut = one_by_one,
+    others: Path | None = None,
 ) -> Summary:
     """Render what is still missing of a data set and write its COCO files. Raises DatasetError.
 
-    `progress` is told how many scenes are there, and how many there will be. `give_out` has the scenes made.
+    `progress` is told how many scenes are there, and how many there will be. `give_out` has the scenes made. `others`
+    is a folder of models of no class, each in a folder of its own, which lie about in the scenes to train on.
     """
     scenes = len(_taken(images))
+    folders = _model_folders(others) if others is not None else ()
     with _told(out):
-        _claim(out, seed)
+        _claim(out, seed, folders)
         missing = [index for index in range(scenes) if not _scene_folder(out, index).is_dir()]
         progress(scenes - len(missing), scenes)
-        made = _rendered(out, seed, missing, give_out)
+        made = _rendered(out, partial(scene_files, seed, folders), missing, give_out)
         for done, _ in enumerate(made, start=scenes - len(missing) + 1):
             progress(done, scenes)
         return _assemble(out, images, seed)
@@ -105,9 +114,17 @@ def _told(out: Path) -> Iterator[None]:
         raise DatasetError(f"{out}: cannot be written ({error})", "name another folder with --out") from error
 
 
-def _claim(out: Path, seed: int) -> None:
-    """Make the folder ours, or check that it is: of the same seed and sources."""
-    wanted = {"format": FORMAT, "seed": seed, "sources": digest()}
+def _model_folders(others: Path) -> tuple[Path, ...]:
+    """Folders of the models in a folder. Raises DatasetError where there is none."""
+    found = tuple(sorted(file.parent for file in others.glob(f"*/{MODEL_FACTS}")))
+    if not found:
+        raise DatasetError(f"{others}: holds no folder with {MODEL_FACTS}", "name a folder of object models")
+    return found
+
+
+def _claim(out: Path, seed: int, others: Sequence[Path]) -> None:
+    """Make the folder ours, or check that it is: of the same seed, sources and others."""
+    wanted = {"format": FORMAT, "seed": seed, "sources": digest(), **_told_of(others)}
     path = out / MANIFEST
     if not out.exists() or not any(out.iterdir()):
         (out / _SCENES).mkdir(parents=True, exist_ok=True)
@@ -119,6 +136,14 @@ def _claim(out: Path, seed: int) -> None:
     (out / _SCENES).mkdir(exist_ok=True)
     for left in (out / _SCENES).glob(".making-*"):
         shutil.rmtree(left, ignore_errors=True)
+
+
+def _told_of(others: Sequence[Path]) -> dict[str, str]:
+    """What the manifest tells of the models of others, where there are some."""
+    made = hashlib.sha256()
+    for folder in others:
+        made.update(folder.name.encode() + b"\0" + (folder / MODEL_FACTS).read_bytes())
+    return {"others": made.hexdigest()[:10]} if others else {}
 
 
 def _compare(path: Path, wanted: Mapping[str, Any]) -> None:
@@ -152,9 +177,11 @@ def _scene_folder(out: Path, index: int) -> Path:
     return out / _SCENES / f"{index:06d}"
 
 
-def _rendered(out: Path, seed: int, missing: list[int], give_out: GiveOut) -> Iterator[int]:
+def _rendered(
+    out: Path, make: Callable[[int], Mapping[str, bytes]], missing: list[int], give_out: GiveOut
+) -> Iterator[int]:
     """Have scenes made and write each whole into its folder; each number as soon as that is there."""
-    for index, files in give_out(partial(scene_files, seed), missing):
+    for index, files in give_out(make, missing):
         if files is None:
             raise _LostSceneError(f"{out}: the processes that rendered scene {index} were killed")
         if shutil.disk_usage(out).free < LEAST_FREE_BYTES:
@@ -168,13 +195,13 @@ def _write_files(files: Mapping[str, bytes], folder: Path) -> None:
         (folder / name).write_bytes(data)
 
 
-def scene_files(seed: int, index: int) -> Mapping[str, bytes]:
-    """Render one scene; its files by name."""
+def scene_files(seed: int, others: Sequence[Path], index: int) -> Mapping[str, bytes]:
+    """Render one scene; its files by name. `others` are folders of further distractors."""
     cv2.setNumThreads(1)
     shown_as = _scene_folder(Path(), index)
     pictures: dict[str, bytes] = {}
     entries: list[dict[str, Any]] = []
-    for number, shot in enumerate(render_scene(seed, index)):
+    for number, shot in enumerate(render_scene(seed, index, [read_model(folder) for folder in others])):
         name = f"{number}.jpg"
         pictures[name] = _encoded(number, shot)
         entries.append({"image": {"file_name": (shown_as / name).as_posix(), **shot.facts}, "annotations": shot.labels})

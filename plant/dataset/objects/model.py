@@ -18,6 +18,8 @@ from plant.pictures import save_png
 from skills.robot import FloatArray
 
 HELD_OUT_EVERY = 4
+MODEL_FACTS = "model.json"
+"""The file that tells what a model in a folder is."""
 
 
 def held_out(number: int) -> bool:
@@ -101,12 +103,12 @@ def write_model(folder: Path, model: ObjectModel, made: Finished) -> None:
         folder / "surface.npz", points=surface.points.astype(np.float32), faces=surface.faces.astype(np.int32)
     )
     facts = {name: value for name, value in asdict(model).items() if name != "folder"}
-    write_text(folder / "model.json", json.dumps(facts, indent=1) + "\n")
+    write_text(folder / MODEL_FACTS, json.dumps(facts, indent=1) + "\n")
 
 
 def read_model(folder: Path) -> ObjectModel:
     """A model that `write_model` has written."""
-    facts = json.loads((folder / "model.json").read_text(encoding="utf-8"))
+    facts = json.loads((folder / MODEL_FACTS).read_text(encoding="utf-8"))
     facts["com_m"], facts["size_m"] = tuple(facts["com_m"]), tuple(facts["size_m"])
     return ObjectModel(folder=folder, **facts)
 

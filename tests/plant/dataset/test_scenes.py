@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -157,6 +158,16 @@ def test_every_tenth_scene_holds_distractors_only() -> None:
     assert scene.objects
     assert all(thing.model.class_id == 0 for thing in scene.objects)
     assert scene.held is None or scene.held.model.class_id == 0
+
+
+# scene            mugs of others among its distractors
+# for training     some
+# for validation   none
+@pytest.mark.parametrize("for_training", [True, False])
+def test_models_of_others_lie_about_in_scenes_to_train_on_alone(for_training: bool) -> None:
+    other = replace(instance("mug", 3), kind="of others")
+    scene = compose(np.random.default_rng(3), 4, for_training=for_training, others=[other])
+    assert any(thing.model == other for thing in scene.objects) is for_training
 
 
 def test_a_crowded_scene_holds_more_than_the_same_one_without(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,12 @@ import pytest
 
 from plant.dataset import shards
 from plant.dataset.errors import DatasetError
+from plant.dataset.objects import ObjectModel
 from plant.dataset.render import Shot, is_validation, views_in
 from plant.dataset.shards import Summary, render
 
 
-def fake_scene(seed: int, index: int) -> list[Shot]:
+def fake_scene(seed: int, index: int, others: Sequence[ObjectModel] = ()) -> list[Shot]:
     """A scene without a renderer: noise from seed and number, one label for each picture."""
     rng = np.random.default_rng([seed, index])
     shots = []
@@ -35,8 +36,14 @@ def no_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shards, "render_scene", fake_scene)
 
 
-def run(out: Path, images: int = 130, seed: int = 4, progress: Callable[[int, int], None] | None = None) -> Summary:
-    return render(out, images=images, seed=seed, progress=progress or (lambda done, total: None))
+def run(
+    out: Path,
+    images: int = 130,
+    seed: int = 4,
+    progress: Callable[[int, int], None] | None = None,
+    others: Path | None = None,
+) -> Summary:
+    return render(out, images=images, seed=seed, progress=progress or (lambda done, total: None), others=others)
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -108,6 +115,40 @@ def test_a_folder_of_another_version_is_refused(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace(shards.digest(), "0123456789"))
     with pytest.raises(DatasetError, match="another version"):
         run(tmp_path / "set", images=8)
+
+
+def others_in(folder: Path, *names: str) -> Path:
+    for name in names:
+        facts = {"category": "other", "seed": 0, "class_id": 0, "kind": name, "colour": "", "mass_kg": 0.5}
+        (folder / name).mkdir(parents=True)
+        (folder / name / "model.json").write_text(json.dumps({**facts, "com_m": [0, 0, 0], "size_m": [0.1, 0.1, 0.1]}))
+    return folder
+
+
+def test_models_of_others_lie_about_in_every_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[list[str]] = []
+
+    def noted(seed: int, index: int, others: Sequence[ObjectModel] = ()) -> list[Shot]:
+        given.append([model.kind for model in others])
+        return fake_scene(seed, index)
+
+    monkeypatch.setattr(shards, "render_scene", noted)
+    run(tmp_path / "set", images=30, others=others_in(tmp_path / "others", "kettle", "radio"))
+    assert given == [["kettle", "radio"]] * 2
+
+
+def test_a_set_with_other_models_of_others_is_refused(tmp_path: Path) -> None:
+    run(tmp_path / "set", images=8, others=others_in(tmp_path / "first", "kettle"))
+    with pytest.raises(DatasetError, match="another version"):
+        run(tmp_path / "set", images=8, others=others_in(tmp_path / "second", "radio"))
+    with pytest.raises(DatasetError, match="another version"):
+        run(tmp_path / "set", images=8)
+
+
+def test_a_folder_without_models_of_others_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match=r"empty: holds no folder with model\.json"):
+        run(tmp_path / "set", others=tmp_path / "empty")
+    assert not (tmp_path / "set").exists()
 
 
 @pytest.mark.parametrize("text", ["{", "[]", ""])

@@ -57,7 +57,7 @@ NIGHTLY = {
     "approach": HANDS,
     "detect": {**HANDS, FREEZES: Cause.EXECUTION},
     "grasp": {**HANDS, FREEZES: Cause.EXECUTION, "gripper loses": Cause.POSTCONDITION},
-    "place": {**HANDS, **LOST},
+    "place": {**HANDS, **LOST, "odometry jumps": Cause.POSTCONDITION},  # nothing corrects it here: it looks beside it
     "find_people": {DIES: Cause.ERROR, LEASE: Cause.EXECUTION},
     "hand_over": {**HANDS, **LOST, "arm never ends": Cause.TIMEOUT},  # the person pulls before it is held out
 }

@@ -78,8 +78,8 @@ CASES: Final[Mapping[str, Case]] = {
 }
 
 
-def done(case: Case, out: Path) -> dict[str, Any]:
-    """Do a run in a new folder and return what came of it."""
+def run_case(case: Case, out: Path) -> dict[str, Any]:
+    """Run a case in an empty folder; return its exit code, result and events."""
     for words in case.queued:
         ended = _errand(words, out)
         if ended.returncode != 0:
@@ -89,7 +89,9 @@ def done(case: Case, out: Path) -> dict[str, Any]:
     if not case.resumed:
         ended = _errand((*case.run, *told), out)
     else:
-        process = subprocess.Popen(_command((*case.run, *told), out), cwd=ROOT, stdout=subprocess.DEVNULL)
+        process = subprocess.Popen(
+            _command((*case.run, *told), out), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
         if not kill_at(process, out / "missions.plant", RESUMED_AT_S):
             raise RuntimeError(f"it was over before {RESUMED_AT_S} s")
         ended = _errand(("resume", "--store", str(out / "missions.sqlite"), *fixed[:2]), out)
@@ -141,7 +143,7 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[s
 def keep(folder: Path, name: str) -> str:
     """Do a run and write what came of it."""
     folder.mkdir(parents=True, exist_ok=True)
-    found = _timed(CASES[name])
+    found = _timed(name)
     (folder / f"{name}.json.xz").write_bytes(lzma.compress(json.dumps(found).encode()))
     return f"{name}: exit {found['exit']}, {sum(map(len, found['logs']))} events"
 
@@ -149,17 +151,17 @@ def keep(folder: Path, name: str) -> str:
 def compare(folder: Path, name: str) -> str:
     """Do a run again and tell what differs."""
     before = json.loads(lzma.decompress((folder / f"{name}.json.xz").read_bytes()))
-    found = list(differences(before, _timed(CASES[name])))
+    found = list(differences(before, _timed(name)))
     if not found:
         return f"{name}: equal, {sum(map(len, before['logs']))} events"
     return "\n".join([f"{name}: {len(found)} differences", *found[:MOST_DIFFERENCES]])
 
 
-def _timed(case: Case) -> dict[str, Any]:
+def _timed(name: str) -> dict[str, Any]:
     begun = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="errand-equal-") as folder:
-        found = done(case, Path(folder))
-    sys.stderr.write(f"{case.run[1]} {case.run[2]}: {time.perf_counter() - begun:.0f} s\n")
+        found = run_case(CASES[name], Path(folder))
+    sys.stderr.write(f"{name}: {time.perf_counter() - begun:.0f} s\n")
     return found
 
 

@@ -51,7 +51,7 @@ def render_command(
     images: Annotated[int, quantity_option(Pictures, help="How many pictures.")],
     seed: Annotated[int, quantity_option(Seed, help="The same seed gives the same pictures.")] = 1,
     others: Annotated[
-        Path | None, typer.Option(help="Folder of models of no class, which lie about in the rooms to train on.")
+        Path | None, typer.Option(help="Folder of object models of no class, for the rooms to train on.")
     ] = None,
     jobs: Annotated[int | None, quantity_option(Count, help="How many processes; all cores unless said.")] = None,
     workers: Annotated[int | None, quantity_option(Count, help="A local Dask cluster of so many workers.")] = None,

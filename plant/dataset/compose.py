@@ -25,7 +25,7 @@ CLEAR_M = 0.004
 LARGE_M = 0.45
 HELD_LONGEST_M = 0.40
 OTHERS_SHARE = 0.4
-"""How many of the distractors are models of other people, where there are some."""
+"""Share of the distractors that are replaced by models of other people, where the caller gives some."""
 TOGETHER_SHARE, SPREAD_M = 0.6, 0.22
 
 
@@ -60,7 +60,7 @@ class Scene:
 
 
 def compose(rng: np.random.Generator, index: int, *, for_training: bool, others: Sequence[ObjectModel] = ()) -> Scene:
-    """Compose the scene of a number. Every tenth holds distractors only; `others` are further distractors to train on.
+    """Compose the scene of a number. Every tenth holds distractors only; `others` replace some of them for training.
 
     Many of those for training hold two to four times as much as those for validation, so that a picture teaches more.
     """
@@ -71,7 +71,10 @@ def compose(rng: np.random.Generator, index: int, *, for_training: bool, others:
     names = [str(name) for name in rng.choice(DISTRACTORS, int(rng.integers(6, 16)) * rounds)]
     distractors = [_any_instance(rng, name, for_training) for name in names]
     if for_training and others:
-        distractors = [_perhaps_another(rng, model, others) for model in distractors]
+        number = len(others)
+        distractors = [
+            others[int(rng.integers(number))] if rng.random() < OTHERS_SHARE else model for model in distractors
+        ]
     table = _Table(room, rng, toppled=for_training)
     crowded = list(rng.permutation(len(room.supports)))[: int(rng.integers(2, 5))] if room.supports else []
     for model in [*wanted, *distractors]:
@@ -93,10 +96,6 @@ def _class_models(rng: np.random.Generator, rounds: int, *, for_training: bool) 
 
 def _any_instance(rng: np.random.Generator, category: str, for_training: bool) -> ObjectModel:
     return instance(category, int(rng.choice(numbers(category, for_training=for_training))))
-
-
-def _perhaps_another(rng: np.random.Generator, model: ObjectModel, others: Sequence[ObjectModel]) -> ObjectModel:
-    return others[int(rng.integers(len(others)))] if rng.random() < OTHERS_SHARE else model
 
 
 def _hold(rng: np.random.Generator, other: ObjectModel | None, *, for_training: bool) -> Held | None:

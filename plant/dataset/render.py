@@ -74,7 +74,7 @@ def views_in(index: int) -> int:
 
 
 def render_scene(seed: int, index: int, others: Sequence[ObjectModel] = ()) -> list[Shot]:
-    """Render the pictures of a scene, with `others` as further distractors; the same for the same arguments."""
+    """Render the pictures of a scene, the same for the same arguments; `others` replace some of its distractors."""
     rng = np.random.default_rng([seed, index, 71])
     scene = compose(rng, index, for_training=not is_validation(index), others=others)
     lighting = random_lighting(rng, scene.room)
@@ -87,7 +87,7 @@ def render_scene(seed: int, index: int, others: Sequence[ObjectModel] = ()) -> l
 def _views(rng: np.random.Generator, scene: Scene, count: int, others: Sequence[ObjectModel]) -> list[View]:
     """Choose so many views: the objects of the classes take turns; where there is none, distractors do.
 
-    A quarter of the turns is that of the `others` in the scene.
+    A quarter of the views show the `others` in the scene.
     """
     specs = camera_specs()
     objects = [thing for thing in scene.objects if thing.model.class_id] or list(scene.objects)

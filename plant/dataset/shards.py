@@ -80,7 +80,7 @@ def render(
     """Render what is still missing of a data set and write its COCO files. Raises DatasetError.
 
     `progress` is told how many scenes are there, and how many there will be. `give_out` has the scenes made. `others`
-    is a folder of models of no class, each in a folder of its own, which lie about in the scenes to train on.
+    is a folder of models of no class, each in a folder of its own, which replace some distractors for training.
     """
     scenes = len(_taken(images))
     folders = _model_folders(others) if others is not None else ()
@@ -115,16 +115,23 @@ def _told(out: Path) -> Iterator[None]:
 
 
 def _model_folders(others: Path) -> tuple[Path, ...]:
-    """Folders of the models in a folder. Raises DatasetError where there is none."""
+    """Find the folders of models in a folder. Raises DatasetError when there is none, or one cannot be a distractor."""
     found = tuple(sorted(file.parent for file in others.glob(f"*/{MODEL_FACTS}")))
     if not found:
         raise DatasetError(f"{others}: holds no folder with {MODEL_FACTS}", "name a folder of object models")
+    for folder in found:
+        try:
+            model = read_model(folder)
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise DatasetError(f"{folder / MODEL_FACTS}: is damaged", "write the model again, or remove it") from error
+        if model.class_id:
+            raise DatasetError(f"{folder}: is a {model.category}, which the detector finds", "remove this model")
     return found
 
 
 def _claim(out: Path, seed: int, others: Sequence[Path]) -> None:
     """Make the folder ours, or check that it is: of the same seed, sources and others."""
-    wanted = {"format": FORMAT, "seed": seed, "sources": digest(), **_told_of(others)}
+    wanted = {"format": FORMAT, "seed": seed, "sources": digest(), **_others_entry(others)}
     path = out / MANIFEST
     if not out.exists() or not any(out.iterdir()):
         (out / _SCENES).mkdir(parents=True, exist_ok=True)
@@ -138,8 +145,8 @@ def _claim(out: Path, seed: int, others: Sequence[Path]) -> None:
         shutil.rmtree(left, ignore_errors=True)
 
 
-def _told_of(others: Sequence[Path]) -> dict[str, str]:
-    """What the manifest tells of the models of others, where there are some."""
+def _others_entry(others: Sequence[Path]) -> dict[str, str]:
+    """Entry of the manifest with the digest of the models of others; none without models."""
     made = hashlib.sha256()
     for folder in others:
         made.update(folder.name.encode() + b"\0" + (folder / MODEL_FACTS).read_bytes())

@@ -151,6 +151,23 @@ def test_a_folder_without_models_of_others_is_named(tmp_path: Path) -> None:
     assert not (tmp_path / "set").exists()
 
 
+# model.json of the kettle                 named as
+# is cut off                               damaged
+# lacks a key                              damaged
+# says that it is a hammer, of class 4     of a class
+@pytest.mark.parametrize(
+    ("facts", "named"),
+    [("{", "model.json: is damaged"), ('{"category": "other"}', "model.json: is damaged"), (None, "is a hammer")],
+)
+def test_a_model_that_cannot_be_a_distractor_is_named(tmp_path: Path, facts: str | None, named: str) -> None:
+    file = others_in(tmp_path / "others", "kettle", "radio") / "kettle" / "model.json"
+    of_a_class = {**json.loads(file.read_text()), "category": "hammer", "class_id": 4}
+    file.write_text(json.dumps(of_a_class) if facts is None else facts)
+    with pytest.raises(DatasetError, match=f"kettle.*{named}"):
+        run(tmp_path / "set", others=tmp_path / "others")
+    assert not (tmp_path / "set").exists()
+
+
 @pytest.mark.parametrize("text", ["{", "[]", ""])
 def test_a_damaged_manifest_is_named(tmp_path: Path, text: str) -> None:
     run(tmp_path / "set", images=8)

@@ -14,7 +14,7 @@ import numpy as np
 
 from plant.control.arm import arm_set_point
 from plant.control.commands import CommandStatuses
-from plant.simulation import Engine
+from plant.engine import Engine
 from skills.robot import (
     ArmTrajectory,
     Battery,

@@ -11,8 +11,8 @@ import numpy as np
 from plant.snapshot.file import Snapshot, SnapshotError, SnapshotFile, encoded
 
 if TYPE_CHECKING:
+    from plant.engine import Engine
     from plant.referee.referee import Referee
-    from plant.simulation import Engine
 
 PERIOD_S: Final = 1.0
 _WORLD: Final = "world: "

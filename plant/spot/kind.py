@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from plant.kinds import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
-from plant.models.spot.description import FACTS, LEGS
+from plant.models.spot.description import FACTS, FINGER_LINK, HAND_LINK, LEGS
 from plant.spot.capabilities import spot_capabilities
 
 if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
-
-HAND_LINK, FINGER_LINK = "arm_wr1", "arm_f1x"
 
 
 def _add(plant: MultibodyPlant, name: str, options: BodyOptions) -> RobotBody:

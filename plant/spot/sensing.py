@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from pydrake.math import RigidTransform
 
 from plant.kinds import SensorOptions
-from plant.models.spot.description import CAMERAS, arm_joint_names, spot_facts
+from plant.models.spot.description import CAMERAS, HAND_LINK, arm_joint_names, spot_facts
 from plant.sensors.camera_spec import load_cameras
 from plant.sensors.lidar import LidarSpec
 from plant.sensors.suite import LidarMount, SensorSuite
-from plant.spot.kind import HAND_LINK
 from plant.spot.model import SpotModel
 from skills.robot import FloatArray
 

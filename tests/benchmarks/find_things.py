@@ -34,8 +34,8 @@ from plant.dataset.resting import choose, resting_poses
 from plant.dataset.room import Support
 from plant.dataset.views import View, camera_specs
 from plant.diagram import LooseModel, build_diagram
+from plant.engine import Engine
 from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
-from plant.simulation import Engine
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.lights import render_parameters
 from skills.api import Detection, Detector, Surface

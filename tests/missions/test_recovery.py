@@ -20,8 +20,8 @@ from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from plant.diagram import LooseModel
+from plant.models.spot.description import HAND_LINK
 from plant.simulation import Simulation
-from plant.spot.kind import HAND_LINK
 from skills.faults.faulty_robot import with_faults
 
 FETCH = (

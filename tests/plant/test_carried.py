@@ -10,8 +10,8 @@ from pydrake.systems.analysis import Simulator
 
 from plant.carried import FASTEST_SPIN_RAD_S, Carried, arc_m
 from plant.diagram import LooseModel, build_diagram
+from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
-from plant.simulation import Engine
 
 DT_S, TURN_RAD_S, REACH_M = 0.0125, 0.75, 0.9
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from plant.diagram import build_diagram
+from plant.engine import Engine
 from plant.recording import Frame, Recorder, save_html, thinned
-from plant.simulation import Engine
 from skills.robot import Pose2D
 
 

@@ -9,8 +9,8 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.framework import DiagramBuilder
 
 from plant.diagram import build_diagram, parser_of
+from plant.engine import Engine
 from plant.referee import Referee
-from plant.simulation import Engine
 from plant.spot.kind import SPOT
 from plant.worlds.world import load_world
 from skills.robot import Pose2D

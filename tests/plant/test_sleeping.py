@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
 
 from plant.diagram import LooseModel, build_diagram
-from plant.simulation import Engine
+from plant.engine import Engine
 from skills.robot import Pose2D
 
 SHELF = """<sdf version="1.9"><model name="shelf"><static>false</static><link name="shelf">

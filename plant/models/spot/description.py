@@ -17,6 +17,7 @@ from skills.files.yaml_source import read_yaml
 FACTS = Path(__file__).with_name("spot.yaml")
 CAMERAS = Path(__file__).with_name("cameras.yaml")
 GRIPPER_JOINT = "arm_f1x"
+HAND_LINK, FINGER_LINK = "arm_wr1", "arm_f1x"
 LEGS = ("fl", "fr", "hl", "hr")
 VISUALS_PACKAGE = "spot_visuals"
 _SIDES = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}

@@ -3,7 +3,7 @@
 import pytest
 
 from plant.diagram import LooseModel, build_diagram
-from plant.simulation import Engine
+from plant.engine import Engine
 from skills.robot import Pose2D
 
 FLOOR = """<sdf version="1.7"><model name="floor"><link name="floor">

@@ -7,7 +7,7 @@ import pytest
 from pydrake.multibody.math import SpatialVelocity
 
 from plant.diagram import LooseModel, build_diagram
-from plant.simulation import Engine
+from plant.engine import Engine
 from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
 
 TRAVELLING_M = 0.37743 + 0.02

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from plant.diagram import LooseModel, build_diagram
+from plant.engine import Engine
 from plant.fetch.capabilities import fetch_capabilities
 from plant.fetch.sensing import lidar_spec
 from plant.fetch.wheels import Axle, WheelOdometer
-from plant.simulation import Engine
 from skills.robot import BaseKind, Mount, Pose2D
 
 WALL = """<sdf version="1.7"><model name="wall"><link name="wall">

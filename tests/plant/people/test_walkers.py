@@ -7,9 +7,9 @@ import pytest
 from pydrake.math import RigidTransform
 
 from plant.diagram import LooseModel, build_diagram
+from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
 from plant.referee import Referee
-from plant.simulation import Engine
 from plant.spot.kind import SPOT
 from plant.worlds.route import Route, Stop
 from plant.worlds.world import WorldError

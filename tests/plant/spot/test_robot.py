@@ -5,7 +5,7 @@ import pytest
 from pydrake.multibody.plant import MultibodyPlantConfig
 
 from plant.diagram import build_diagram
-from plant.simulation import Engine
+from plant.engine import Engine
 from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
 
 

@@ -5,8 +5,8 @@ import pytest
 from pydrake.math import RigidTransform
 
 from plant.diagram import LooseModel, build_diagram
+from plant.engine import Engine
 from plant.models.spot.description import spot_facts
-from plant.simulation import Engine
 from skills.robot import Pose2D
 
 FLOOR = """<sdf version="1.9"><model name="ground"><link name="ground"><collision name="ground">

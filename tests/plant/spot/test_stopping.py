@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from plant.diagram import build_diagram
-from plant.simulation import Engine
+from plant.engine import Engine
 from skills.robot import ArmTrajectory, Pose2D
 
 STILL_S = 0.2

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from plant.diagram import build_diagram
+from plant.engine import Engine
 from plant.models.spot.description import LEGS, spot_facts
-from plant.simulation import Engine
 from skills.robot import Pose2D
 
 SETTLE_S = 0.05

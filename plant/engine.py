@@ -1,0 +1,232 @@
+"""The engine: steps the Diagram, lets robots command and sense, and keeps the only clock."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from plant.carried import Carried
+from plant.diagram import TIME_STEP_S, WorldDiagram
+from plant.happenings.doors import Doors
+from plant.happenings.moves import Moves
+from plant.kinds import RobotBody, SensorOptions
+from plant.people.receivers import Receivers
+from plant.people.walkers import Walkers
+from plant.sleeping import Sleepers
+from plant.snapshot.values import State
+from plant.worlds.placement import Receiving
+from plant.worlds.route import Route
+from plant.worlds.world import DoorRule
+from skills.robot import FloatArray, Pose2D, Robot
+
+CONTROL_STEPS = 2
+SLEEP_PERIOD_STEPS = 4
+_SQUARE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+HAND_OUTLINE_M, PERSON_OUTLINE_M = 0.15 * _SQUARE, 0.25 * _SQUARE
+"""What a door sees of a hand, and of a person."""
+
+
+class Engine:
+    """A Diagram in motion with the robots in it; implements the Clock protocol."""
+
+    def __init__(
+        self,
+        world: WorldDiagram,
+        starts: Mapping[str, Pose2D],
+        *,
+        seed: int = 0,
+        docks: Mapping[str, Pose2D] = MappingProxyType({}),
+        charge: float = 1.0,
+        routes: Mapping[str, Route] = MappingProxyType({}),
+        receiving: Mapping[str, Receiving] = MappingProxyType({}),
+        doors: Sequence[DoorRule] = (),
+    ) -> None:
+        """`starts`: where each robot stands at time 0, in the world frame; `seed` gives the sensors' noise.
+
+        Batteries begin at `charge` (0 to 1), each robot's charges at its own of the `docks`. `routes` are those of
+        people who walk, by the names of their models; `receiving` says how those with a tray take what is held out to
+        them; `doors` are those of the Diagram. Raises WorldError: a route leads through what stands fast.
+        """
+        self.world, self._docks, self._charge = world, docks, charge
+        self._simulator = Simulator(world.diagram)
+        self.root_context: Context = self._simulator.get_mutable_context()
+        self.context: Context = world.plant.GetMyMutableContextFromRoot(self.root_context)
+        for name, pose in starts.items():
+            world.robots[name].place(self.context, pose)
+        self.work: Counter[str] = Counter()
+        self._robots = {
+            name: body.kind.drive(body, self._sensors(body, seed)) for name, body in sorted(world.robots.items())
+        }
+        self.walkers = Walkers(world, self.context, routes)
+        self._sleepers = Sleepers(world, self.root_context)
+        plant = world.plant
+        loose = [plant.get_body(index) for model in world.models.values() for index in plant.GetBodyIndices(model)]
+        self._carried = Carried(plant, self.context, loose)
+        self._hands = {name: robot.hand for name, robot in world.robots.items()}
+        self.receivers = Receivers(world, self.context, receiving)
+        self._happened: list[tuple[float, str]] = []
+        self.doors = Doors(plant, self.context, doors, self._outlines_W, self.note)
+        self.moves: Moves | None = None
+        self._steps = 0
+        self._observers: list[tuple[int, Callable[[float], None]]] = []
+        self._after_advance: list[Callable[[], None]] = []
+        self._command_robots()
+        self._simulator.Initialize()
+
+    def _sensors(self, body: RobotBody, seed: int) -> SensorOptions:
+        return SensorOptions(
+            self.world.scene_graph,
+            self.context,
+            seed=seed,
+            scene=self.world.scene,
+            dock=self._docks.get(body.name),
+            charge=self._charge,
+            work=self.work,
+        )
+
+    @property
+    def robots(self) -> Mapping[str, Robot]:
+        """The robots by name."""
+        return self._robots
+
+    @property
+    def happened(self) -> Sequence[tuple[float, str]]:
+        """What doors did, and what somebody moved: the time (s) and a sentence each."""
+        return self._happened
+
+    @property
+    def asleep(self) -> frozenset[str]:
+        """Loose objects at rest, which do not move until something comes near."""
+        return self._sleepers.asleep
+
+    def observe(self, observer: Callable[[float], None], *, every: int = 1) -> None:
+        """Call `observer(now_s)` after every step, or every so many."""
+        self._observers.append((every, observer))
+
+    def now(self) -> float:
+        """Simulated seconds since the start."""
+        return self._steps * TIME_STEP_S
+
+    def advance(self, dt_s: float) -> None:
+        """Step the plant by dt_s, rounded to whole steps (at least one), and take readings."""
+        self.step(dt_s)
+        self.sense()
+
+    def step(self, dt_s: float) -> None:
+        """Step the plant by dt_s, rounded to whole steps (at least one); the robots' readings stay as they are."""
+        holding = [name for name, robot in self._robots.items() if robot.gripper().holding]
+        until = self._steps + max(1, round(dt_s / TIME_STEP_S))
+        while self._steps < until:
+            if self._steps % SLEEP_PERIOD_STEPS == 0:
+                self._sleepers.update(self.now())
+            if self._steps % CONTROL_STEPS == 0:
+                self._command_robots()
+            self._before_step(0, holding)
+            steps = min(CONTROL_STEPS - self._steps % CONTROL_STEPS, until - self._steps)
+            if steps > 1 and self._only_robots_move(holding):
+                for later in range(1, steps):
+                    self._before_step(later, holding)
+            else:
+                steps = 1
+            self._do_steps(steps, holding)
+
+    def _before_step(self, later: int, holding: Sequence[str]) -> None:
+        """Move people, doors and what somebody moves, before the next step or a `later` one."""
+        now_s = (self._steps + later) * TIME_STEP_S
+        self.walkers.before_step(TIME_STEP_S, standing=self.receivers.busy)
+        self.receivers.before_step(now_s, TIME_STEP_S, holding)
+        self.doors.before_step(now_s, TIME_STEP_S)
+        if self.moves is not None:
+            self.moves.before_step(now_s, self._hands_W, holding)
+
+    def _only_robots_move(self, holding: Sequence[str]) -> bool:
+        """Whether nothing is to be done or seen between two steps of one control period."""
+        seen = any(every % CONTROL_STEPS for every, _ in self._observers)
+        still = self.walkers.still and self.doors.still and self.moves is None and not self.receivers.busy
+        return still and not seen and not holding and self._sleepers.all_asleep
+
+    def _do_steps(self, steps: int, holding: Sequence[str]) -> None:
+        """Let the plant do one step, or several in one go where nothing is to be done between them."""
+        self._steps += steps
+        self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
+        if not self._sleepers.all_asleep:
+            self._carried.limit_spin()
+        for name in holding:
+            self._carried.after_step(self._hands[name], TIME_STEP_S)
+        self.work["plant_steps"] += steps
+        for every, observer in self._observers:
+            if self._steps % every == 0:
+                observer(self.now())
+
+    def sense(self) -> None:
+        """Let all robots take readings."""
+        for robot in self._robots.values():
+            robot.sense(self.now())
+        for listener in self._after_advance:
+            listener()
+
+    def after_advance(self, listener: Callable[[], None]) -> None:
+        """Call `listener` whenever time has been advanced and all robots have sensed."""
+        self._after_advance.append(listener)
+
+    def state(self) -> State:
+        """Time, what the robots keep, how far the people have walked, and what they are about to take."""
+        robots = {name: robot.state() for name, robot in self._robots.items()}
+        people = {"walkers": self.walkers.state(), "receivers": self.receivers.state()}
+        moves = None if self.moves is None else self.moves.state()
+        return {"steps": self._steps, "robots": robots, **people, "doors": self.doors.state(), "moves": moves}
+
+    def world_state(self) -> Mapping[str, FloatArray]:
+        """Positions and velocities of all that moves."""
+        groups = range(self.root_context.num_discrete_state_groups())
+        return {str(group): self.root_context.get_discrete_state(group).value() for group in groups}
+
+    def restore(self, state: State, world: Mapping[str, FloatArray]) -> None:
+        """Go on from such a state; the robots have powered up in it.
+
+        Raises:
+            ValueError: the state is that of another Diagram.
+        """
+        if set(world) != set(self.world_state()):
+            raise ValueError("the parts of the world are others")
+        self._sleepers.wake_all()
+        self.walkers.restore(state["walkers"])
+        self._steps = state["steps"]
+        self.root_context.SetTime(self.now())
+        for group, values in world.items():
+            self.root_context.get_mutable_discrete_state(int(group)).SetFromVector(values)
+        self.receivers.restore(state["receivers"])
+        self.doors.restore(state["doors"])
+        if self.moves is not None and state["moves"] is not None:
+            self.moves.restore(state["moves"])
+        for name, robot in self._robots.items():
+            robot.restore(state["robots"][name], self.now())
+        self._command_robots()
+        self._simulator.Initialize()
+
+    def note(self, sentence: str) -> None:
+        """Note what happens now."""
+        self._happened.append((round(self.now(), 6), sentence))
+
+    def _hands_W(self) -> Mapping[str, FloatArray]:
+        poses = {name: self.world.plant.EvalBodyPoseInWorld(self.context, hand) for name, hand in self._hands.items()}
+        return {name: np.array(X_WH.translation()) for name, X_WH in poses.items()}
+
+    def _outlines_W(self) -> Iterator[FloatArray]:
+        """The outlines (K, 2) of robots, their hands and people, from above."""
+        for robot in self.world.robots.values():
+            outline_B = np.array(robot.kind.capabilities().footprint_m)
+            corners_B = np.column_stack([outline_B, np.zeros(len(outline_B))])
+            X_WB = self.world.plant.EvalBodyPoseInWorld(self.context, robot.body)
+            yield X_WB.multiply(corners_B.T).T[:, :2]
+        yield from (p_W[:2] + HAND_OUTLINE_M for p_W in self._hands_W().values())
+        yield from (np.array(place_W) + PERSON_OUTLINE_M for place_W in self.walkers.places_W())
+
+    def _command_robots(self) -> None:
+        for robot in self._robots.values():
+            robot.control(self.now(), CONTROL_STEPS * TIME_STEP_S)

@@ -10,7 +10,7 @@ from executive.language.grounding import ABLE
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind, noun_examples
 from executive.language.phrases import Phrase
-from executive.language.questions import RefusalError
+from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import ResolvedAction
 from executive.language.roles import HERE, Location
 from executive.mission.knowledge import Knowledge
@@ -50,7 +50,8 @@ def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None
     """The refusal that names the parts which lie outside the mission, each with the whole clause that it stands in."""
     within = {clause: [part for part, other in parts if other == clause] for _, clause in parts}
     named = (_named(tuple(dict.fromkeys(words)), clause) for clause, words in within.items())
-    return RefusalError(f"I do not understand {', '.join(named)}; {ABLE}", [part for part, _ in parts])
+    reason = f"I do not understand {', '.join(named)}; {ABLE}"
+    return RefusalError(reason, [part for part, _ in parts], kind=RefusalKind.NOT_UNDERSTOOD)
 
 
 def _named(words: Sequence[str], clause: str) -> str:

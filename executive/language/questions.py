@@ -18,6 +18,7 @@ __all__ = [
     "ClarifyingQuestion",
     "QuestionPolicy",
     "RefusalError",
+    "RefusalKind",
     "Slot",
     "answer_by",
     "chosen",
@@ -187,6 +188,15 @@ _YES: Final = frozenset({"yes", "yeah", "yep", "sure", "ok", "okay", "right", "c
 _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth")
 
 
+class RefusalKind(Enum):
+    """Why a sentence cannot become commands, for those who decide by it; the reason tells people."""
+
+    NOT_UNDERSTOOD = "not_understood"  # words that lie outside of what the robot does
+    NOTHING_TO_DO = "nothing_to_do"  # it only tells something
+    NO_SUCH_DOOR = "no_such_door"
+    OTHER = "other"
+
+
 class RefusalError(Exception):
     """The sentence cannot become commands: the reason in one line, and the words that were not understood.
 
@@ -194,8 +204,14 @@ class RefusalError(Exception):
     """
 
     def __init__(
-        self, reason: str, unknown: Iterable[str] = (), *, question: bool | ClarifyingQuestion = False
+        self,
+        reason: str,
+        unknown: Iterable[str] = (),
+        *,
+        question: bool | ClarifyingQuestion = False,
+        kind: RefusalKind = RefusalKind.OTHER,
     ) -> None:
+        self.kind = kind
         self.reason = _LONG_WORD.sub(r"\1…", reason)
         super().__init__(self.reason)
         self.unknown = tuple(dict.fromkeys(_LONG_WORD.sub(r"\1…", word) for word in unknown))

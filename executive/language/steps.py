@@ -20,7 +20,7 @@ from executive.language.normalise import MAX_CHARACTERS, MAX_WORDS
 from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase, noun_phrases
-from executive.language.questions import RefusalError, Slot, which
+from executive.language.questions import RefusalError, RefusalKind, Slot, which
 from executive.language.reading import split_items
 from executive.language.reference import Memory, ResolvedAction, resolve
 from executive.language.relations import check_ways_and_speaker
@@ -134,7 +134,7 @@ def _check(trace: Trace, context: _Context) -> Trace:
     if not any(action.kind for action in trace.actions):
         told = [phrase.text for action in trace.actions for phrase in action.objects]
         of = f" of {listing(told)}" if told else ""
-        raise RefusalError(f"nothing to do was said{of}; {ABLE}", told)
+        raise RefusalError(f"nothing to do was said{of}; {ABLE}", told, kind=RefusalKind.NOTHING_TO_DO)
     return trace
 
 

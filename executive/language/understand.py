@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from executive.language.foreign import foreign_reason
 from executive.language.normalise import clean, placeholder
 from executive.language.parser import DependencyParser
-from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, with_answer
+from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, with_answer
 from executive.language.reference import Memory
 from executive.language.similar import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
@@ -55,6 +55,11 @@ class Understanding:
     memory: Memory | None = None
     trace: Trace | None = field(default=None, compare=False, repr=False)
     steps: tuple[MissionStep, ...] = ()
+
+    @property
+    def refused_as(self) -> RefusalKind | None:
+        """Why it became no commands; None where it did, or where it was not for this robot."""
+        return None if self.trace is None or self.trace.refusal is None else self.trace.refusal.kind
 
     def to_json(self) -> dict[str, Any]:
         """The answer as JSON values."""

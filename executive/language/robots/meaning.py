@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from executive.language.normalise import clean
 from executive.language.parser import DependencyParser
-from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, with_answer
+from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, with_answer
 from executive.language.reference import Memory
 from executive.language.robots.calls import Whom, calls_of
 from executive.language.robots.cutting import Cut, Piece, Who, cut_by_robot, narrates
@@ -341,7 +341,7 @@ def _share(one: Who | None, other: Who) -> bool:
 
 def _only_tells(meant: Understanding) -> bool:
     """Whether a text only tells how something is."""
-    return meant.status is Status.REFUSED and (meant.reason or "").startswith("nothing to do was said")
+    return meant.status is Status.REFUSED and meant.refused_as is RefusalKind.NOTHING_TO_DO
 
 
 def _quotes(text: str) -> bool:

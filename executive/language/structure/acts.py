@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from executive.language.questions import RefusalError
+from executive.language.questions import RefusalError, RefusalKind
 from executive.language.structure.conditions import suppose
 from executive.language.structure.cutting import (
     Behind,
@@ -224,7 +224,8 @@ class Acts(Repeats):
         try:
             supposed = suppose(text, state, self.leaves)
         except RefusalError as refusal:
-            raise (refusal if refusal.question is not None or "door" in text else plain) from None
+            said = refusal.question is not None or refusal.kind is RefusalKind.NO_SUCH_DOOR
+            raise (refusal if said else plain) from None
         self.flush(row)
         self.notes += supposed.notes
         look = supposed.condition.command if isinstance(supposed.condition, Look) else None

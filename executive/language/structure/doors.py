@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from executive.language.questions import RefusalError, Slot, which
+from executive.language.questions import RefusalError, RefusalKind, Slot, which
 from executive.language.similar import synonyms_of
 from executive.mission.condition import Condition, DoorOpen, Not
 from executive.mission.knowledge import Knowledge
@@ -48,13 +48,15 @@ def _between(match: re.Match[str], knowledge: Knowledge) -> tuple[str, str]:
     said = match["door"]
     bare = re.sub(r"^(?:the|that|this|a) ", "", said, flags=re.IGNORECASE)
     if not knowledge.doors:
-        raise RefusalError(f"I know no door here, so '{said}' cannot be looked at", [bare])
+        what = f"I know no door here, so '{said}' cannot be looked at"
+        raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
     named = [match[name] for name in ("room", "one", "other", "from", "to", "of") if match[name]]
     rooms = {_room(name.strip(), knowledge) for name in named}
     fitting = [door.between for door in knowledge.doors if rooms <= {*door.between}]
     if not fitting:
         known = listing(f"{one} and {other}" for one, other in (door.between for door in knowledge.doors))
-        raise RefusalError(f"I know no such door as '{said}'; there are doors between {known}", [bare])
+        what = f"I know no such door as '{said}'; there are doors between {known}"
+        raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
     if len(fitting) > 1:
         question = which(Slot.PLACE, bare, tuple(f"door between {one} and {other}" for one, other in fitting))
         raise RefusalError(question.text, [bare], question=question)
@@ -66,5 +68,6 @@ def _room(name: str, knowledge: Knowledge) -> str:
     known = {spelling.lower(): room for room in knowledge.places for spelling in knowledge.spellings([room])}
     found = knowledge.place(bare) or next(iter(synonyms_of(bare.lower(), known)), None)
     if found is None:
-        raise RefusalError(f"I know no room '{bare}'; known are {listing(knowledge.places)}", [bare])
+        what = f"I know no room '{bare}'; known are {listing(knowledge.places)}"
+        raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
     return knowledge.room(found)

@@ -8,7 +8,7 @@ from typing import Final
 
 from executive.language.lexicon import lexicon
 from executive.language.parser import DependencyParser
-from executive.language.questions import RefusalError
+from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.steps import Trace, trace_sentence
@@ -88,10 +88,10 @@ class Leaves:
         try:
             leaf = self.leaf(text if asked else f"check if {text}", state)
         except RefusalError as refusal:
-            if not refusal.reason.startswith("I do not understand"):
+            if refusal.kind is not RefusalKind.NOT_UNDERSTOOD:
                 raise
             raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text]) from None
-        if any("I take the first" in note for note in leaf.trace.notes):
+        if any(action.choices for action in leaf.trace.actions):
             raise RefusalError(f"I cannot tell which of them is meant in '{text}'", [text])
         looks = tuple(Look(command) for command in leaf.commands if command.task is Task.FIND)
         if not looks or len(looks) != len(leaf.commands):

@@ -15,11 +15,11 @@ from typing import Any
 from pydantic import BaseModel
 
 from executive.mission.file.schema import MissionFile, mission_json_schema
-from executive.mission.knowledge import Knowledge
 from executive.mission.scenario_file import ScenarioFile
 from executive.testing.skill_test import SkillTestFile
 from executive.tree.registry import built_in_skills
 from executive.tree.types import describe_type, field_types
+from executive.words.knowledge import Knowledge
 from plant.worlds.world import SeedRules
 from skills.api import Skill
 from skills.durations import DURATION_PATTERN

@@ -11,12 +11,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 OURS = ("executive", "skills", "plant")
-WORDS = (
-    *("command", "condition", "expression", "file.blocks", "file.model", "geometry", "knowledge", "robots"),
-    "written",
-)
 HOMES = (
-    (*(f"executive.mission.{name}" for name in WORDS), "executive.record.profile", "executive.record.work"),
+    ("executive.words", "executive.record.profile", "executive.record.work"),
     ("executive.language",),
     ("executive.speech",),
     ("executive.mission",),
@@ -31,7 +27,7 @@ HOMES = (
     ("executive.testing",),
     ("executive.cli",),
 )
-"""The lowest first; what both the language and the missions speak of stands below both."""
+"""The homes of executive, the lowest first."""
 TRAINING = (
     "plant.dataset",
     "plant.models.builder",
@@ -137,7 +133,7 @@ def test_the_root_of_executive_holds_no_modules() -> None:
     ("path", "source", "expected"),
     [
         (
-            "executive/mission/command.py",
+            "executive/words/command.py",
             "from executive.language import understand",
             ["executive.language.understand"],
         ),

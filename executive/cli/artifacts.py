@@ -19,8 +19,8 @@ from executive.record.reader import Event
 from executive.record.schemas import TRANSITIONS
 from executive.store.resuming import told_before
 from executive.tree.behaviours.answer import ANSWER_TOPIC
-from executive.tree.compiling.builder import slug
 from executive.view.styles import ROBOT_COLOURS, rgb_of
+from executive.words.slug import slug
 from plant.pictures import (
     Bounds,
     best_view,

@@ -20,7 +20,7 @@ from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.recollection import Recollection
 from executive.store.records import Replacement
 from executive.store.resuming import ended_tree, resumed_tree
-from executive.tree.compiling.builder import slug
+from executive.words.slug import slug
 from skills.files.errors import InputError, disk_is_full
 from skills.robot import Pose2D
 

@@ -10,8 +10,8 @@ from executive.cli.fleet_progress import is_plain
 from executive.cli.requests import Prepared
 from executive.fleet.auction import Bid
 from executive.fleet.chain import Chain, Split, soonest, splits
-from executive.mission.command import Command
-from executive.mission.knowledge import Knowledge, SurfaceFacts
+from executive.words.command import Command
+from executive.words.knowledge import Knowledge, SurfaceFacts
 from skills.files.errors import InputError
 
 __all__ = ["ChainedMission", "chained"]

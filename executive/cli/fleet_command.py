@@ -22,9 +22,9 @@ from executive.cli.run_options import (
     robots_of,
 )
 from executive.cli.serve_command import AsJson
-from executive.mission.robots import display_name, robot_called
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.words.robots import display_name, robot_called
 from skills.files.errors import InputError
 from skills.files.outside import is_folder
 from skills.quantities import Seed

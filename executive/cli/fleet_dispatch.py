@@ -22,7 +22,6 @@ from executive.cli.requests import Prepared
 from executive.cli.starts import PlacedRobot
 from executive.fleet.auction import Bid
 from executive.fleet.dispatcher import Dispatcher
-from executive.mission.knowledge import BatteryFacts, SurfaceFacts
 from executive.mission.scenario import Scenario
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
@@ -34,6 +33,7 @@ from executive.run.runner import RunEntry
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.node_view import node_view
+from executive.words.knowledge import BatteryFacts, SurfaceFacts
 from skills.files.errors import listing
 from skills.robot import Pose2D
 

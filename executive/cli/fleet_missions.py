@@ -14,14 +14,14 @@ from executive.cli.several import prepared_part, understood_for_robots
 from executive.cli.starts import PlacedRobot, knowledge_for
 from executive.fleet.auction import Bid
 from executive.language.robots import Part, Whom
-from executive.mission.command import Command, Task
-from executive.mission.file.model import Mission
-from executive.mission.knowledge import Knowledge
 from executive.mission.mission import mission_from_lines
 from executive.mission.request import Request
 from executive.store.missions import MissionStore, StoredMission
 from executive.tree.check import Checked
 from executive.tree.estimate import RoutePlanner, load_estimates
+from executive.words.command import Command, Task
+from executive.words.knowledge import Knowledge
+from executive.words.steps import Mission
 from plant.worlds.world import World
 from skills.files.errors import InputError
 from skills.robot import Pose2D

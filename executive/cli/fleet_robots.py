@@ -15,9 +15,9 @@ from executive.cli.fleet_progress import Progress, ProgressJournal
 from executive.cli.requests import Prepared
 from executive.cli.starts import PlacedRobot
 from executive.fleet.auction import Bid
-from executive.mission.knowledge import BatteryFacts, SurfaceFacts
 from executive.run.runner import RunEntry
 from executive.tree.estimate import RoutePlanner
+from executive.words.knowledge import BatteryFacts, SurfaceFacts
 from plant.kinds import robot_kind
 from skills.api import Surface
 from skills.geometry import wrap

@@ -12,9 +12,9 @@ from executive.cli.fleet_missions import FleetMission, charging_missions, fleet_
 from executive.cli.simulated import SimulatedBackend
 from executive.cli.starts import placed_robots
 from executive.cli.worlds import knowledge_of, open_world
-from executive.mission.robots import RobotSetup
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.words.robots import RobotSetup
 from plant.worlds.world import World
 from skills.files.errors import InputError, Problems
 

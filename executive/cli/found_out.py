@@ -7,13 +7,13 @@ from dataclasses import replace
 
 from executive.cli.artifacts import Artifacts
 from executive.cli.report import ReportedAnswer, ReportedObject, RunReport
-from executive.mission.geometry import inside
-from executive.mission.knowledge import Knowledge
 from executive.record.reader import Event
 from executive.record.sightings import seen_objects
 from executive.run.findings import Finding
 from executive.run.outcome import RunResult
 from executive.tree.compiler import StepPart
+from executive.words.geometry import inside
+from executive.words.knowledge import Knowledge
 from skills.api import ObjectObservation
 
 __all__ = ["with_found_out"]

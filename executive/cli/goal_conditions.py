@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from executive.mission.expression import Expression, Template
-from executive.mission.goal import Area, GoalCondition, GoalKind, When
 from executive.run.executions import Execution, is_speech
 from executive.run.outcome import Outcome, RobotResult
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiler import CompiledTree, StepPart
+from executive.words.expression import Expression, Template
+from executive.words.goal import Area, GoalCondition, GoalKind, When
 from plant import referee
 from skills.files.errors import listing
 

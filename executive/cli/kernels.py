@@ -20,8 +20,8 @@ from executive.cli.requests import prepare
 from executive.cli.simulated import SimulatedBackend
 from executive.cli.starts import DEFAULT_KIND, alone
 from executive.cli.worlds import open_world
-from executive.mission.file.model import DEFAULT_WORLD
 from executive.mission.request import Request
+from executive.words.steps import DEFAULT_WORLD
 from skills.estimate.compiled import CompiledFunction
 from skills.files.errors import count_text
 from skills.navigate.lattice import search

@@ -21,9 +21,6 @@ from executive.cli.worlds import knowledge_of, open_world
 from executive.language.parser import load_parser
 from executive.language.robots import Part
 from executive.language.understand import Status, Understanding
-from executive.mission.file.model import DEFAULT_WORLD
-from executive.mission.knowledge import Knowledge
-from executive.mission.robots import RobotSetup, display_name
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, TeamReader, refuse_alike, spoken_phrases
 from executive.speech.listener import HeardUtterance, Listener, Recording
@@ -31,6 +28,9 @@ from executive.speech.microphone import Hearing, follow, microphone_blocks
 from executive.speech.vocabulary import Vocabulary, of_world, read_vocabulary
 from executive.speech.voice import Voice, installed_voice
 from executive.speech.whisper import load_whisper
+from executive.words.knowledge import Knowledge
+from executive.words.robots import RobotSetup, display_name
+from executive.words.steps import DEFAULT_WORLD
 from skills.files.errors import InputError, listing
 
 __all__ = ["answer_line", "called_robots", "hear_request", "heard_sentence", "listen", "listener_for", "show_hearing"]

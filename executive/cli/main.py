@@ -59,10 +59,10 @@ from executive.language.questions import QuestionPolicy
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
 from executive.mission.scenario import Scenario
-from executive.mission.variation import NORMAL_LIGHT, Variation
 from executive.record.profile import Profile, lines
 from executive.speech.voice import Voice
 from executive.store.missions import MissionStore
+from executive.words.variation import NORMAL_LIGHT, Variation
 from skills.files.errors import InputError
 from skills.quantities import Count, Seed
 

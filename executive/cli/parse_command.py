@@ -15,8 +15,8 @@ from executive.language.explain import explain
 from executive.language.explain_views import arcs_svg, explanation_lines
 from executive.language.parser import load_parser
 from executive.language.understand import Status, Understanding, parse_lines
-from executive.mission.file.model import DEFAULT_WORLD
-from executive.mission.written import written
+from executive.words.steps import DEFAULT_WORLD
+from executive.words.written import written
 from skills.files.errors import InputError
 from skills.files.outside import read_text
 

@@ -19,7 +19,7 @@ from executive.cli.simulated import run_simulated
 from executive.run.control import Control
 from executive.store.database import StoreError
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.tree.compiling.builder import slug
+from executive.words.slug import slug
 from skills.files.errors import InputError
 
 _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCELLED, MissionState.ERROR)

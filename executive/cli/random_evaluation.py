@@ -11,7 +11,7 @@ from executive.evaluation.random_missions import KnownWorld, random_evaluation
 from executive.evaluation.runs import Evaluation
 from executive.evaluation.scenario import MOST_RUNS
 from executive.evaluation.seeds import first_seeds
-from executive.mission.file.model import DEFAULT_WORLD
+from executive.words.steps import DEFAULT_WORLD
 from skills.files.errors import InputError
 from skills.files.outside import is_file
 

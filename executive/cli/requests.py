@@ -14,18 +14,18 @@ from executive.cli.starts import DEFAULT_KIND, PlacedRobot
 from executive.cli.worlds import knowledge_of, open_world, refuse_blocked, with_map
 from executive.language.parser import load_parser
 from executive.language.questions import Answerer
-from executive.mission.file.model import DEFAULT_WORLD, Mission
 from executive.mission.file.objects import import_folders
 from executive.mission.file.overrides import overridden
 from executive.mission.file.people import routes_in
 from executive.mission.file.resolve import load_mission, mission_from_file
 from executive.mission.file.schema import MissionFile
-from executive.mission.knowledge import Knowledge, Pose
 from executive.mission.mission import lines_of, mission_from_lines, mission_from_meaning, understood
 from executive.mission.request import Request
-from executive.mission.robots import RobotSetup, display_name, robots_in
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills
+from executive.words.knowledge import Knowledge, Pose
+from executive.words.robots import RobotSetup, display_name, robots_in
+from executive.words.steps import DEFAULT_WORLD, Mission
 from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
 from skills.files.errors import InputError, Problems
 from skills.files.yaml_source import read_yaml

@@ -13,11 +13,11 @@ from typer.core import TyperCommand
 
 from executive.cli.number_options import quantity_option
 from executive.mission.scenario import RandomFaults
-from executive.mission.variation import Clutter, Friction, MorePeople
+from executive.words.variation import Clutter, Friction, MorePeople
 from skills.quantities import LongDuration, Port, QuantityError, Wait, clock_text
 
 if TYPE_CHECKING:
-    from executive.mission.robots import RobotSetup
+    from executive.words.robots import RobotSetup
     from skills.robot import Pose2D
 
 __all__ = [
@@ -129,7 +129,7 @@ def time_of_day(text: str | None) -> str | None:
 
 def robots_of(text: str | None) -> Mapping[str, RobotSetup]:
     """The robots of the option. Raises InputError: they are none, or of a kind that is not installed."""
-    from executive.mission.robots import parse_robots
+    from executive.words.robots import parse_robots
     from plant.kinds import robot_kinds
 
     return {} if text is None else parse_robots(text, robot_kinds())

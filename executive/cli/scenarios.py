@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from executive.mission.knowledge import Knowledge
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
 from executive.mission.scenario_file import checked_fault, load_scenario, scenario_of
+from executive.words.knowledge import Knowledge
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import DoorRule, MoveRule, RouteRule, World, WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map

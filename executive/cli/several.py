@@ -14,13 +14,13 @@ from executive.language.parser import load_parser
 from executive.language.questions import Answerer
 from executive.language.robots import Addressed, Part, Whom, understand_for_robots_asking
 from executive.language.understand import Status, Understanding
-from executive.mission.file.model import KeyPath, Mission
 from executive.mission.file.resolve import for_robot
 from executive.mission.file.schema import MissionFile, PartFile
-from executive.mission.knowledge import Knowledge
 from executive.mission.mission import mission_from_steps, steps_of
 from executive.mission.request import Request
-from executive.mission.robots import robot_called
+from executive.words.knowledge import Knowledge
+from executive.words.robots import robot_called
+from executive.words.steps import KeyPath, Mission
 from plant.worlds.world import World
 from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.robot import Pose2D

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from executive.mission.knowledge import Knowledge, Pose, RobotFacts
 from executive.mission.request import Start
-from executive.mission.robots import RobotSetup, display_name
 from executive.mission.stack_file import load_stack
+from executive.words.knowledge import Knowledge, Pose, RobotFacts
+from executive.words.robots import RobotSetup, display_name
 from plant.kinds import robot_kind
 from plant.worlds.world import World
 from skills.files.errors import InputError

@@ -14,7 +14,7 @@ from typing import Any, Final
 from executive.cli.report import VERDICTS, RefereeReport, RunReport
 from executive.mission.request import Request
 from executive.mission.scenario import NO_SCENARIO, Scenario
-from executive.tree.compiling.builder import slug
+from executive.words.slug import slug
 from skills.files.errors import InputError
 
 COUNTS: Final = ("successes", "referee_successes", "false_claims")

@@ -19,12 +19,12 @@ from executive.language.remarks import remark_of
 from executive.language.robots.calls import GREETING, Whom, calls_of
 from executive.language.understand import Understanding, understand
 from executive.language.wake import addressed_to
-from executive.mission.file.model import MissionStep
 from executive.mission.mission import mission_from_steps
 from executive.run.control import Control
 from executive.run.runner import Progress
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills
+from executive.words.steps import MissionStep
 
 __all__ = ["Talk", "conversation_of", "load_ahead"]
 

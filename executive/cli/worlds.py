@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from executive.mission.knowledge import Knowledge, load_knowledge
+from executive.words.knowledge import Knowledge, load_knowledge
 from plant.worlds.world import WORLDS_FOLDER, World, WorldError, known_worlds, load_world
 from skills.files.errors import InputError, known_names, suggestion
 

@@ -10,10 +10,10 @@ from typing import Final
 from executive.language.questions import ClarifyingQuestion
 from executive.language.reference import Memory
 from executive.language.understand import Understanding
-from executive.mission.command import Command
-from executive.mission.file.model import MissionStep
-from executive.mission.knowledge import Knowledge
 from executive.tree.compiler import CompiledTree
+from executive.words.command import Command
+from executive.words.knowledge import Knowledge
+from executive.words.steps import MissionStep
 
 __all__ = ["NEVER_MIND", "OVER", "Reply", "ReplyKind", "Speech", "Waiting", "answer", "done", "refused"]
 

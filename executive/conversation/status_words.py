@@ -6,11 +6,11 @@ from typing import Final
 
 from py_trees.common import Status
 
-from executive.mission.geometry import distance_m
-from executive.mission.knowledge import Knowledge
 from executive.run.control import ControlState, Mode
 from executive.run.runner import Progress
 from executive.tree.snapshot import NodeState, Snapshot
+from executive.words.geometry import distance_m
+from executive.words.knowledge import Knowledge
 from skills.robot import Pose2D
 
 __all__ = ["doing_in_words", "place_in_words"]

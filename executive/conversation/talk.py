@@ -29,12 +29,12 @@ from executive.language.reference import Memory
 from executive.language.remarks import Remark, remark_of
 from executive.language.understand import Status, Understanding
 from executive.language.wake import heard_wake, strip_wake
-from executive.mission.command import Command, Task, Thing
-from executive.mission.file.model import MissionStep
-from executive.mission.written import written
 from executive.run.control import Control, Mode
 from executive.run.runner import Progress
 from executive.tree.compiler import CompiledTree
+from executive.words.command import Command, Task, Thing
+from executive.words.steps import MissionStep
+from executive.words.written import written
 from skills.files.errors import InputError
 
 __all__ = ["REMEMBERED_S", "Conversation"]

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from executive.evaluation.runs import Evaluation, RunSpec
-from executive.mission.knowledge import Knowledge
+from executive.words.knowledge import Knowledge
 from skills.detect.words import plural
 from skills.files.errors import InputError
 from skills.files.yaml_source import read_yaml

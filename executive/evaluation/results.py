@@ -16,7 +16,7 @@ from typing import Any, Final, TextIO
 
 from executive.evaluation.outcome import Evidence, RunOutcome
 from executive.evaluation.runs import Evaluation, RunSpec
-from executive.mission.variation import Variation
+from executive.words.variation import Variation
 from skills.files.errors import InputError, disk_is_full
 
 __all__ = ["ResultsFile"]

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any, Final
 
-from executive.mission.variation import NO_VARIATION, Variation
+from executive.words.variation import NO_VARIATION, Variation
 
 __all__ = ["Evaluation", "RunSpec"]
 

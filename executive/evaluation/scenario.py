@@ -11,7 +11,7 @@ from typing import Any, Final
 from executive.evaluation.runs import Evaluation, RunSpec
 from executive.evaluation.scenario_schema import EvaluationFile, FaultsFile, MissionEntry, VariationsFile
 from executive.evaluation.seeds import seed_range
-from executive.mission.variation import Variation
+from executive.words.variation import Variation
 from skills.files.errors import InputError
 from skills.files.outside import is_file, read_text
 from skills.files.schema import validate

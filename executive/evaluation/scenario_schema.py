@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.mission.scenario import RandomFaults
-from executive.mission.variation import (
+from executive.words.variation import (
     NORMAL_LIGHT,
     Brightness,
     Clutter,

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from executive.fleet.auction import Bid
-from executive.mission.command import Command, Task
+from executive.words.command import Command, Task
 
 __all__ = ["Chain", "Split", "soonest", "splits"]
 

@@ -25,7 +25,7 @@ from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, THERE, Location, Roles, read_roles
 from executive.language.tokens import Token
-from executive.mission.command import TIME_UNITS_S
+from executive.words.command import TIME_UNITS_S
 
 __all__ = ["Action", "read_actions"]
 

@@ -13,7 +13,7 @@ from executive.language.items import spoken_words
 from executive.language.roles import Location
 from executive.language.steps import Trace
 from executive.language.tokens import Token
-from executive.mission.written import written
+from executive.words.written import written
 
 __all__ = ["ActionRow", "Explanation", "ThingRow", "TokenRow", "explain", "tree_lines"]
 

@@ -13,7 +13,7 @@ from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import ResolvedAction
 from executive.language.roles import HERE, Location
-from executive.mission.knowledge import Knowledge
+from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
 
 __all__ = ["check_feasible", "not_understood"]

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from executive.mission.command import Command, Task, Thing
-from executive.mission.knowledge import Knowledge
+from executive.words.command import Command, Task, Thing
+from executive.words.knowledge import Knowledge
 
 __all__ = ["Amendment", "FollowUp", "FollowUpKind", "amended", "follow_up_of", "without_fetching"]
 

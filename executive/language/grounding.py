@@ -19,8 +19,8 @@ from executive.language.relations import check_relation
 from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
 from executive.language.tokens import Token
-from executive.mission.command import Command, Task, Thing
-from executive.mission.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
+from executive.words.command import Command, Task, Thing
+from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
 from skills.files.errors import known_names, listing
 
 __all__ = ["ABLE", "Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]

@@ -9,7 +9,7 @@ from typing import Final
 
 from executive.language.parser import DependencyParser
 from executive.language.tokens import Token
-from executive.mission.knowledge import Knowledge
+from executive.words.knowledge import Knowledge
 
 __all__ = ["NameTable", "name_table", "parse_with_names"]
 

@@ -14,7 +14,7 @@ from typing import Final
 from executive.language.lexicon import lexicon
 from executive.language.nouns import NounKind
 from executive.language.tokens import Token
-from executive.mission.command import is_attribute
+from executive.words.command import is_attribute
 
 __all__ = ["corrected_parse"]
 

@@ -16,7 +16,7 @@ from rapidfuzz.distance import OSA
 
 from executive.language.lexicon import read_table
 from executive.language.sounds import sound_distance
-from executive.mission.knowledge import Knowledge
+from executive.words.knowledge import Knowledge
 
 __all__ = ["Corrected", "WordFacts", "correct_spelling", "look_alikes", "synonyms_of", "words_for"]
 

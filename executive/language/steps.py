@@ -27,9 +27,9 @@ from executive.language.relations import check_ways_and_speaker
 from executive.language.rephrasing import rephrased
 from executive.language.similar import WordFacts
 from executive.language.tokens import Token
-from executive.mission.command import Command, is_attribute
-from executive.mission.file.model import MissionStep
-from executive.mission.knowledge import Knowledge
+from executive.words.command import Command, is_attribute
+from executive.words.knowledge import Knowledge
+from executive.words.steps import MissionStep
 from skills.files.errors import listing
 
 __all__ = ["Trace", "trace_sentence"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from executive.language.nouns import NounKind
-from executive.mission.command import is_attribute, may_be_attribute
+from executive.words.command import is_attribute, may_be_attribute
 
 __all__ = ["Token"]
 

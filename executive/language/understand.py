@@ -16,10 +16,10 @@ from executive.language.similar import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
 from executive.language.structure.mention import mentions_structure
 from executive.language.wake import strip_wake
-from executive.mission.command import Command
-from executive.mission.file.model import MissionStep
-from executive.mission.knowledge import Knowledge
-from executive.mission.written import written
+from executive.words.command import Command
+from executive.words.knowledge import Knowledge
+from executive.words.steps import MissionStep
+from executive.words.written import written
 
 if TYPE_CHECKING:
     from executive.language.structure.sentence import Structured

@@ -1,1 +1,1 @@
-"""What is to be done: commands, knowledge of the world, missions and their files."""
+"""Missions: their files, and missions made of sentences."""

@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Final
 
-from executive.mission.condition import AllOf, AnyOf, Condition, Not, ValueIs, parts_of
-from executive.mission.expression import CLOCK, COMPARISONS, TIME_OF_DAY, Expression, ExpressionError
+from executive.words.condition import AllOf, AnyOf, Condition, Not, ValueIs, parts_of
+from executive.words.expression import CLOCK, COMPARISONS, TIME_OF_DAY, Expression, ExpressionError
 from skills.quantities import bounds, likely, range_text
 
 __all__ = ["refuse_certain", "refuse_certain_comparisons"]

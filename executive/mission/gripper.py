@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from executive.mission.command import Command, Task, Thing
-from executive.mission.knowledge import Knowledge
+from executive.words.command import Command, Task, Thing
+from executive.words.knowledge import Knowledge
 
 __all__ = ["UNNAMED", "UNSURE", "InGripper", "after_command", "cannot_take", "either", "is_same", "objection"]
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
-from executive.mission.command import Command, parse_command
-from executive.mission.file.model import Mission, MissionStep
-from executive.mission.knowledge import Knowledge
-from executive.mission.written import parse_written, written
+from executive.words.command import Command, parse_command
+from executive.words.knowledge import Knowledge
+from executive.words.steps import Mission, MissionStep
+from executive.words.written import parse_written, written
 from skills.files.errors import InputError
 
 if TYPE_CHECKING:

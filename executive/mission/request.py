@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from executive.language.questions import QuestionPolicy
-from executive.mission.robots import RobotSetup, pose_in
 from executive.mission.scenario import NO_SCENARIO, Scenario
-from executive.mission.variation import NO_VARIATION, Variation
+from executive.words.robots import RobotSetup, pose_in
+from executive.words.variation import NO_VARIATION, Variation
 from skills.files.errors import InputError
 from skills.files.outside import is_there
 from skills.quantities import QuantityError

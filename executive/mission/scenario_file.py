@@ -12,8 +12,8 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from executive.mission.file.people import StopFile
-from executive.mission.knowledge import Corner, Knowledge
 from executive.mission.scenario import RandomFaults, Scenario
+from executive.words.knowledge import Corner, Knowledge
 from skills.faults.words import parse_fault
 from skills.files.errors import InputError, Problems, suggestion
 from skills.files.schema import Name, Text, validate

@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from types import MappingProxyType
 
-from executive.mission.command import START, Command
-from executive.mission.knowledge import Knowledge
 from executive.record.messages import TASK_TOPIC, task_messages
 from executive.record.schemas import RUN
 from executive.tree.compiler import CompiledTree
+from executive.words.command import START, Command
+from executive.words.knowledge import Knowledge
 from skills.api import Publish
 from skills.robot import Clock
 

@@ -19,7 +19,7 @@ from mcap.writer import Writer
 
 from executive.record.drawable import drawable
 from executive.record.schemas import TOPIC, WALL, Schema, schema_of
-from executive.tree.compiling.builder import slug
+from executive.words.slug import slug
 from skills.robot import Clock
 
 FLUSH_EVERY_S = 1.0

@@ -9,11 +9,11 @@ from typing import Any
 
 from py_trees.common import Status
 
-from executive.mission.robots import robot_called
 from executive.record.reader import Event, read_events
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.tree.node_view import NodeView, logged_view
 from executive.tree.snapshot import NodeState
+from executive.words.robots import robot_called
 from skills.api import Cause
 from skills.files.errors import InputError
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from executive.mission.command import Command, Task, Thing
+from executive.words.command import Command, Task, Thing
 from skills.perception.class_forms import class_forms
 
 __all__ = ["TaskMessage", "command_type", "task_messages"]

@@ -16,7 +16,7 @@ from mcap_ros2.writer import Writer
 from executive.record.drawable import stamp
 from executive.record.reader import Event
 from executive.record.schemas import BOXES, DETECTIONS, PATH, POSE
-from executive.tree.compiling.builder import slug
+from executive.words.slug import slug
 from skills.files.errors import InputError
 
 _RULE: Final = "=" * 80

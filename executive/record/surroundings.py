@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from executive.mission.knowledge import Knowledge
+from executive.words.knowledge import Knowledge
 from skills.estimate.grid_map import GridMap
 
 FREE, UNKNOWN, OCCUPIED = 255, 205, 0

@@ -12,8 +12,8 @@ from py_trees.common import Status
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.explained import Explained
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.builder import slug
 from executive.tree.node import NodeSpec
+from executive.words.slug import slug
 from skills.api import Part
 from skills.robot import Clock
 

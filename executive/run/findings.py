@@ -11,7 +11,7 @@ from typing import Any, Final
 from executive.record.schemas import SPEECH
 from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.behaviours.board import Board
-from executive.tree.compiling.builder import slug
+from executive.words.slug import slug
 from skills.api import Publish
 from skills.robot import Clock
 

@@ -18,7 +18,7 @@ from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, Wa
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.builder import slug
+from executive.words.slug import slug
 from skills.api import Costmap, Detector, Localiser, Publish, Worker
 from skills.detection import NO_DETECTOR
 from skills.navigate.footprint import Footprint

@@ -24,8 +24,9 @@ from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.builder import slug, start_key
+from executive.tree.compiling.builder import start_key
 from executive.tree.snapshot import NodeState, Snapshot
+from executive.words.slug import slug
 from skills.api import Cause, LayeredView, LocalisationEstimate, ParticleView, SkillContext
 from skills.robot import Pose2D
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 from py_trees.common import Status
 
-from executive.mission.goal import GoalKind
 from executive.record.profile import Profile
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.executions import Executions
@@ -26,6 +25,7 @@ from executive.tree.behaviours.suspension import suspend
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import node_view
 from executive.tree.snapshot import Change, NodeState, Observed, Snapshot
+from executive.words.goal import GoalKind
 from skills.api import Cause
 
 POSE_NOTE_PERIOD_S = 1.0

@@ -17,11 +17,11 @@ from executive.language.roles import HERE
 from executive.language.sounds import sound_distance
 from executive.language.understand import Status, Understanding, understand
 from executive.language.wake import SAME_NAME, Address, addressed_to, heard_wake
-from executive.mission.command import Command, is_attribute
-from executive.mission.knowledge import Knowledge
 from executive.speech.alikes import SoundAlikes
 from executive.speech.sound_correction import Reading
 from executive.speech.vocabulary import Vocabulary
+from executive.words.command import Command, is_attribute
+from executive.words.knowledge import Knowledge
 from skills.files.errors import InputError
 
 __all__ = ["Meant", "Reader", "SpeechReader", "TeamReader", "refuse_alike", "spoken_phrases"]

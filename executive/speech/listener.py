@@ -9,7 +9,6 @@ from typing import Any, Final
 
 from executive.language.robots import Part
 from executive.language.understand import Status
-from executive.mission.command import Command
 from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Utterance
 from executive.speech.alikes import SoundAlikes
 from executive.speech.calling import opening_as_heard
@@ -19,6 +18,7 @@ from executive.speech.recogniser import Recogniser
 from executive.speech.sound import Loudness, Samples, joined
 from executive.speech.vocabulary import Vocabulary
 from executive.speech.wav import read_wav
+from executive.words.command import Command
 from skills.files.errors import InputError
 
 __all__ = ["HeardUtterance", "Listener", "Recording", "together"]

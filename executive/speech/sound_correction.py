@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Final, Generic, TypeVar
 
-from executive.mission.command import is_attribute
 from executive.speech.alikes import Alike, SoundAlikes
+from executive.words.command import is_attribute
 
 __all__ = ["Candidate", "Reading", "corrections"]
 

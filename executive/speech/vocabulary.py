@@ -8,7 +8,7 @@ from itertools import cycle
 from pathlib import Path
 from typing import Final
 
-from executive.mission.knowledge import Knowledge
+from executive.words.knowledge import Knowledge
 from skills.files.errors import InputError
 from skills.files.outside import read_text
 

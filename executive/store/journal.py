@@ -15,8 +15,8 @@ from executive.store.recollection import Recollection
 from executive.store.records import pose_text, row_of
 from executive.store.values import to_text
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.builder import slug
 from executive.tree.snapshot import Change
+from executive.words.slug import slug
 from skills.geometry import wrap
 from skills.robot import Pose2D
 

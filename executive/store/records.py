@@ -11,9 +11,9 @@ from typing import Any, Final
 from py_trees.common import Status
 
 from executive.mission.request import Request, Start
-from executive.mission.robots import RobotSetup
 from executive.mission.scenario import NO_SCENARIO, Scenario
-from executive.mission.variation import NO_VARIATION, Variation
+from executive.words.robots import RobotSetup
+from executive.words.variation import NO_VARIATION, Variation
 from skills.api import Cause
 from skills.robot import Pose2D
 

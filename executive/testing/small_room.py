@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import yaml
 
-from executive.mission.knowledge import Knowledge
+from executive.words.knowledge import Knowledge
 from skills.files.yaml_source import read_yaml
 from skills.testing.blocks import ROOM, Block, grid_of
 

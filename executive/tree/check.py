@@ -7,12 +7,12 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from executive.mission.command import START, Task
-from executive.mission.geometry import area_m2
 from executive.mission.gripper import InGripper, cannot_take, objection
-from executive.mission.knowledge import Knowledge
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, estimate_tree
+from executive.words.command import START, Task
+from executive.words.geometry import area_m2
+from executive.words.knowledge import Knowledge
 from skills.api import Costmap, PlanningError, Skill
 from skills.files.errors import InputError, listing, suggestion
 from skills.navigate.footprint import Footprint

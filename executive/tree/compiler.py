@@ -6,9 +6,6 @@ from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
 
-from executive.mission.command import Command
-from executive.mission.file.model import Mission, MissionStep
-from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decisions import buttons_of
 from executive.tree.compiling.assembly import StepPart, assemble, step_name
@@ -18,6 +15,9 @@ from executive.tree.compiling.interrupts import watched
 from executive.tree.compiling.wiring import check_wiring
 from executive.tree.kinds import build
 from executive.tree.node import NodeSpec
+from executive.words.command import Command
+from executive.words.knowledge import Knowledge
+from executive.words.steps import Mission, MissionStep
 from skills.files.errors import InputError
 from skills.perception.doorway import Doorway
 

@@ -16,9 +16,9 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, Final, Union
 
-from executive.mission.command import thing
-from executive.mission.knowledge import Knowledge
 from executive.tree.types import describe_type, field_types, required
+from executive.words.command import thing
+from executive.words.knowledge import Knowledge
 from skills.api import Surface, Thing
 from skills.files.errors import listing, suggestion
 from skills.quantities import QuantityError, bounds, number_of, without_unit

@@ -28,7 +28,7 @@ from executive.cli.several import prepare_several
 from executive.cli.simulated import SimulatedBackend
 from executive.evaluation.statistics import Rate
 from executive.mission.request import Request
-from executive.mission.robots import RobotSetup
+from executive.words.robots import RobotSetup
 
 ROBOT: Final = "bob"
 WORLD: Final = "flat"

@@ -32,11 +32,7 @@ from executive.cli.fleet_run import run_fleet
 from executive.cli.fleet_setup import simulated_fleet
 from executive.cli.requests import prepare
 from executive.cli.simulated import SimulatedBackend
-from executive.mission.command import parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
-from executive.mission.knowledge import Knowledge
 from executive.mission.request import Request
-from executive.mission.robots import RobotSetup
 from executive.record.event_log import EventLog
 from executive.record.reader import Event, read_events
 from executive.run.outcome import Outcome
@@ -44,6 +40,10 @@ from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.compiler import compile_mission
+from executive.words.command import parse_command
+from executive.words.knowledge import Knowledge
+from executive.words.robots import RobotSetup
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from tests.executive.conftest import (
     FETCH,
     KNOWLEDGE,

@@ -43,14 +43,14 @@ from executive.cli.assembly import run_entry, simulate
 from executive.cli.starts import alone
 from executive.cli.worlds import knowledge_of
 from executive.cli.worst_sheet import Shown, contact_sheet
-from executive.mission.command import parse_command
-from executive.mission.file.model import Mission, MissionStep
 from executive.run.journal import TickNote
 from executive.run.outcome import Outcome, RobotResult
 from executive.run.runner import RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import built_in_skills
+from executive.words.command import parse_command
+from executive.words.steps import Mission, MissionStep
 from plant.models.imported import FACTS_FILE, read_imported
 from plant.pictures import best_view, render_view, save_png
 from plant.simulation import Simulation

@@ -25,12 +25,12 @@ from executive.evaluation.scenario import load_evaluation
 from executive.language.parser import load_parser
 from executive.mission.file.overrides import overridden
 from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
-from executive.mission.knowledge import load_knowledge
 from executive.mission.scenario_file import load_scenario, scenario_of
 from executive.mission.stack_file import load_stack
 from executive.testing.skill_test import load_skill_tests
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
+from executive.words.knowledge import load_knowledge
 from plant.models.builder.importing import ObjectImportError
 from plant.models.builder.importing.reading import read_patches
 from plant.models.builder.importing.solid import solid_of

@@ -28,10 +28,16 @@ from pathlib import Path
 from typing import Any
 
 from executive.cli.goal_conditions import verdict_of
-from executive.mission.command import parse_command
-from executive.mission.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
-from executive.mission.expression import Expression, Template
-from executive.mission.file.blocks import (
+from executive.mission.request import Request
+from executive.run.control import Control
+from executive.run.journal import TickNote
+from executive.run.outcome import Outcome, RunResult
+from executive.run.runner import Progress, RunEntry, RunSettings, run
+from executive.run.worker import LockStepWorker
+from executive.store.missions import MissionStore
+from executive.store.resuming import resumed_tree
+from executive.tree.compiler import CompiledTree, compile_mission
+from executive.words.blocks import (
     Ask,
     Check,
     Choose,
@@ -45,7 +51,10 @@ from executive.mission.file.blocks import (
     Try,
     Wait,
 )
-from executive.mission.file.model import (
+from executive.words.command import parse_command
+from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
+from executive.words.expression import Expression, Template
+from executive.words.steps import (
     DEFAULT_WORLD,
     Mission,
     MissionStep,
@@ -55,15 +64,6 @@ from executive.mission.file.model import (
     StepGuards,
     StepPolicy,
 )
-from executive.mission.request import Request
-from executive.run.control import Control
-from executive.run.journal import TickNote
-from executive.run.outcome import Outcome, RunResult
-from executive.run.runner import Progress, RunEntry, RunSettings, run
-from executive.run.worker import LockStepWorker
-from executive.store.missions import MissionStore
-from executive.store.resuming import resumed_tree
-from executive.tree.compiler import CompiledTree, compile_mission
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectObservation, Part, Running, Skill, Succeeded, Thing
 from skills.check_door.skill import CheckDoorInputs
 from skills.files.errors import InputError

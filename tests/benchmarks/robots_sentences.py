@@ -20,8 +20,8 @@ import yaml
 from executive.language.parser import load_parser
 from executive.language.robots import Addressed, Part, Whom, understand_for_robots
 from executive.language.understand import Status
-from executive.mission.knowledge import load_knowledge
-from executive.mission.written import parse_written
+from executive.words.knowledge import load_knowledge
+from executive.words.written import parse_written
 from plant.worlds.world import load_world
 from tests.benchmarks.structured_sentences import Score, as_lines, in_full, steps_of
 

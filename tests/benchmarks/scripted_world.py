@@ -11,12 +11,12 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform
 
-from executive.mission.geometry import inside
-from executive.mission.goal import GoalCondition, GoalKind, When
-from executive.mission.knowledge import ANYBODY, Knowledge
 from executive.run.executions import is_speech
 from executive.run.outcome import RobotResult
 from executive.tree.compiler import CompiledTree, StepPart
+from executive.words.geometry import inside
+from executive.words.goal import GoalCondition, GoalKind, When
+from executive.words.knowledge import ANYBODY, Knowledge
 from plant.referee import GoalCondition as Asked
 from plant.referee import Verdict
 from plant.referee.judge import LOOKS_AT_DOOR_S, judge

@@ -21,9 +21,9 @@ import yaml
 
 from executive.language.parser import load_parser
 from executive.language.understand import Status, Understanding, understand
-from executive.mission.file.model import MissionStep
-from executive.mission.knowledge import load_knowledge
-from executive.mission.written import parse_written, written
+from executive.words.knowledge import load_knowledge
+from executive.words.steps import MissionStep
+from executive.words.written import parse_written, written
 from plant.worlds.world import load_world
 
 __all__ = ["TABLES", "Score", "as_lines", "in_full", "measured", "steps_of"]

@@ -10,15 +10,15 @@ import time
 
 import pytest
 
-from executive.mission.command import parse_command
-from executive.mission.condition import AllOf, ButtonPressed, Not, ValueIs
-from executive.mission.expression import Expression
-from executive.mission.file.blocks import Choose, Group, Handler, Repeat, Set, Together, Try, Wait
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep, SkillCall, StepPolicy
-from executive.mission.knowledge import Knowledge
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
+from executive.words.blocks import Choose, Group, Handler, Repeat, Set, Together, Try, Wait
+from executive.words.command import parse_command
+from executive.words.condition import AllOf, ButtonPressed, Not, ValueIs
+from executive.words.expression import Expression
+from executive.words.knowledge import Knowledge
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep, SkillCall, StepPolicy
 from tests.executive.conftest import (
     KNOWLEDGE,
     PORTS,

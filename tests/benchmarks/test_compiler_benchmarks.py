@@ -7,9 +7,9 @@ import pytest
 
 from executive.language.parser import load_parser
 from executive.mission.file.resolve import mission_from_file
-from executive.mission.knowledge import load_knowledge
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
+from executive.words.knowledge import load_knowledge
 
 STEPS = (
     "  - {to: kitchen, do: grasp, object: drink, retries: 1, timeout: 300}",

@@ -11,10 +11,10 @@ import yaml
 
 from executive.language.parser import load_parser
 from executive.language.understand import understand
-from executive.mission.knowledge import load_knowledge
 from executive.mission.mission import mission_from_meaning, understood
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
+from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
 from tests.benchmarks import robots_sentences, structured_sentences
 

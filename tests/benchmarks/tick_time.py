@@ -17,9 +17,6 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.mission.command import parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
-from executive.mission.knowledge import Knowledge
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.run.control import Control
@@ -27,6 +24,9 @@ from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
+from executive.words.command import parse_command
+from executive.words.knowledge import Knowledge
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from tests.executive.conftest import (
     FETCH,
     KNOWLEDGE,

@@ -23,8 +23,8 @@ from executive.cli.mission_run import run_request
 from executive.cli.several import prepare_several
 from executive.cli.simulated import SimulatedBackend
 from executive.mission.request import Request
-from executive.mission.robots import RobotSetup
 from executive.run.runner import Progress
+from executive.words.robots import RobotSetup
 from skills.robot import Pose2D
 from tests.benchmarks.traffic_cases import meeting, missions
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from executive.cli.worlds import knowledge_of, open_world
-from executive.mission.knowledge import Door, Knowledge
-from executive.mission.robots import RobotSetup
+from executive.words.knowledge import Door, Knowledge
+from executive.words.robots import RobotSetup
 from plant.kinds import robot_kind
 from plant.worlds.world import World
 from skills.estimate.grid_map import GridMap, load_grid_map

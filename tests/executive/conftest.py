@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from executive.mission.command import parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
-from executive.mission.knowledge import Knowledge
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.snapshot import Change, Observed
+from executive.words.command import parse_command
+from executive.words.knowledge import Knowledge
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from skills.api import (
     Cause,
     Failed,

@@ -11,13 +11,13 @@ from pydrake.math import RigidTransform
 
 from executive.cli.assembly import judge, run_entry
 from executive.cli.worlds import knowledge_of
-from executive.mission.command import parse_command
-from executive.mission.file.model import Mission, MissionStep, StepPolicy
 from executive.run.outcome import Outcome
 from executive.run.runner import RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
+from executive.words.command import parse_command
+from executive.words.steps import Mission, MissionStep, StepPolicy
 from plant import simulation
 from plant.worlds.placement import place_objects
 from plant.worlds.world import load_world

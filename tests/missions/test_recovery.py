@@ -12,13 +12,13 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from executive.cli.assembly import judge, run_entry
 from executive.cli.worlds import knowledge_of, open_world
-from executive.mission.command import parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.run.outcome import Outcome
 from executive.run.runner import RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
+from executive.words.command import parse_command
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from plant.diagram import LooseModel
 from plant.models.spot.description import HAND_LINK
 from plant.simulation import Simulation

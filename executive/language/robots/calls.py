@@ -11,7 +11,7 @@ from typing import Final
 
 from executive.language.lexicon import lexicon
 from executive.language.questions import RefusalError
-from executive.mission.robots import display_name, robot_called
+from executive.words.robots import display_name, robot_called
 from skills.files.errors import listing
 
 __all__ = ["GREETING", "VERBS", "Calls", "Whom", "calls_of", "imperative"]

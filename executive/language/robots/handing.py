@@ -7,7 +7,7 @@ from dataclasses import replace
 from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.understand import Status, Understanding
-from executive.mission.command import Task
+from executive.words.command import Task
 
 __all__ = ["handed_on", "moved", "takes_what_was_put", "with_place"]
 

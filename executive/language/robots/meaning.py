@@ -15,8 +15,8 @@ from executive.language.robots.calls import Whom, calls_of
 from executive.language.robots.cutting import Cut, Piece, Who, cut_by_robot, narrates
 from executive.language.robots.handing import handed_on, moved, takes_what_was_put, with_place
 from executive.language.understand import Status, Understanding, understand
-from executive.mission.knowledge import Knowledge
-from executive.mission.robots import display_name, robot_called
+from executive.words.knowledge import Knowledge
+from executive.words.robots import display_name, robot_called
 from skills.files.errors import listing
 
 __all__ = ["Addressed", "Part", "Whom", "understand_for_robots", "understand_for_robots_asking"]

@@ -39,11 +39,11 @@ from executive.language.structure.row import (
 )
 from executive.language.structure.telling import Asked, Listener, asked_of, bare, said_by, template
 from executive.language.structure.waiting import charged, waited
-from executive.mission.command import Task
-from executive.mission.condition import Look
-from executive.mission.expression import Template
-from executive.mission.file.blocks import Ask, Check, Speak, Wait
-from executive.mission.file.model import MissionStep
+from executive.words.blocks import Ask, Check, Speak, Wait
+from executive.words.command import Task
+from executive.words.condition import Look
+from executive.words.expression import Template
+from executive.words.steps import MissionStep
 
 
 class Acts(Repeats):

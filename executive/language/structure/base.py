@@ -17,8 +17,8 @@ from executive.language.structure.row import (
     asked_by,
     checked,
 )
-from executive.mission.file.blocks import Block
-from executive.mission.file.model import MissionStep
+from executive.words.blocks import Block
+from executive.words.steps import MissionStep
 
 
 class Base:

@@ -30,8 +30,8 @@ from executive.language.structure.row import (
     turned,
     was_not,
 )
-from executive.mission.file.blocks import Choose, Group, Repeat, Try, Wait
-from executive.mission.file.model import MissionStep
+from executive.words.blocks import Choose, Group, Repeat, Try, Wait
+from executive.words.steps import MissionStep
 
 
 class Branches(Base):

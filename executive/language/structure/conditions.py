@@ -13,8 +13,8 @@ from executive.language.structure.amounts import SHARE, SPAN, seconds_of, share_
 from executive.language.structure.cutting import pattern
 from executive.language.structure.doors import door_condition
 from executive.language.structure.leaves import Leaves, State, Supposed
-from executive.mission.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Not, ValueIs
-from executive.mission.expression import Expression
+from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Not, ValueIs
+from executive.words.expression import Expression
 
 __all__ = ["negated", "suppose"]
 

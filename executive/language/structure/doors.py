@@ -7,8 +7,8 @@ from typing import Final
 
 from executive.language.questions import RefusalError, RefusalKind, Slot, which
 from executive.language.similar import synonyms_of
-from executive.mission.condition import Condition, DoorOpen, Not
-from executive.mission.knowledge import Knowledge
+from executive.words.condition import Condition, DoorOpen, Not
+from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
 
 __all__ = ["door_condition"]

@@ -8,8 +8,8 @@ from typing import Final
 
 from executive.language.questions import RefusalError
 from executive.language.structure.leaves import Leaf, Leaves, State
-from executive.mission.command import Command, Task
-from executive.mission.file.model import MissionStep
+from executive.words.command import Command, Task
+from executive.words.steps import MissionStep
 from skills.files.errors import listing
 
 __all__ = ["EVERY_ROOM", "GOES_EVERYWHERE", "everywhere", "for_everyone", "look_for", "serves_all"]

@@ -12,10 +12,10 @@ from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.steps import Trace, trace_sentence
-from executive.mission.command import START, Command, Task, Thing
-from executive.mission.condition import AllOf, Condition, DoorOpen, Look
-from executive.mission.geometry import inside
-from executive.mission.knowledge import Knowledge
+from executive.words.command import START, Command, Task, Thing
+from executive.words.condition import AllOf, Condition, DoorOpen, Look
+from executive.words.geometry import inside
+from executive.words.knowledge import Knowledge
 
 __all__ = ["Leaf", "Leaves", "State", "Supposed", "at_start"]
 

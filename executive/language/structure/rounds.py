@@ -34,11 +34,11 @@ from executive.language.structure.row import (
     where_it_is_taken,
 )
 from executive.language.structure.telling import said_by
-from executive.mission.command import Task
-from executive.mission.condition import ValueIs
-from executive.mission.expression import Expression
-from executive.mission.file.blocks import Choose, Repeat, Together
-from executive.mission.file.model import MissionStep
+from executive.words.blocks import Choose, Repeat, Together
+from executive.words.command import Task
+from executive.words.condition import ValueIs
+from executive.words.expression import Expression
+from executive.words.steps import MissionStep
 
 
 class Repeats(Branches):

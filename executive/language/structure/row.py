@@ -19,12 +19,12 @@ from executive.language.structure.cutting import (
 )
 from executive.language.structure.leaves import Leaf, Leaves, State, Supposed
 from executive.language.structure.telling import template
-from executive.mission.command import Command, Task
-from executive.mission.condition import AllOf, Condition, Look, Not
-from executive.mission.expression import Template
-from executive.mission.file.blocks import Repeat, Speak
-from executive.mission.file.model import MissionStep
-from executive.mission.written import written_condition
+from executive.words.blocks import Repeat, Speak
+from executive.words.command import Command, Task
+from executive.words.condition import AllOf, Condition, Look, Not
+from executive.words.expression import Template
+from executive.words.steps import MissionStep
+from executive.words.written import written_condition
 
 Steps = tuple[MissionStep, ...]
 

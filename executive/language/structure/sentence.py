@@ -24,9 +24,9 @@ from executive.language.structure.row import (
     Row,
     Steps,
 )
-from executive.mission.file.blocks import Ask, Choose, Repeat, Together, Try, steps_of
-from executive.mission.file.model import MissionStep
-from executive.mission.knowledge import Knowledge
+from executive.words.blocks import Ask, Choose, Repeat, Together, Try, steps_of
+from executive.words.knowledge import Knowledge
+from executive.words.steps import MissionStep
 
 __all__ = ["Structured", "structured"]
 

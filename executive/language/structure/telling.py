@@ -10,7 +10,7 @@ from typing import Final
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.structure.cutting import pattern
-from executive.mission.knowledge import Knowledge
+from executive.words.knowledge import Knowledge
 
 __all__ = ["Asked", "Listener", "Said", "asked_of", "bare", "said_by", "template"]
 

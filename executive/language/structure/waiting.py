@@ -10,8 +10,8 @@ from executive.language.questions import RefusalError
 from executive.language.structure.amounts import SHARE, SPAN, seconds_of, share_of, time_of
 from executive.language.structure.conditions import negated, suppose
 from executive.language.structure.leaves import Leaves, State, Supposed
-from executive.mission.file.blocks import Dock, Wait
-from executive.mission.file.model import MissionStep
+from executive.words.blocks import Dock, Wait
+from executive.words.steps import MissionStep
 
 __all__ = ["Done", "charged", "waited"]
 

@@ -8,10 +8,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Protocol
 
 from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
-from executive.mission.command import Command, Task
-from executive.mission.condition import RANGES, AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
-from executive.mission.expression import Expression, ExpressionError, Template, Value, literal
-from executive.mission.file.blocks import (
+from executive.mission.file.condition_schema import ConditionFile, RepeatFile
+from executive.mission.file.schema import HandlerFile, StepFile
+from executive.mission.file.scope import Scope
+from executive.words.blocks import (
     Ask,
     Block,
     Check,
@@ -26,11 +26,11 @@ from executive.mission.file.blocks import (
     Try,
     Wait,
 )
-from executive.mission.file.condition_schema import ConditionFile, RepeatFile
-from executive.mission.file.model import KeyPath, MissionStep
-from executive.mission.file.schema import HandlerFile, StepFile
-from executive.mission.file.scope import Scope
-from executive.mission.knowledge import ANYBODY, Knowledge
+from executive.words.command import Command, Task
+from executive.words.condition import RANGES, AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
+from executive.words.expression import Expression, ExpressionError, Template, Value, literal
+from executive.words.knowledge import ANYBODY, Knowledge
+from executive.words.steps import KeyPath, MissionStep
 from skills.files.errors import listing, suggestion
 
 if TYPE_CHECKING:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from executive.mission.command import START, TIME_UNITS_S, Command, Task, Thing, parse_command
-from executive.mission.file.model import KeyPath
 from executive.mission.file.schema import StepFile
 from executive.mission.file.scope import Scope
-from executive.mission.knowledge import Knowledge
+from executive.words.command import START, TIME_UNITS_S, Command, Task, Thing, parse_command
+from executive.words.knowledge import Knowledge
+from executive.words.steps import KeyPath
 from skills.files.errors import InputError, Problems, suggestion
 
 __all__ = ["typed_command"]

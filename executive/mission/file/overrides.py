@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from executive.mission.file.schema import MissionFile
-from executive.mission.knowledge import Knowledge, knowledge_of_source
+from executive.words.knowledge import Knowledge, knowledge_of_source
 from skills.files.yaml_source import YamlSource
 
 __all__ = ["overridden"]

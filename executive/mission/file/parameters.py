@@ -15,8 +15,8 @@ from typing import Any, Final
 
 import yaml
 
-from executive.mission.expression import Value
-from executive.mission.file.model import KeyPath
+from executive.words.expression import Value
+from executive.words.steps import KeyPath
 from skills.files.errors import InputError, did_you_mean, listing, suggestion
 from skills.files.texts import json_object, plain_text
 from skills.files.yaml_scalars import scalar_of

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from executive.mission.knowledge import Corner, Knowledge
+from executive.words.knowledge import Corner, Knowledge
 from skills.files.errors import Problems, suggestion
 from skills.files.schema import Name
 from skills.quantities import Delay, Speed

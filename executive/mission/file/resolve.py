@@ -10,18 +10,18 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
-from executive.mission.command import START, Command
-from executive.mission.condition import Condition
 from executive.mission.file.block_steps import condition_of, plain_value, read_block, round_values
-from executive.mission.file.blocks import Block, Group, Handler
 from executive.mission.file.condition_schema import ConditionFile
-from executive.mission.file.model import KeyPath, Mission, MissionStep, SkillCall
 from executive.mission.file.names import typed_command
 from executive.mission.file.overrides import overridden
 from executive.mission.file.parameters import Given, part_source, round_source, with_parameters
 from executive.mission.file.schema import HandlerFile, MissionFile, ParameterFile, RoundFile, StepFile, with_source
 from executive.mission.file.scope import Scope
-from executive.mission.knowledge import Knowledge
+from executive.words.blocks import Block, Group, Handler
+from executive.words.command import START, Command
+from executive.words.condition import Condition
+from executive.words.knowledge import Knowledge
+from executive.words.steps import KeyPath, Mission, MissionStep, SkillCall
 from skills.files.errors import InputError, Problems, suggestion
 from skills.files.outside import is_file
 from skills.files.schema import validate

@@ -18,7 +18,6 @@ from pydantic import (
 )
 
 from executive.language.questions import QuestionPolicy
-from executive.mission.command import Task
 from executive.mission.file.condition_schema import (
     Condition,
     DockFile,
@@ -27,7 +26,11 @@ from executive.mission.file.condition_schema import (
     WaitFile,
     WhileFile,
 )
-from executive.mission.file.model import (
+from executive.mission.file.objects import ObjectFile
+from executive.mission.file.people import RouteFile
+from executive.words.command import Task
+from executive.words.robots import RobotsFile
+from executive.words.steps import (
     DEFAULT_WORLD,
     KeyPath,
     OnFailure,
@@ -37,9 +40,6 @@ from executive.mission.file.model import (
     StepGuards,
     StepPolicy,
 )
-from executive.mission.file.objects import ObjectFile
-from executive.mission.file.people import RouteFile
-from executive.mission.robots import RobotsFile
 from skills.files.errors import InputError, listing
 from skills.files.schema import Name, Text
 from skills.files.yaml_source import YamlSource

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from executive.mission.file.model import KeyPath
 from executive.mission.file.schema import MissionFile
+from executive.words.steps import KeyPath
 from skills.files.errors import InputError, SourceLine
 from skills.files.yaml_source import YamlSource
 

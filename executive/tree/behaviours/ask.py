@@ -9,12 +9,12 @@ from typing import Any, Final
 
 from py_trees.common import Status
 
-from executive.mission.expression import LARGEST, ExpressionError, Template, Value
 from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decisions import Keys, View
 from executive.tree.behaviours.explained import ExplainedLeaf
 from executive.tree.node import NodeKind
+from executive.words.expression import LARGEST, ExpressionError, Template, Value
 from skills.api import Asked, Cause, Failed, Question
 
 SPEECH_TOPIC: Final = "speech"

@@ -9,7 +9,6 @@ from typing import Final, Literal
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.mission.expression import Value
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.composites import MemoryComposite
 from executive.tree.behaviours.context import RunContext
@@ -18,6 +17,7 @@ from executive.tree.behaviours.explained import cause_of, message_of
 from executive.tree.behaviours.policies import FINAL_CAUSES
 from executive.tree.behaviours.recovery import Afterwards
 from executive.tree.node import NodeKind
+from executive.words.expression import Value
 from skills.api import Cause
 from skills.files.errors import count_text
 from skills.robot import Clock

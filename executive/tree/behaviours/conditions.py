@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
-from executive.mission.file.model import StaleData
 from executive.tree.behaviours.context import RunContext
+from executive.words.steps import StaleData
 from skills.api import Cause, Failed, Thing
 from skills.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.perception.class_forms import THING

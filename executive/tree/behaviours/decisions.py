@@ -14,8 +14,6 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
-from executive.mission.condition import READINGS
-from executive.mission.expression import Expression, ExpressionError, Template, Value
 from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.conditions import Condition, Verdict, Waiting
@@ -23,6 +21,8 @@ from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decorators import ExplainedDecorator
 from executive.tree.behaviours.explained import ExplainedLeaf, ExplainedNode, cause_of, message_of
 from executive.tree.node import NodeKind, NodeSpec
+from executive.words.condition import READINGS
+from executive.words.expression import Expression, ExpressionError, Template, Value
 from skills.api import Cause, Failed
 from skills.robot import Clock
 

@@ -10,10 +10,10 @@ from typing import Any, Final
 import numpy as np
 from py_trees.common import Status
 
-from executive.mission.geometry import distance_m
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import ExplainedLeaf
 from executive.tree.node import NodeKind
+from executive.words.geometry import distance_m
 from skills.api import FLOOR, Surface
 from skills.geometry import compose
 from skills.quantities import Coordinate, Height

@@ -8,10 +8,10 @@ from typing import Final
 
 from py_trees.common import Status
 
-from executive.mission.geometry import Point, distance_m, inside
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import ExplainedLeaf
 from executive.tree.node import NodeKind
+from executive.words.geometry import Point, distance_m, inside
 from skills.api import Cause, Surface
 from skills.robot import Clock, Pose2D
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from executive.mission.command import Thing
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.node import NodeSpec
+from executive.words.command import Thing
 from skills.api import Cause, Surface
 
 SETTLE_S: Final = 0.5

@@ -6,21 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Final
 
-from executive.mission.command import START, Command, Task
-from executive.mission.expression import kind_of, literal
-from executive.mission.file.model import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
-from executive.mission.goal import (
-    GoalCondition,
-    When,
-    clearing_goals,
-    command_goal,
-    drive_goal,
-    given_goal,
-    lifted_goal,
-    put_goal,
-)
 from executive.mission.gripper import UNNAMED, after_command, is_same
-from executive.mission.knowledge import Knowledge, Pose
 from executive.tree.behaviours.board import Constant
 from executive.tree.compiling.blocks import (
     PYTHON_TYPES,
@@ -33,7 +19,7 @@ from executive.tree.compiling.blocks import (
     give,
     set_plan,
 )
-from executive.tree.compiling.builder import PICK_UPS, PlanBuilder, Registry, slug, start_key
+from executive.tree.compiling.builder import PICK_UPS, PlanBuilder, Registry, start_key
 from executive.tree.compiling.clearing import clear_plan, is_clearing, refuse_everything
 from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.compiling.policies import PolicyFrame, needs_way_back, under_policy
@@ -42,6 +28,21 @@ from executive.tree.compiling.skill_steps import skill_plan
 from executive.tree.compiling.steps import step_plan
 from executive.tree.compiling.trips import are_trips, refuse_several, trips_plan
 from executive.tree.node import NodeSpec
+from executive.words.command import START, Command, Task
+from executive.words.expression import kind_of, literal
+from executive.words.goal import (
+    GoalCondition,
+    When,
+    clearing_goals,
+    command_goal,
+    drive_goal,
+    given_goal,
+    lifted_goal,
+    put_goal,
+)
+from executive.words.knowledge import Knowledge, Pose
+from executive.words.slug import slug
+from executive.words.steps import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from skills.api import Skill, Surface
 from skills.files.errors import InputError, Problems, SourceLine, listing
 from skills.quantities import Quantity

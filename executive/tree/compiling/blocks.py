@@ -7,29 +7,10 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final, Protocol
 
-from executive.mission.command import Command, Task
-from executive.mission.condition import READINGS, AllOf, Condition, DoorOpen, Look, ValueIs, parts_of
-from executive.mission.expression import Expression, Kind, Template, Value, kind_of
-from executive.mission.file.blocks import (
-    Ask,
-    Block,
-    Check,
-    Choose,
-    Dock,
-    Group,
-    Repeat,
-    Set,
-    Speak,
-    Together,
-    Try,
-    Wait,
-)
-from executive.mission.file.model import MissionStep, StepPolicy
-from executive.mission.goal import command_goal, door_goal, held_goal
 from executive.mission.gripper import InGripper, either
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.decisions import AnswerIs, MustHold, MustNotBegin
-from executive.tree.compiling.builder import PlanBuilder, pose_2d, slug
+from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.compiling.decisions import (
     Decided,
     Named,
@@ -43,6 +24,26 @@ from executive.tree.compiling.doors import door_plan
 from executive.tree.compiling.interrupts import HANDLING, dock_plan
 from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.node import NodeSpec
+from executive.words.blocks import (
+    Ask,
+    Block,
+    Check,
+    Choose,
+    Dock,
+    Group,
+    Repeat,
+    Set,
+    Speak,
+    Together,
+    Try,
+    Wait,
+)
+from executive.words.command import Command, Task
+from executive.words.condition import READINGS, AllOf, Condition, DoorOpen, Look, ValueIs, parts_of
+from executive.words.expression import Expression, Kind, Template, Value, kind_of
+from executive.words.goal import command_goal, door_goal, held_goal
+from executive.words.slug import slug
+from executive.words.steps import MissionStep, StepPolicy
 from skills.api import Part
 from skills.files.errors import InputError, suggestion
 

@@ -3,41 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
-import re
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final
 
-from executive.mission.command import Command, Task, Thing
-from executive.mission.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
 from executive.tree.behaviours.recovery import Recovery, Trigger
 from executive.tree.node import NodeSpec
 from executive.tree.registry import missing
+from executive.words.command import Command, Task, Thing
+from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
+from executive.words.slug import slug
 from skills.api import Cause, Part, Skill, Surface
 from skills.files.errors import InputError, SourceLine, suggestion
 from skills.perception.class_forms import THING
 from skills.robot import Pose2D
 
 Registry = Mapping[str, type[Skill[Any]]]
-LONGEST_SLUG: Final = 80
 STOW: Final = "stow"
 PICK_UPS: Final = 2
 """How often what falls on the way is picked up again, unless a mission says otherwise."""
-
-
-def slug(text: str) -> str:
-    """Text as one part of a path id or of a file's name: lower case, words joined by hyphens, no dots or slashes.
-
-    A long text is cut off and ends with its checksum, so that others with the same beginning differ from it.
-    """
-    words = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "unnamed"
-    if len(words) <= LONGEST_SLUG:
-        return words
-    checksum = f"{zlib.crc32(words.encode()):08x}"
-    return f"{words[: LONGEST_SLUG - len(checksum) - 1].rstrip('-')}-{checksum}"
 
 
 def start_key(robot_name: str, mission_name: str) -> str:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from executive.mission.command import START, Command, Task, Thing
-from executive.mission.knowledge import EVERYTHING
 from executive.tree.behaviours.board import FromBoardOr
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.compiling.handling import pick_up_plan, tidied
 from executive.tree.compiling.search import detect_plan, look_plans, required_surfaces, where
 from executive.tree.compiling.steps import put_down_plan
 from executive.tree.node import NodeSpec
+from executive.words.command import START, Command, Task, Thing
+from executive.words.knowledge import EVERYTHING
 from skills.perception.class_forms import THING
 
 __all__ = ["MOST_OBJECTS", "clear_plan", "is_clearing", "refuse_everything"]

@@ -7,20 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
-from executive.mission.condition import (
-    RANGES,
-    READINGS,
-    AllOf,
-    AnyOf,
-    ButtonPressed,
-    Condition,
-    DoorOpen,
-    Look,
-    Not,
-    ValueIs,
-    parts_of,
-)
-from executive.mission.expression import Expression, ExpressionError, Kind, Template, kind_of
 from executive.tree.behaviours.decisions import (
     AllHold,
     AnswerIs,
@@ -35,6 +21,20 @@ from executive.tree.compiling.doors import door_plan
 from executive.tree.compiling.steps import find_plan
 from executive.tree.compiling.trips import refuse_several
 from executive.tree.node import NodeSpec
+from executive.words.condition import (
+    RANGES,
+    READINGS,
+    AllOf,
+    AnyOf,
+    ButtonPressed,
+    Condition,
+    DoorOpen,
+    Look,
+    Not,
+    ValueIs,
+    parts_of,
+)
+from executive.words.expression import Expression, ExpressionError, Kind, Template, kind_of
 from skills.files.errors import InputError
 
 __all__ = ["Decided", "Named", "decide_plan", "decision_of", "instant_decision", "keys_of", "kind_in"]

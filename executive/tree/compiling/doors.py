@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from itertools import product
 from typing import Final
 
-from executive.mission.geometry import Point, distance_m, fits, nearest_side
-from executive.mission.knowledge import Door, Knowledge
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.node import NodeSpec
+from executive.words.geometry import Point, distance_m, fits, nearest_side
+from executive.words.knowledge import Door, Knowledge
 from skills.files.errors import InputError
 from skills.perception.doorway import Doorway
 from skills.robot import Pose2D

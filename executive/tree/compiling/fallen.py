@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from typing import Final
 
-from executive.mission.command import Thing
 from executive.tree.behaviours.board import BesideBoard, FromBoard
 from executive.tree.behaviours.recovery import Recovery
 from executive.tree.compiling.builder import PlanBuilder, after
 from executive.tree.compiling.handling import LOOK_AGAIN_S, held_plan, pick_up_plan
 from executive.tree.compiling.search import detect_plan
 from executive.tree.node import NodeSpec
+from executive.words.command import Thing
 from skills.api import FLOOR, Cause
 
 LOST_WITHIN_M: Final = 2.0

@@ -19,14 +19,14 @@ from __future__ import annotations
 
 from typing import Final
 
-from executive.mission.command import Thing
-from executive.mission.geometry import inside
 from executive.tree.behaviours.board import BesideBoard, FromBoard, FromBoardOr, beside
 from executive.tree.behaviours.conditions import Holds
 from executive.tree.behaviours.recovery import Recovery
 from executive.tree.compiling.aside import can_move_aside, move_aside_plan
 from executive.tree.compiling.builder import PlanBuilder, after
 from executive.tree.node import NodeSpec
+from executive.words.command import Thing
+from executive.words.geometry import inside
 from skills.api import Cause, Surface
 from skills.robot import Pose2D
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from executive.mission.knowledge import Pose
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import BatteryForWork, KnowsPlace, NoStopButton, OwnLease
 from executive.tree.behaviours.recovery import Recovery
 from executive.tree.compiling.builder import PlanBuilder, after, pose_2d
 from executive.tree.node import NodeSpec
+from executive.words.knowledge import Pose
 from skills.api import Cause
 from skills.robot import Pose2D
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from executive.mission.command import Command
-from executive.mission.goal import GoalCondition
 from executive.mission.gripper import InGripper
 from executive.tree.node import NodeSpec
+from executive.words.command import Command
+from executive.words.goal import GoalCondition
 from skills.api import Skill
 
 __all__ = ["Assembled", "StepPart"]

@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from executive.mission.file.model import OnFailure, StepGuards, StepPolicy
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import BatteryAtLeast, Condition, KnowsPlace, NotAfter
 from executive.tree.behaviours.policies import FINAL_CAUSES, RETRY, SKIP, STOP
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.node import NodeSpec
+from executive.words.steps import OnFailure, StepGuards, StepPolicy
 from skills.api import Cause
 
 __all__ = ["PolicyFrame", "needs_way_back", "under_policy"]

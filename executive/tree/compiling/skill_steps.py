@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from executive.mission.file.model import SkillCall
-from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
-from executive.tree.compiling.builder import Registry, skill_spec, slug
+from executive.tree.compiling.builder import Registry, skill_spec
 from executive.tree.node import NodeSpec
 from executive.tree.port_values import FROM_KEY, PortValueError, gathered, port_value
 from executive.tree.registry import missing
 from executive.tree.types import field_types
+from executive.words.knowledge import Knowledge
+from executive.words.slug import slug
+from executive.words.steps import SkillCall
 from skills.api import Skill
 from skills.files.errors import SourceLine, listing, suggestion
 

@@ -7,9 +7,6 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from executive.mission.command import START, TIME_UNITS_S, Task, Thing
-from executive.mission.geometry import inside
-from executive.mission.knowledge import ANYBODY, ANYTHING
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import Holds, HoldsNothingElse
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
@@ -26,6 +23,9 @@ from executive.tree.compiling.search import (
     where,
 )
 from executive.tree.node import NodeSpec
+from executive.words.command import START, TIME_UNITS_S, Task, Thing
+from executive.words.geometry import inside
+from executive.words.knowledge import ANYBODY, ANYTHING
 from skills.detect.words import numbered, plural
 from skills.robot import Pose2D
 

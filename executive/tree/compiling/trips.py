@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from executive.mission.command import START, Command, Task
-from executive.mission.goal import surfaces_to_search
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.compiling.steps import carry_plan, grasp_plan
 from executive.tree.node import NodeSpec
+from executive.words.command import START, Command, Task
+from executive.words.goal import surfaces_to_search
 
 __all__ = ["are_trips", "refuse_several", "trips_plan"]
 

@@ -3,8 +3,8 @@
 import random
 from dataclasses import dataclass
 
-from executive.mission.command import Task
-from executive.mission.knowledge import Knowledge
+from executive.words.command import Task
+from executive.words.knowledge import Knowledge
 
 GREETINGS = ("Hey {robot}, ", "Hi {robot}, ", "OK {robot}, ", "{robot}, ")
 POLITE = ("", "", "", "please ", "could you ", "can you please ", "would you ")

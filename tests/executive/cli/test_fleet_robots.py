@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from executive.cli.fleet_robots import FleetRobot, Offers
-from executive.mission.knowledge import BatteryFacts, SurfaceFacts
+from executive.words.knowledge import BatteryFacts, SurfaceFacts
 from skills.robot import Pose2D
 
 TABLE = SurfaceFacts.model_validate(

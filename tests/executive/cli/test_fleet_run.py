@@ -19,8 +19,6 @@ from executive.cli.fleet_run import run_fleet
 from executive.cli.page_view import PageView
 from executive.cli.requests import Prepared
 from executive.fleet.auction import Bid
-from executive.mission.command import Command, Task, parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.mission.mission import lines_of
 from executive.mission.request import Request
 from executive.record.reader import read_events
@@ -28,6 +26,8 @@ from executive.run.runner import RunEntry
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
+from executive.words.command import Command, Task, parse_command
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.faults.faulty_robot import with_faults
 from skills.files.errors import InputError

@@ -5,12 +5,12 @@ import dataclasses
 import pytest
 
 from executive.cli.goal_conditions import condition_of, conditions_of, verdict_of
-from executive.mission.command import parse_command
-from executive.mission.expression import Template
-from executive.mission.file import blocks
-from executive.mission.file.model import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
-from executive.mission.goal import command_goal
 from executive.tree.compiler import compile_mission
+from executive.words import blocks
+from executive.words.command import parse_command
+from executive.words.expression import Template
+from executive.words.goal import command_goal
+from executive.words.steps import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from plant.referee import GoalKind, Verdict, When
 from skills.speak.skill import Speak
 

@@ -12,8 +12,8 @@ import executive.cli.listen_command as listen_command
 from executive.cli.entry import app
 from executive.cli.listen_command import answer_line, hear_request, show_hearing
 from executive.language.understand import Status, Understanding
-from executive.mission.robots import RobotSetup
 from executive.speech.microphone import follow
+from executive.words.robots import RobotSetup
 from skills.files.errors import InputError
 
 GO = "Hey Alice, go to the kitchen."

@@ -14,7 +14,6 @@ from typer.testing import CliRunner
 from executive.cli import entry, main, queue_run, requests
 from executive.cli.mission_run import Finished
 from executive.cli.report import RefereeReport, RunReport
-from executive.mission.command import Command
 from executive.mission.mission import mission_from_commands
 from executive.run.journal import TickNote
 from executive.store.missions import MissionStore
@@ -23,6 +22,7 @@ from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
 from executive.tree.registry import installed_skills
 from executive.tree.snapshot import Change, NodeState
+from executive.words.command import Command
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 

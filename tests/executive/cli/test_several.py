@@ -9,7 +9,7 @@ from executive.cli.requests import prepare
 from executive.cli.wake_check import refuse_unaddressed
 from executive.cli.worlds import open_world
 from executive.mission.request import Request, Start
-from executive.mission.robots import RobotSetup
+from executive.words.robots import RobotSetup
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 

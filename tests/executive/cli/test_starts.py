@@ -6,7 +6,7 @@ import pytest
 
 from executive.cli.starts import PlacedRobot, alone, knowledge_for, placed_robots
 from executive.cli.worlds import knowledge_of, open_world
-from executive.mission.robots import RobotSetup
+from executive.words.robots import RobotSetup
 from plant.worlds.placement import place_people
 from skills.files.errors import InputError
 from skills.robot import Pose2D

@@ -6,8 +6,8 @@ from executive.cli.requests import prepare
 from executive.cli.talk import Talk
 from executive.conversation import ReplyKind
 from executive.mission.request import Request
-from executive.mission.robots import RobotSetup
 from executive.run.control import Control, Mode
+from executive.words.robots import RobotSetup
 
 TWO = {"alice": RobotSetup("spot"), "bob": RobotSetup("spot")}
 

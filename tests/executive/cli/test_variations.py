@@ -9,7 +9,7 @@ import pytest
 from executive.cli.requests import prepare
 from executive.cli.variations import plant_variation
 from executive.mission.request import Request
-from executive.mission.variation import Variation
+from executive.words.variation import Variation
 from plant.worlds.lights import LIGHTS
 from plant.worlds.placement import place_people
 from skills.files.errors import InputError

@@ -3,13 +3,13 @@
 import pytest
 
 from executive.cli.goal_conditions import Share, conditions_of
-from executive.mission.command import parse_command
-from executive.mission.condition import DoorOpen, Look, ValueIs
-from executive.mission.expression import Expression
-from executive.mission.file import blocks
-from executive.mission.file.model import Mission, MissionStep, SkillCall, StepPolicy
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
+from executive.words import blocks
+from executive.words.command import parse_command
+from executive.words.condition import DoorOpen, Look, ValueIs
+from executive.words.expression import Expression
+from executive.words.steps import Mission, MissionStep, SkillCall, StepPolicy
 from plant.referee import GoalKind, When
 from skills.api import Cause, Failed, Succeeded
 from skills.check_door.skill import CheckDoorInputs

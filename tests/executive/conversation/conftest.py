@@ -5,10 +5,10 @@ import pytest
 from executive.conversation import Conversation, Speech
 from executive.language.parser import load_parser
 from executive.language.understand import understand
-from executive.mission.file.model import MissionStep
 from executive.mission.mission import mission_from_steps
 from executive.run.control import Control
 from executive.tree.compiler import compile_mission
+from executive.words.steps import MissionStep
 
 
 @pytest.fixture(scope="session")

@@ -6,11 +6,11 @@ from dataclasses import replace
 import pytest
 
 from executive.conversation import Conversation, ReplyKind
-from executive.mission.command import Command
-from executive.mission.file.model import MissionStep
-from executive.mission.written import written
 from executive.run.control import Mode
 from executive.run.outcome import Outcome
+from executive.words.command import Command
+from executive.words.steps import MissionStep
+from executive.words.written import written
 from skills.api import Question
 from skills.testing.clock import VirtualClock
 

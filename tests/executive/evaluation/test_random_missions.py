@@ -7,7 +7,7 @@ import pytest
 from executive.evaluation.random_missions import KINDS, TURNS, KnownWorld, random_evaluation, random_sentence
 from executive.language.parser import load_parser
 from executive.language.understand import Status, understand
-from executive.mission.knowledge import Knowledge, load_knowledge
+from executive.words.knowledge import Knowledge, load_knowledge
 from plant.worlds.world import known_worlds, load_world
 
 

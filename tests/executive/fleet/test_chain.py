@@ -2,7 +2,7 @@
 
 from executive.fleet.auction import Bid
 from executive.fleet.chain import Split, soonest, splits
-from executive.mission.command import parse_command
+from executive.words.command import parse_command
 
 TAKE, PUT, GO = map(
     parse_command,

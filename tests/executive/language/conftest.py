@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from executive.language.parser import load_parser
-from executive.mission.knowledge import load_knowledge
+from executive.words.knowledge import load_knowledge
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from executive.language.followups import Amendment, FollowUpKind, amended, follow_up_of, without_fetching
-from executive.mission.command import parse_command
+from executive.words.command import parse_command
 from skills.api import Thing
 
 FETCH = tuple(

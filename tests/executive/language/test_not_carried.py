@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from executive.language.understand import Status, understand
-from executive.mission.command import parse_command
+from executive.words.command import parse_command
 
 ROWS = yaml.safe_load(Path(__file__).with_name("not_carried.yaml").read_text(encoding="utf-8"))
 SENTENCES = [(kind, text, part) for kind, rows in ROWS.items() for text, part in rows.items()]

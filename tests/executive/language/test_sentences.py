@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from executive.language.understand import Status, understand
-from executive.mission.command import parse_command
+from executive.words.command import parse_command
 
 FAMILIES = {
     file.stem: yaml.safe_load(file.read_text(encoding="utf-8"))

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from executive.language.understand import Status, parse_lines, understand
-from executive.mission.command import parse_command
+from executive.words.command import parse_command
 
 HERE = Path(__file__).parent
 FAMILIES = yaml.safe_load((HERE / "sentences.yaml").read_text(encoding="utf-8"))

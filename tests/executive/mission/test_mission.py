@@ -3,11 +3,7 @@ from pathlib import Path
 import pytest
 
 from executive.language.parser import load_parser
-from executive.mission.command import Command, parse_command
-from executive.mission.file.blocks import Repeat
-from executive.mission.file.model import MissionStep, SourceLine
 from executive.mission.file.resolve import load_mission, mission_from_file
-from executive.mission.knowledge import load_knowledge
 from executive.mission.mission import (
     lines_of,
     mission_from_commands,
@@ -15,7 +11,11 @@ from executive.mission.mission import (
     mission_from_meaning,
     understood,
 )
-from executive.mission.written import written
+from executive.words.blocks import Repeat
+from executive.words.command import Command, parse_command
+from executive.words.knowledge import load_knowledge
+from executive.words.steps import MissionStep, SourceLine
+from executive.words.written import written
 from skills.files.errors import InputError
 
 WORLD = Path(__file__).parents[1] / "language" / "world.yaml"

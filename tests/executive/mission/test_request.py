@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from executive.mission.request import Request, Start
-from executive.mission.robots import RobotSetup
+from executive.words.robots import RobotSetup
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from executive.mission.knowledge import Door, Knowledge, Person, Place, Pose, SurfaceFacts, ThingFacts
 from executive.mission.scenario import Scenario
 from executive.mission.scenario_file import load_scenario, scenario_of
+from executive.words.knowledge import Door, Knowledge, Person, Place, Pose, SurfaceFacts, ThingFacts
 from skills.files.errors import InputError
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))

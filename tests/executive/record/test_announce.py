@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from executive.mission.command import parse_command
 from executive.record.announce import announce, goal_position
+from executive.words.command import parse_command
 
 
 def test_run_and_commands_are_announced(compiled, make, knowledge, clock):

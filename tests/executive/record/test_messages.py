@@ -2,8 +2,8 @@ import math
 
 import pytest
 
-from executive.mission.command import Task, parse_command
 from executive.record.messages import TaskMessage, command_type, task_messages
+from executive.words.command import Task, parse_command
 
 CLASSES = {"drink": ("coke", "beer"), "hammer": ("hammer",), "unicorn": ("unicorn",)}
 

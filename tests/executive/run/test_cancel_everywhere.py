@@ -5,13 +5,13 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from executive.mission.command import parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
+from executive.words.command import parse_command
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause, ObjectObservation, Running, Skill, Succeeded, Thing
 from skills.robot import ArmTrajectory

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import pytest
 from py_trees.common import Status
 
-from executive.mission.command import parse_command
-from executive.mission.file.blocks import Group
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.run.control import Control, Mode
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
+from executive.words.blocks import Group
+from executive.words.command import parse_command
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from skills.api import Question
 
 GO = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"

@@ -2,13 +2,13 @@
 
 import pytest
 
-from executive.mission.command import parse_command
-from executive.mission.expression import Expression, Template
-from executive.mission.file.blocks import Ask, Group, Set, Try, Wait
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep, SkillCall, StepPolicy
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
+from executive.words.blocks import Ask, Group, Set, Try, Wait
+from executive.words.command import parse_command
+from executive.words.expression import Expression, Template
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep, SkillCall, StepPolicy
 from skills.api import Cause, Failed
 
 

@@ -6,13 +6,13 @@ import time
 import pytest
 from py_trees.common import Status
 
-from executive.mission.command import parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
+from executive.words.command import parse_command
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from skills.api import Cause, Failed, Succeeded
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from executive.language.parser import load_parser
-from executive.mission.knowledge import load_knowledge
+from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -10,12 +10,12 @@ import pytest
 from py_trees.common import Status
 
 from executive.mission.request import Request, Start
-from executive.mission.robots import RobotSetup
 from executive.mission.scenario import Scenario
 from executive.run.journal import TickNote
 from executive.store.database import VERSION
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.snapshot import Change, NodeState
+from executive.words.robots import RobotSetup
 from skills.api import Cause
 from skills.files.errors import InputError
 from skills.robot import Pose2D

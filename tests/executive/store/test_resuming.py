@@ -6,8 +6,6 @@ from typing import ClassVar
 import pytest
 from py_trees.common import Status
 
-from executive.mission.command import parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep, StepPolicy
 from executive.mission.request import Request
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
@@ -18,6 +16,8 @@ from executive.store.resuming import resumed_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.node import NodeSpec
 from executive.tree.registry import installed_skills
+from executive.words.command import parse_command
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep, StepPolicy
 from skills.api import Cause, Failed, ObjectObservation, Running, Succeeded, Surface, Thing
 from skills.quantities import Coordinate, Length
 

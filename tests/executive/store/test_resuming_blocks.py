@@ -5,11 +5,6 @@ from typing import ClassVar
 
 import pytest
 
-from executive.mission.command import parse_command
-from executive.mission.condition import Look, Not, ValueIs
-from executive.mission.expression import Expression, Template
-from executive.mission.file.blocks import Ask, Check, Choose, Group, Repeat, Set, Together, Try, Wait
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.outcome import Outcome
@@ -18,6 +13,11 @@ from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.store.resuming import resumed_tree
 from executive.tree.compiler import compile_mission
+from executive.words.blocks import Ask, Check, Choose, Group, Repeat, Set, Together, Try, Wait
+from executive.words.command import parse_command
+from executive.words.condition import Look, Not, ValueIs
+from executive.words.expression import Expression, Template
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 
 REQUEST = Request("blocks", seed=3, name="m", world_name="flat", robot="Alice", fingerprint="print")

@@ -4,10 +4,7 @@ from collections import Counter
 
 import pytest
 
-from executive.mission.command import parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.mission.request import Request
-from executive.mission.robots import RobotSetup
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
@@ -15,6 +12,9 @@ from executive.store.missions import MissionStore
 from executive.store.resuming import BEFORE, ended_tree, resumed_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
+from executive.words.command import parse_command
+from executive.words.robots import RobotSetup
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from skills.api import Cause, Failed, Running, Succeeded
 
 TAKE_AND_PUT = (

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.mission.command import parse_command
-from executive.mission.condition import Look
-from executive.mission.file.blocks import Repeat, Together, Wait
-from executive.mission.file.model import Mission, MissionStep, SkillCall, StepPolicy
 from executive.tree.check import Abilities, PlannedRoutes, check_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.estimate import Route, load_estimates
+from executive.words.blocks import Repeat, Together, Wait
+from executive.words.command import parse_command
+from executive.words.condition import Look
+from executive.words.steps import Mission, MissionStep, SkillCall, StepPolicy
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap
 from skills.files.errors import SourceLine

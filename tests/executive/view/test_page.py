@@ -15,8 +15,6 @@ import pytest
 from executive.conversation import Conversation, Speech
 from executive.language.questions import ClarifyingQuestion, Slot
 from executive.language.understand import Status, Understanding
-from executive.mission.command import parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.record.event_log import EventLog
 from executive.record.history import read_history
 from executive.record.surroundings import map_message
@@ -32,6 +30,8 @@ from executive.view.report_page import AnswerRow, ReportPage, StepRow, Verdict, 
 from executive.view.server import PageContent, PageServer
 from executive.view.styles import Styles
 from executive.view.watch import SEND_LIMIT_S, ControlWatch
+from executive.words.command import parse_command
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from skills.api import Cause, Failed, Question
 from skills.estimate.grid_map import GridMap
 from skills.robot import Pose2D

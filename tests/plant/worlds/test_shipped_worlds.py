@@ -15,8 +15,8 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-from executive.mission.knowledge import load_knowledge
 from executive.tree.compiling.doors import view_of
+from executive.words.knowledge import load_knowledge
 from plant.worlds.builder.__main__ import build
 from plant.worlds.builder.plan import PLANS, load_plan
 from plant.worlds.placement import place_objects, place_people

@@ -8,8 +8,8 @@ import pytest
 
 from executive.mission.file.resolve import load_mission
 from executive.mission.file.schema import MissionFile
-from executive.mission.knowledge import load_knowledge
 from executive.mission.stack_file import load_stack
+from executive.words.knowledge import load_knowledge
 from skills.files.errors import InputError
 from skills.files.yaml_source import MAX_BYTES, YamlSource, read_yaml
 from tests.hostile_values import FILES

@@ -1,7 +1,7 @@
 import pytest
 
 from executive.language.understand import understand
-from executive.mission.knowledge import load_knowledge
+from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
 
 

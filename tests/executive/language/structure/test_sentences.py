@@ -7,7 +7,7 @@ import yaml
 
 from executive.language.structure.sentence import MOST_NESTED
 from executive.language.understand import Status, understand, understand_asking
-from executive.mission.written import parse_written, written
+from executive.words.written import parse_written, written
 
 HERE = Path(__file__).parent
 

@@ -8,9 +8,9 @@ import pytest
 from executive.language.parser import load_parser
 from executive.mission.file.overrides import overridden
 from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
-from executive.mission.knowledge import load_knowledge
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
+from executive.words.knowledge import load_knowledge
 
 ROOT = Path(__file__).parents[4]
 

@@ -5,10 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from executive.mission.command import Command, Task, Thing
-from executive.mission.condition import AllOf, AnyOf, ButtonPressed, Look, Not, ValueIs
-from executive.mission.expression import Expression, Template
-from executive.mission.file.blocks import (
+from executive.mission.file.resolve import MAX_NESTING, MAX_STEPS, mission_from_file
+from executive.words.blocks import (
     Ask,
     Check,
     Choose,
@@ -23,7 +21,9 @@ from executive.mission.file.blocks import (
     Wait,
     steps_of,
 )
-from executive.mission.file.resolve import MAX_NESTING, MAX_STEPS, mission_from_file
+from executive.words.command import Command, Task, Thing
+from executive.words.condition import AllOf, AnyOf, ButtonPressed, Look, Not, ValueIs
+from executive.words.expression import Expression, Template
 from skills.files.errors import InputError
 
 KITCHEN, HALL = Command(goal="kitchen"), Command(goal="hall")

@@ -4,7 +4,7 @@ import pytest
 
 from executive.mission.file.overrides import overridden
 from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
-from executive.mission.robots import RobotSetup, robots_in
+from executive.words.robots import RobotSetup, robots_in
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from executive.mission.file.model import OnFailure, OperatorQuestion, StaleData, StepGuards, StepPolicy
 from executive.mission.file.resolve import load_mission
 from executive.mission.file.schema import MissionFile, mission_json_schema
+from executive.words.steps import OnFailure, OperatorQuestion, StaleData, StepGuards, StepPolicy
 from skills.files.errors import InputError
 
 GOOD = """\

@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 from py_trees.common import Status
 
-from executive.mission.expression import Template
 from executive.run.control import Control
 from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.behaviours.ask import SPEECH_TOPIC, AskPeople
 from executive.tree.behaviours.suspension import suspend
+from executive.words.expression import Template
 from skills.api import Cause
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID

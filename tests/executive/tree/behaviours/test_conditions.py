@@ -6,7 +6,6 @@ import pytest
 from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
-from executive.mission.file.model import StaleData
 from executive.tree.behaviours.conditions import (
     BatteryAtLeast,
     BatteryForWork,
@@ -19,6 +18,7 @@ from executive.tree.behaviours.conditions import (
     Waiting,
 )
 from executive.tree.behaviours.decorators import Guard
+from executive.words.steps import StaleData
 from skills.api import Cause, Failed
 from skills.robot import Lease, Pose2D
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from py_trees.common import Status
 
-from executive.mission.expression import Expression, Template
 from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.behaviours.conditions import Waiting
 from executive.tree.behaviours.decisions import (
@@ -27,6 +26,7 @@ from executive.tree.behaviours.decisions import (
     WaitUntilClock,
 )
 from executive.tree.behaviours.suspension import suspend
+from executive.words.expression import Expression, Template
 from skills.api import Cause, Failed
 
 _spec = importlib.util.spec_from_file_location("scripted_leaf", Path(__file__).with_name("scripted.py"))

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from executive.mission.command import parse_command
-from executive.mission.file.model import Mission, MissionStep, StepPolicy
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
+from executive.words.command import parse_command
+from executive.words.steps import Mission, MissionStep, StepPolicy
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Surface, Thing
 from skills.quantities import Coordinate, Length
 from skills.robot import Pose2D

@@ -4,10 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from executive.mission.command import parse_command
-from executive.mission.condition import ButtonPressed, Condition, Look, Not, ValueIs
-from executive.mission.expression import Expression, Template
-from executive.mission.file.blocks import (
+from executive.tree.compiler import compile_mission
+from executive.words.blocks import (
     Ask,
     Check,
     Choose,
@@ -21,8 +19,10 @@ from executive.mission.file.blocks import (
     Try,
     Wait,
 )
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep, OnFailure, SkillCall, StepPolicy
-from executive.tree.compiler import compile_mission
+from executive.words.command import parse_command
+from executive.words.condition import ButtonPressed, Condition, Look, Not, ValueIs
+from executive.words.expression import Expression, Template
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from skills.files.errors import InputError
 
 HOLDING, PRESSED = ValueIs(Expression("holding")), ButtonPressed("go")

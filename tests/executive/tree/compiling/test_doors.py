@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from executive.mission.command import Command
-from executive.mission.knowledge import Door, Knowledge
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.compiling.doors import door_plan, view_of
+from executive.words.command import Command
+from executive.words.knowledge import Door, Knowledge
 from skills.back_off.skill import BackOff
 from skills.check_door.skill import CheckDoor
 from skills.clear_costmap.skill import ClearCostmap

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from executive.mission.command import parse_command
-from executive.mission.condition import AllOf, AnyOf, Look, Not, ValueIs
-from executive.mission.expression import Expression
-from executive.mission.file.blocks import Check, Choose, Group, Handler, Repeat, Set, Together, Try, Wait
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep, SkillCall, StepPolicy
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
+from executive.words.blocks import Check, Choose, Group, Handler, Repeat, Set, Together, Try, Wait
+from executive.words.command import parse_command
+from executive.words.condition import AllOf, AnyOf, Look, Not, ValueIs
+from executive.words.expression import Expression
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep, SkillCall, StepPolicy
 from skills.api import Cause, Failed, Succeeded
 
 BEER = Look(parse_command("Take [Nothing] to [shelf] and do [find] to [beer]"))

@@ -2,11 +2,11 @@
 
 import pytest
 
-from executive.mission.command import parse_command
-from executive.mission.file.model import Mission, MissionStep, OnFailure, OperatorQuestion, StepGuards, StepPolicy
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
+from executive.words.command import parse_command
+from executive.words.steps import Mission, MissionStep, OnFailure, OperatorQuestion, StepGuards, StepPolicy
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.robot import Battery
 

@@ -4,9 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from executive.mission.command import parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
-from executive.mission.knowledge import load_knowledge
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.run.runner import RunSettings
@@ -14,6 +11,9 @@ from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiler import compile_mission
 from executive.tree.compiling.search import surfaces_elsewhere
 from executive.tree.registry import built_in_skills
+from executive.words.command import parse_command
+from executive.words.knowledge import load_knowledge
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from skills.api import Cause, Failed, Succeeded, Thing
 from skills.robot import Pose2D
 

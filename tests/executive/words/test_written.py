@@ -4,10 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from executive.mission.command import Command, Task, Thing
-from executive.mission.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
-from executive.mission.expression import Expression, Template
-from executive.mission.file.blocks import (
+from executive.words.blocks import (
     Ask,
     Check,
     Choose,
@@ -21,8 +18,11 @@ from executive.mission.file.blocks import (
     Try,
     Wait,
 )
-from executive.mission.file.model import MissionStep, OnFailure, SkillCall, StepPolicy
-from executive.mission.written import parse_written, written
+from executive.words.command import Command, Task, Thing
+from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
+from executive.words.expression import Expression, Template
+from executive.words.steps import MissionStep, OnFailure, SkillCall, StepPolicy
+from executive.words.written import parse_written, written
 
 texts = st.text(st.characters(exclude_characters="{}", exclude_categories=["Cs"]), max_size=12)
 names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=8)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from executive.mission.command import START, Command, Task, Thing
-from executive.mission.knowledge import ANYBODY, Knowledge, Pose
+from executive.words.command import START, Command, Task, Thing
+from executive.words.knowledge import ANYBODY, Knowledge, Pose
 
 __all__ = [
     "Area",

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from executive.mission.command import Command
-from executive.mission.expression import Value
-from executive.mission.file.blocks import Block, Group, steps_of
+from executive.words.blocks import Block, Group, steps_of
+from executive.words.command import Command
+from executive.words.expression import Value
 from skills.files.errors import InputError, SourceLine
 
 __all__ = [

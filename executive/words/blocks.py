@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from executive.mission.condition import Condition
-from executive.mission.expression import Expression, Template, Value
+from executive.words.condition import Condition
+from executive.words.expression import Expression, Template, Value
 
 if TYPE_CHECKING:
-    from executive.mission.file.model import MissionStep
+    from executive.words.steps import MissionStep
 
 __all__ = [
     "Ask",

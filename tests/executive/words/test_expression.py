@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from executive.mission.expression import (
+from executive.words.expression import (
     FUNCTIONS,
     LARGEST,
     MOST_DEPTH,

@@ -1,7 +1,7 @@
 import pytest
 
-from executive.mission.command import Task
-from executive.mission.knowledge import load_knowledge
+from executive.words.command import Task
+from executive.words.knowledge import load_knowledge
 from skills.files.errors import InputError
 
 WORLD = """\

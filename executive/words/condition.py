@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, Any, Final
 
-from executive.mission.command import Command
-from executive.mission.expression import Expression, Kind
+from executive.words.command import Command
+from executive.words.expression import Expression, Kind
 from skills.quantities import Quantity, Share
 
 __all__ = [

@@ -18,10 +18,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final
 
-from executive.mission.command import Command, parse_command
-from executive.mission.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
-from executive.mission.expression import Expression, ExpressionError, Template
-from executive.mission.file.blocks import (
+from executive.words.blocks import (
     Ask,
     Block,
     Check,
@@ -36,7 +33,10 @@ from executive.mission.file.blocks import (
     Try,
     Wait,
 )
-from executive.mission.file.model import MissionStep
+from executive.words.command import Command, parse_command
+from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
+from executive.words.expression import Expression, ExpressionError, Template
+from executive.words.steps import MissionStep
 
 __all__ = ["parse_written", "written", "written_condition"]
 

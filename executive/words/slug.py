@@ -1,0 +1,21 @@
+"""Names as parts of path ids and of file names."""
+
+import re
+import zlib
+from typing import Final
+
+__all__ = ["slug"]
+
+LONGEST_SLUG: Final = 80
+
+
+def slug(text: str) -> str:
+    """Text as one part of a path id or of a file's name: lower case, words joined by hyphens, no dots or slashes.
+
+    A long text is cut off and ends with its checksum, so that others with the same beginning differ from it.
+    """
+    words = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "unnamed"
+    if len(words) <= LONGEST_SLUG:
+        return words
+    checksum = f"{zlib.crc32(words.encode()):08x}"
+    return f"{words[: LONGEST_SLUG - len(checksum) - 1].rstrip('-')}-{checksum}"

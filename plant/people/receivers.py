@@ -7,18 +7,235 @@ is a force on the object, and ends as soon as the gripper gives way.
 
 from __future__ import annotations
 
+import enum
+import math
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
-from pydrake.multibody.math import SpatialForce
+from pydrake.common.eigen_geometry import AngleAxis
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.math import SpatialForce, SpatialVelocity
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.framework import Context
 
-from plant.diagram import WorldDiagram
-from plant.people.offers import Offers
-from plant.people.receiver import Receiver
-from plant.snapshot.values import State
+from plant.diagram import X_PT_HOME, WorldDiagram
+from plant.people.offers import Offer, Offers
+from plant.snapshot.values import State, array_of, transform_state
 from plant.worlds.placement import Receiving
+from skills.robot import FloatArray
+
+REACH_M = 1.0
+BELOW_M = 0.018
+"""So far below the lowest point of what is held out the tray is held."""
+UNDER_M = 0.15
+"""From so far below it the tray is raised."""
+SPEED_M_S, TURN_RAD_S = 0.3, 1.5
+PULL_S, RAMP_S, PAUSE_S = 6.0, 0.6, 4.0
+DOWN = 0.95
+"""The share of the pull that goes down, beside that towards the person."""
+GIVES_M, GIVES_RAD = 0.01, 0.03
+"""The gripper gives way: the object has moved so far in the hand since the pull began, or the fingers have opened."""
+DROPS_M = BELOW_M - 0.002
+"""As long as nobody pulls, what creeps in the hand by less is not let go of."""
+SETTLE_S = 1.5
+ON_TRAY_M = 0.25
+_NEAR_M, _ASIDE_M, _DOWN_M = 0.004, 0.05, 0.05
+_MOVED = 1e-9
+
+
+class Phase(enum.Enum):
+    """What a person does."""
+
+    IDLE = "idle"
+    BRINGING = "bringing"
+    PULLING = "pulling"
+    PAUSING = "pausing"
+    RECEIVING = "receiving"
+
+
+class Receiver:
+    """One person. Call `look` now and then, and `move_tray` before each step."""
+
+    def __init__(self, world: WorldDiagram, context: Context, name: str, receiving: Receiving, offers: Offers) -> None:
+        self._plant, self._context, self._offers, self._receiving = world.plant, context, offers, receiving
+        (index,) = world.plant.GetBodyIndices(world.models[name])[:1]
+        self._body, self._tray = world.plant.get_body(index), world.trays[name]
+        self._walks = not world.plant.IsAnchored(self._body)
+        self.phase = Phase.IDLE
+        self.offer: Offer | None = None
+        self._since_s, self._opening = 0.0, 0.0
+        self._p_HO = np.zeros(3)
+        self._home, self._X_WT = True, self._home_W()
+
+    @property
+    def busy(self) -> bool:
+        """Whether they take something, or have something on the tray."""
+        return self.phase is not Phase.IDLE or not self._home
+
+    def look(self, now_s: float) -> None:
+        """Decide what to do next."""
+        if self.offer is None:
+            self.offer = self._offers.near(self._X_WP().translation(), REACH_M, now_s - self._receiving.reaction_s)
+            if self.offer is not None:
+                self._grip(self.offer)
+                self._turn_to(Phase.BRINGING, now_s)
+        elif self.phase is Phase.RECEIVING:
+            if now_s - self._since_s > SETTLE_S:
+                self._end_receiving(self.offer, now_s)
+        elif self._gives(self.offer, moved_m=DROPS_M if self.phase is Phase.BRINGING else GIVES_M):
+            self._turn_to(Phase.RECEIVING, now_s)
+        elif not self._offers.holds(self.offer):
+            self._go_home(now_s)
+        else:
+            self._go_on(self.offer, now_s)
+
+    def _go_on(self, offer: Offer, now_s: float) -> None:
+        """The next phase while something is held out."""
+        for_s = now_s - self._since_s
+        off_m = float(np.linalg.norm(self._under(offer).translation() - self._X_WT.translation()))
+        if self.phase is Phase.PULLING and for_s > PULL_S:
+            self._turn_to(Phase.PAUSING, now_s)
+        elif (self.phase is Phase.BRINGING and off_m < _NEAR_M) or (self.phase is Phase.PAUSING and for_s > PAUSE_S):
+            self._grip(offer)
+            self._turn_to(Phase.PULLING, now_s)
+
+    def _end_receiving(self, offer: Offer, now_s: float) -> None:
+        """Pull again when the gripper still holds the object; put the tray away when the object is not on it."""
+        if self._offers.grips(offer) and self._offers.holds(offer):
+            self._grip(offer)
+            self._turn_to(Phase.PULLING, now_s)
+        elif not self._on_tray(offer):
+            self._go_home(now_s)
+
+    def _grip(self, offer: Offer) -> None:
+        """Note how the gripper has the object, against which it is seen to give way."""
+        self._opening, self._p_HO = self._offers.opening(offer.robot), self._offers.in_hand(offer)
+
+    def _gives(self, offer: Offer, opens_rad: float = GIVES_RAD, moved_m: float = GIVES_M) -> bool:
+        """Whether the gripper gives way: somebody who pulls feels it sooner."""
+        opened = self._offers.opening(offer.robot) - self._opening > opens_rad
+        return opened or float(np.linalg.norm(self._offers.in_hand(offer) - self._p_HO)) > moved_m
+
+    def pull_W(self, now_s: float) -> FloatArray | None:
+        """The force (N, world) on the object; it ends for good when the gripper gives way."""
+        if self.offer is None or self.phase is not Phase.PULLING:
+            return None
+        if self._gives(self.offer, 0.5 * GIVES_RAD):
+            self._turn_to(Phase.RECEIVING, now_s)
+            return None
+        to_person = self._X_WP().translation()[:2] - self._offers.place_W(self.offer)[:2]
+        along = to_person / max(float(np.linalg.norm(to_person)), 1e-6)
+        force_n = self._receiving.pull_n * min(1.0, (now_s - self._since_s) / RAMP_S)
+        return np.asarray(force_n * np.array([*(math.sqrt(1.0 - DOWN**2) * along), -DOWN]))
+
+    def move_tray(self, dt_s: float) -> None:
+        """Put the tray where it is, with the velocity that leads to where it will be after dt_s."""
+        if self.phase is Phase.IDLE and self._home:
+            if self._walks:
+                self._X_WT = self._home_W()
+                self._set(self._X_WT, SpatialVelocity.Zero())
+            return
+        here, goal = self._X_WT, self._goal()
+        self._X_WT, velocity = _towards(here, goal, dt_s)
+        self._set(here, velocity)
+        self._home = self.phase is Phase.IDLE and self._X_WT.IsNearlyEqualTo(self._home_W(), _MOVED)
+        if self._home:
+            self._set(self._X_WT, SpatialVelocity.Zero())
+
+    def _goal(self) -> RigidTransform:
+        """Where the tray is to go."""
+        if self.phase is Phase.IDLE or self.offer is None:
+            return self._way_home()
+        if self.phase is Phase.RECEIVING:
+            return self._X_WT
+        under = self._under(self.offer)
+        aside_m = float(np.linalg.norm((under.translation() - self._X_WT.translation())[:2]))
+        if self.phase is Phase.BRINGING and aside_m > _ASIDE_M:
+            return self._way_under(under)
+        return under
+
+    def _way_under(self, under: RigidTransform) -> RigidTransform:
+        """First down before the body, lower than what is held out hangs, then below it."""
+        here, level_m = self._X_WT.translation(), float(under.translation()[2]) - UNDER_M
+        xy = here[:2] if here[2] > level_m + _NEAR_M else under.translation()[:2]
+        return RigidTransform(under.rotation(), np.array([*xy, level_m]))
+
+    def _way_home(self) -> RigidTransform:
+        """First back to the body, level and a little down, as something may be above the tray; then into the torso."""
+        home, here = self._home_W(), self._X_WT
+        p_W = np.array([*home.translation()[:2], here.translation()[2] - _DOWN_M])
+        aside_m = float(np.linalg.norm((p_W - here.translation())[:2]))
+        return RigidTransform(here.rotation(), p_W) if aside_m > _ASIDE_M else home
+
+    def _under(self, offer: Offer) -> RigidTransform:
+        """Where the tray is just below what is held out, its handle towards the person."""
+        x, y, _ = place_W = self._offers.place_W(offer)
+        from_person = place_W - self._X_WP().translation()
+        yaw_rad = math.atan2(from_person[1], from_person[0])
+        level_m = self._offers.lowest_m(offer) - BELOW_M
+        return RigidTransform(RotationMatrix.MakeZRotation(yaw_rad), np.array([x, y, level_m]))
+
+    def _on_tray(self, offer: Offer) -> bool:
+        """Whether the object is on the tray or just above it."""
+        x, y, z = self._X_WT.inverse() @ self._offers.place_W(offer)
+        return math.hypot(x, y) < ON_TRAY_M and -BELOW_M < z < ON_TRAY_M
+
+    def _turn_to(self, phase: Phase, now_s: float) -> None:
+        self.phase, self._since_s, self._home = phase, now_s, False
+
+    def _go_home(self, now_s: float) -> None:
+        """What was held out is gone: put the tray away."""
+        self.offer = None
+        self._turn_to(Phase.IDLE, now_s)
+
+    def _X_WP(self) -> RigidTransform:
+        return self._plant.EvalBodyPoseInWorld(self._context, self._body)
+
+    def _home_W(self) -> RigidTransform:
+        return self._X_WP() @ X_PT_HOME
+
+    def _set(self, X_WT: RigidTransform, V_WT: SpatialVelocity) -> None:
+        """Set the tray's pose and velocity in the plant where they are others."""
+        plant, context, tray = self._plant, self._context, self._tray
+        if not plant.EvalBodyPoseInWorld(context, tray).IsNearlyEqualTo(X_WT, _MOVED):
+            plant.SetFreeBodyPose(context, tray, X_WT)
+        off = plant.EvalBodySpatialVelocityInWorld(context, tray).get_coeffs() - V_WT.get_coeffs()
+        if float(np.abs(off).max()) > _MOVED:
+            plant.SetFreeBodySpatialVelocity(context, tray, V_WT)
+
+    def state(self) -> State:
+        """What the person does."""
+        taken = None if self.offer is None else [self.offer.robot, self.offer.thing]
+        return {
+            "phase": self.phase.value,
+            "offer": taken,
+            "since_s": self._since_s,
+            "opening": self._opening,
+            "p_HO": self._p_HO.tolist(),
+            "home": self._home,
+            "X_WT": transform_state(self._X_WT),
+        }
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state. Raises KeyError: an object is not there."""
+        self.phase, self._since_s, self._home = Phase(state["phase"]), state["since_s"], state["home"]
+        self._opening, self._p_HO = state["opening"], array_of(state["p_HO"])
+        self._X_WT = RigidTransform(np.array(state["X_WT"]))
+        self.offer = None
+        if state["offer"] is not None:
+            robot, thing = state["offer"]
+            self.offer = Offer(robot, thing, self._offers.loose[thing])
+
+
+def _towards(X: RigidTransform, goal: RigidTransform, dt_s: float) -> tuple[RigidTransform, SpatialVelocity]:
+    """The pose after dt_s on the way to a goal, at limited speed, and the velocity that leads there."""
+    way = goal.translation() - X.translation()
+    shift = way * min(1.0, SPEED_M_S * dt_s / max(float(np.linalg.norm(way)), 1e-9))
+    turn = (goal.rotation() @ X.rotation().inverse()).ToAngleAxis()
+    turned = AngleAxis(min(turn.angle(), TURN_RAD_S * dt_s), turn.axis())
+    after = RigidTransform(RotationMatrix(turned) @ X.rotation(), X.translation() + shift)
+    return after, SpatialVelocity(turned.axis() * turned.angle() / dt_s, shift / dt_s)
+
 
 LOOK_STEPS = 4
 """Everybody looks whether something is held out once in so many steps."""

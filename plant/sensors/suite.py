@@ -16,15 +16,12 @@ from pydrake.multibody.tree import RigidBody
 from plant.control.joints import ActuatedJoints, Indices
 from plant.kinds import RobotBody, SensorOptions
 from plant.scene import RENDERER
-from plant.sensors.battery import BatteryModel, BatterySpec
 from plant.sensors.camera import Camera
 from plant.sensors.camera_spec import CameraSpec
 from plant.sensors.gripper import GripperModel, GripperNoise
-from plant.sensors.imu import ImuModel
-from plant.sensors.joints import JointModel
 from plant.sensors.lidar import Lidar, LidarSpec
 from plant.sensors.noisy import NoisySensor
-from plant.sensors.odometry import OdometryModel
+from plant.sensors.proprioception import BatteryModel, BatterySpec, ImuModel, JointModel, OdometryModel
 from plant.snapshot.values import State
 from skills.robot import Battery, FloatArray, FrameTree, Gripper, Image, Imu, Joints, Odometry, Scan
 

@@ -31,7 +31,7 @@ from executive.cli.simulated import SimulatedBackend
 from executive.cli.starts import alone
 from executive.mission.request import Request
 from plant.sensors.lidar import Lidar
-from plant.sensors.odometry import OdometryModel
+from plant.sensors.proprioception import OdometryModel
 from plant.simulation import Simulation
 from plant.spot.model import spot_facts
 from plant.worlds.world import World, load_world

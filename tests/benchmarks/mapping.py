@@ -24,7 +24,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.referee.trajectory import aligned, trajectory_error_m
 from plant.sensors.lidar import Lidar
-from plant.sensors.odometry import OdometryModel
+from plant.sensors.proprioception import OdometryModel
 from plant.simulation import Simulation
 from plant.spot.model import spot_facts
 from plant.worlds.world import load_world

@@ -10,7 +10,7 @@ from pydrake.multibody.math import SpatialVelocity
 from plant.diagram import LooseModel, build_diagram
 from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
-from plant.people.receiver import Phase
+from plant.people.receivers import Phase
 from plant.referee import Referee
 from plant.spot.kind import SPOT
 from plant.worlds.placement import Placement, Receiving

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.sensors.battery import BatteryModel, BatterySpec, discharged
 from plant.sensors.gripper import GripperModel
-from plant.sensors.imu import ImuModel, ImuNoise
-from plant.sensors.joints import JointModel
+from plant.sensors.proprioception import BatteryModel, BatterySpec, ImuModel, ImuNoise, JointModel, discharged
 
 ZERO = np.zeros(3)
 QUIET_IMU = ImuNoise(0.0, 0.0, 0.0, 0.0)

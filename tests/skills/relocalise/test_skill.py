@@ -7,7 +7,7 @@ import pytest
 from analytic_scan import scan_of
 from planar_robot import PlanarClock, PlanarRobot
 
-from skills.relocalise.free_space import FreeSpaceOptions, can_turn, free_m, obstacles_B
+from skills.relocalise.skill import FreeSpaceOptions, can_turn, free_m, obstacles_B
 from skills.robot import Pose2D
 
 OPTIONS = FreeSpaceOptions(side_m=0.15, ahead_m=0.3)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from plant.locomotion.leg_kinematics import LegKinematics, UnreachableFootError
 from plant.models.spot.description import LEGS
+from plant.spot.servos import LegKinematics, UnreachableFootError
 
 
 @pytest.mark.parametrize("leg", LEGS)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.sensors.odometry import OdometryModel, OdometryNoise
+from plant.sensors.proprioception import OdometryModel, OdometryNoise
 
 ZERO = np.zeros(3)
 EXACT = OdometryNoise(*([0.0] * 5), 0.03, 0.03, *([0.0] * 4))

@@ -1,4 +1,4 @@
-from plant.models.spot.visuals import simplified_obj
+from plant.spot.model import simplified_obj
 
 # A square of two triangles with an edge of 1 m, and a sliver of a tenth of a millimetre at its corner.
 SOUP = """mtllib material.mtl

@@ -1,15 +1,141 @@
-"""Dead reckoning as a walking robot does it: right in the short run, drifting with the way gone."""
+"""Proprioceptive sensors with bias and noise: joints, inertial measurement unit, battery, odometry."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.sensors.noisy import NoisySensor
 from plant.snapshot.values import State
-from skills.robot import FloatArray, Odometry, Pose2D
+from skills.robot import Battery, FloatArray, Imu, Joints, Odometry, Pose2D
+
+
+@dataclass(frozen=True)
+class JointNoise:
+    """White noise of each reading, and the encoders' constant offsets, drawn once."""
+
+    offset_rad: float = 0.001
+    position_rad: float = 0.0003
+    velocity_rad_s: float = 0.01
+    effort_nm: float = 0.3
+
+
+class JointModel(NoisySensor):
+    """All joint sensors of one robot."""
+
+    def __init__(self, rng: np.random.Generator, names: Sequence[str], noise: JointNoise | None = None) -> None:
+        """`names` gives the order of the arrays in `update`."""
+        super().__init__(rng)
+        self._names, self._noise = tuple(names), noise or JointNoise()
+        self._offsets = rng.normal(0.0, self._noise.offset_rad, len(self._names))
+
+    def update(
+        self, stamp_s: float, position_rad: FloatArray, velocity_rad_s: FloatArray, effort_nm: FloatArray
+    ) -> Joints:
+        """Reading at stamp_s from the true arrays (joints,). Raises ValueError when a length is wrong."""
+        noise = self._rng.standard_normal((3, len(self._names)))
+        read = (
+            position_rad + self._offsets + self._noise.position_rad * noise[0],
+            velocity_rad_s + self._noise.velocity_rad_s * noise[1],
+            effort_nm + self._noise.effort_nm * noise[2],
+        )
+        position, velocity, effort = (dict(zip(self._names, row.tolist(), strict=True)) for row in read)
+        return Joints(stamp_s, position, velocity, effort)
+
+
+GRAVITY_W = np.array([0.0, 0.0, -9.81])
+
+
+@dataclass(frozen=True)
+class ImuNoise:
+    """Standard deviations of the constant biases and of the white noise of each axis."""
+
+    gyro_bias_rad_s: float = 0.002
+    gyro_rad_s: float = 0.003
+    accelerometer_bias_m_s2: float = 0.03
+    accelerometer_m_s2: float = 0.05
+
+
+class ImuModel(NoisySensor):
+    """The IMU of one robot; acceleration comes from the change of velocity between two updates."""
+
+    kept = ("last",)
+
+    def __init__(self, rng: np.random.Generator, noise: ImuNoise | None = None) -> None:
+        """Draw this run's biases."""
+        super().__init__(rng)
+        self._noise = noise or ImuNoise()
+        self._gyro_bias = rng.normal(0.0, self._noise.gyro_bias_rad_s, 3)
+        self._force_bias = rng.normal(0.0, self._noise.accelerometer_bias_m_s2, 3)
+        self._last: list[Any] | None = None
+
+    def update(self, stamp_s: float, X_WB: RigidTransform, w_WB_W: FloatArray, v_WB_W: FloatArray) -> Imu:
+        """Reading at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in W."""
+        acceleration_W = self._acceleration(stamp_s, np.asarray(v_WB_W, dtype=np.float64))
+        R_BW = X_WB.rotation().matrix().T
+        rates = R_BW @ w_WB_W + self._gyro_bias + self._rng.normal(0.0, self._noise.gyro_rad_s, 3)
+        force = R_BW @ (acceleration_W - GRAVITY_W) + self._force_bias
+        force = force + self._rng.normal(0.0, self._noise.accelerometer_m_s2, 3)
+        return Imu(
+            stamp_s,
+            (float(rates[0]), float(rates[1]), float(rates[2])),
+            (float(force[0]), float(force[1]), float(force[2])),
+        )
+
+    def _acceleration(self, stamp_s: float, v_WB_W: FloatArray) -> FloatArray:
+        """Mean acceleration since the last update, zero at the first."""
+        last, self._last = self._last, [stamp_s, v_WB_W.tolist()]
+        if last is None or stamp_s <= last[0]:
+            return np.zeros(3)
+        return np.asarray((v_WB_W - last[1]) / (stamp_s - last[0]))
+
+
+@dataclass(frozen=True)
+class BatterySpec:
+    """`runtime_s` from full to empty at load 1; at load 0 it draws `idle_share` of that; the gauge errs by `sigma`.
+
+    On a dock it goes from empty to full in `charge_s`: a quick dock, so that missions need not wait for an hour.
+    """
+
+    runtime_s: float = 5400.0
+    idle_share: float = 0.4
+    sigma: float = 0.001
+    charge_s: float = 300.0
+
+
+class BatteryModel(NoisySensor):
+    """The battery of one robot."""
+
+    kept = ("charge", "stamp_s")
+
+    def __init__(self, rng: np.random.Generator, charge: float = 1.0, spec: BatterySpec | None = None) -> None:
+        """Start with a charge from 0 to 1. Raises ValueError for another."""
+        if not 0.0 <= charge <= 1.0:
+            raise ValueError(f"battery charge must be from 0 to 1, not {charge}")
+        super().__init__(rng)
+        self._spec, self._charge = spec or BatterySpec(), charge
+        self._stamp_s: float | None = None
+
+    def update(self, stamp_s: float, load: float, *, docked: bool = False) -> Battery:
+        """Reading at stamp_s after a load from 0 (standing) to 1 (walking), or on a dock, since the last update."""
+        elapsed = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
+        self._stamp_s = stamp_s
+        if docked:
+            self._charge = min(1.0, self._charge + elapsed / self._spec.charge_s)
+        else:
+            self._charge = discharged(self._charge, elapsed, load, self._spec)
+        read = self._charge + float(self._rng.normal(0.0, self._spec.sigma))
+        return Battery(stamp_s, min(max(round(read, 3), 0.0), 1.0))
+
+
+def discharged(charge: float, elapsed_s: float, load: float, spec: BatterySpec) -> float:
+    """The charge left after elapsed_s at a load (cut to 0..1)."""
+    share = spec.idle_share + (1.0 - spec.idle_share) * min(max(load, 0.0), 1.0)
+    return max(0.0, charge - elapsed_s * share / spec.runtime_s)
 
 
 @dataclass(frozen=True)

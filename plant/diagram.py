@@ -27,12 +27,12 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, ModelInstanceIndex, PlanarJoint, RigidBody
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
+from plant.friction import multiply_friction
 from plant.happenings.doors import add_panel
 from plant.kinds import BodyOptions, RobotBody, robot_kind
 from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.scene import Scene
 from plant.scenery import add_model, add_scenery
-from plant.variation import multiply_friction
 from plant.worlds.world import DoorRule
 
 TIME_STEP_S = 0.0125

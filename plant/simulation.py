@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -11,6 +11,7 @@ import numpy as np
 from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 
+from executive.words.variation import NO_VARIATION, Variation, light_called
 from plant.diagram import LooseModel, build_diagram
 from plant.engine import Engine
 from plant.happenings.moves import Moves
@@ -21,7 +22,6 @@ from plant.referee.referee import Referee
 from plant.snapshot.file import read_snapshot
 from plant.snapshot.values import State
 from plant.snapshot.writer import SnapshotWriter, restore
-from plant.variation import AS_IT_IS, Variation
 from plant.worlds.clutter import place_clutter
 from plant.worlds.lights import render_parameters
 from plant.worlds.placement import Placement, place_objects, place_people
@@ -48,13 +48,15 @@ class Simulation:
         extra_models: Sequence[LooseModel] = (),
         starts: Mapping[str, Pose2D] = MappingProxyType({}),
         docks: Mapping[str, Pose2D] = MappingProxyType({}),
-        variation: Variation = AS_IT_IS,
+        variation: Variation = NO_VARIATION,
+        spared: Collection[str] = (),
     ) -> None:
         """Build the plant of `world`; things and people stand where the seed puts them.
 
         `robots` names the kind of each. They stand at their `starts`, one alone by default at the world's, and charge
         at their `docks`, by default the world's. Batteries begin at `charge` (0 to 1). `extra_models` stand in the
-        world though no map knows them; `locomotion` limits what bears each robot; `variation` says how it differs.
+        world though no map knows them; `locomotion` limits what bears each robot. `variation` is how the world differs
+        in light, clutter (of none of the classes in `spared`) and friction; its people stand in `world` already.
         Raises WorldError when the things do not fit into the world, or a person's route leads through something.
         Raises ValueError: a robot has no start.
         """
@@ -63,7 +65,7 @@ class Simulation:
             raise ValueError(f"there is no start for {', '.join(sorted(missing))}")
         own_docks = dict(docks) if world.dock is None else {name: docks.get(name, world.dock) for name in robots}
         things, people = place_objects(world, seed), place_people(world, seed)
-        things += place_clutter(world, things, variation.clutter, seed, spared=variation.spared)
+        things += place_clutter(world, things, variation.clutter, seed, spared=spared)
         built = build_diagram(
             directives=world.directives_path,
             models=[
@@ -75,7 +77,7 @@ class Simulation:
             doors=world.doors,
             visuals=visuals,
             locomotion=locomotion,
-            renderer_parameters=render_parameters(variation.light),
+            renderer_parameters=render_parameters(light_called(variation.light)),
             friction=variation.friction,
         )
         self.engine = Engine(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -12,10 +12,10 @@ from executive.cli.starts import PlacedRobot
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
 from executive.tree.compiler import CompiledTree
+from executive.words.variation import NO_VARIATION, Variation
 from plant.referee import Verdict
 from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
-from plant.variation import AS_IT_IS, Variation
 from plant.worlds.world import World, WorldError
 from skills.detection import Detector
 from skills.estimate.grid_map import load_grid_map
@@ -31,9 +31,10 @@ def simulate(
     *,
     seed: int,
     record: bool,
-    variation: Variation = AS_IT_IS,
+    variation: Variation = NO_VARIATION,
+    spared: Collection[str] = (),
 ) -> Simulation:
-    """The plant of a world, things set by the seed. Raises InputError when they do not fit into it."""
+    """The plant of a world, objects set by the seed. Raises InputError when they do not fit into it."""
     logging.getLogger("drake").setLevel(logging.WARNING)  # Drake sets its own level when it is imported
     try:
         return Simulation(
@@ -45,6 +46,7 @@ def simulate(
             starts={name: robot.start for name, robot in robots.items()},
             docks={name: robot.dock for name, robot in robots.items() if robot.dock is not None},
             variation=variation,
+            spared=spared,
         )
     except WorldError as error:
         raise InputError(str(error)) from error

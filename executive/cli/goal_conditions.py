@@ -1,4 +1,4 @@
-"""A mission's goal conditions in the referee's words, as its tree compiled them and its run left them."""
+"""Judges a mission that has run: its goal conditions with the times of its run, and what it said."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from executive.run.outcome import Outcome, RobotResult
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.words.expression import Expression, Template
-from executive.words.goal import Area, GoalCondition, GoalKind, When
-from plant import referee
+from executive.words.goal import GoalCondition, GoalKind, When
+from plant.referee import Verdict
 from skills.files.errors import listing
 
 SHOWN_CHARS = 60
@@ -47,11 +47,11 @@ class _Move:
 def verdict_of(
     tree: CompiledTree,
     result: RobotResult,
-    judge: Callable[[Sequence[referee.GoalCondition]], referee.Verdict],
+    judge: Callable[[Sequence[GoalCondition]], Verdict],
     *,
     before: Sequence[Share] = (),
     since_s: float = 0.0,
-) -> referee.Verdict:
+) -> Verdict:
     """The verdict on a tree that has run; `judge` is the referee's, on the goal conditions.
 
     A run that did not end with success has not fulfilled its mission, whatever holds. Of one that did, all that can be
@@ -85,7 +85,7 @@ def _unseen(tree: CompiledTree, result: RobotResult) -> Sequence[str]:
 
 def conditions_of(
     tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = ()
-) -> tuple[referee.GoalCondition, ...]:
+) -> tuple[GoalCondition, ...]:
     """The goal conditions of a tree that has run: one for each time that a part was done, and one for each answer.
 
     A count is one condition, however many trips it takes. Where a robot went must hold until it drives again, and
@@ -96,12 +96,12 @@ def conditions_of(
     return tuple(condition for share in shares for condition in _of_share(share, moves, last=share is shares[-1]))
 
 
-def _of_share(share: Share, moves: Sequence[_Move], *, last: bool) -> Iterator[referee.GoalCondition]:
+def _of_share(share: Share, moves: Sequence[_Move], *, last: bool) -> Iterator[GoalCondition]:
     result = share.result
     for part in share.tree.parts[: share.done]:
         if part.goal is None:
             continue
-        condition = condition_of(part.goal, robot=share.tree.robot_name, answer=None)
+        condition = replace(part.goal, robot=share.tree.robot_name)
         executions = [one for one in result.executions if one.path_id == _node_of(part) and one.done]
         if part.goal.kind in (GoalKind.ANSWERED, GoalKind.DOOR_OPEN):
             yield from _answers(part, condition, result, done=bool(executions))
@@ -109,12 +109,10 @@ def _of_share(share: Share, moves: Sequence[_Move], *, last: bool) -> Iterator[r
         if not executions and result.outcome is not Outcome.SUCCESS:
             yield condition
         for one in executions:
-            yield _timed(condition, part.goal, one, share, moves, last=last)
+            yield _timed(condition, one, share, moves, last=last)
 
 
-def _answers(
-    part: StepPart, condition: referee.GoalCondition, result: RobotResult, *, done: bool
-) -> Iterator[referee.GoalCondition]:
+def _answers(part: StepPart, condition: GoalCondition, result: RobotResult, *, done: bool) -> Iterator[GoalCondition]:
     """One condition for each answer that a check gave, whatever became of what it stands in: it was said."""
     below = f"{part.path_id}/"
     answers = [one for one in result.findings if f"{one.path_id}/".startswith(below) and isinstance(one.answer, bool)]
@@ -125,25 +123,24 @@ def _answers(
 
 
 def _timed(
-    condition: referee.GoalCondition,
-    goal: GoalCondition,
+    condition: GoalCondition,
     one: Execution,
     share: Share,
     moves: Sequence[_Move],
     *,
     last: bool,
-) -> referee.GoalCondition:
+) -> GoalCondition:
     """The condition of one execution, with the times at which it must hold."""
     result, ended_s = share.result, math.inf if one.ended_s is None else one.ended_s
     between = [_Move(frozenset(), each.began_s, _end(each)) for other in result.preempting for each in other.executions]
-    later = [move for move in (*moves, *between) if move.until_s > ended_s and move.concerns(goal)]
+    later = [move for move in (*moves, *between) if move.until_s > ended_s and move.concerns(condition)]
     drove = not last or result.stepped_aside or bool(result.preempting) or (result.moved_s or 0.0) > ended_s
-    let_go = goal.kind is GoalKind.GRASPED and later
-    when = goal.when
-    if when is When.END_OF_MISSION and (let_go or (goal.kind is GoalKind.WENT and drove)):
+    let_go = condition.kind is GoalKind.GRASPED and later
+    when = condition.when
+    if when is When.END_OF_MISSION and (let_go or (condition.kind is GoalKind.WENT and drove)):
         when = When.END_OF_STEP
     taken_s = tuple((move.from_s, move.until_s) for move in later)
-    return replace(condition, when=referee.When[when.name], began_s=one.began_s, ended_s=one.ended_s, taken_s=taken_s)
+    return replace(condition, when=when, began_s=one.began_s, ended_s=one.ended_s, taken_s=taken_s)
 
 
 def _moves(share: Share) -> Iterator[_Move]:
@@ -200,24 +197,3 @@ def _is_text(heard: str, text: str | Template | Expression | None) -> bool:
 
 def _joined(*sentences: str) -> str:
     return " ".join(filter(None, sentences))
-
-
-def condition_of(condition: GoalCondition, *, robot: str, answer: bool | None) -> referee.GoalCondition:
-    """One condition in the referee's words."""
-    return referee.GoalCondition(
-        kind=referee.GoalKind[condition.kind.name],
-        classes=condition.classes,
-        count=condition.count,
-        source=tuple(map(_region, condition.source)),
-        goal=tuple(map(_region, condition.goal)),
-        maybe=tuple(map(_region, condition.maybe)),
-        person=condition.person,
-        wanted=condition.wanted,
-        answer=answer,
-        robot=robot,
-        when=referee.When[condition.when.name],
-    )
-
-
-def _region(area: Area) -> referee.Region:
-    return referee.Region(area.name, area.polygon, *(area.heights_m or ()))

@@ -241,13 +241,21 @@ def prepared_for(
 
         request = with_scenario(request, world, knowledge)
         world = with_happenings(world, request.scenario)
-    if request.variation:
-        from executive.cli.variations import with_people
-
-        world = with_people(world, request)
+    if request.variation.people:
+        world = _with_passers_by(world, request)
     tree = compile_mission(mission, knowledge=knowledge, registry=installed_skills())
     compiled = _of_tree(replace(request, world_name=world.name, robot=mission.robot_name), tree)
     return Prepared(compiled, mission, world, knowledge, tree, meant)
+
+
+def _with_passers_by(world: World, request: Request) -> World:
+    """The world with the people of the request's variation. Raises InputError: the world has no place for them."""
+    from plant.worlds.clutter import with_passers_by
+
+    try:
+        return with_passers_by(world, request.variation.people, request.seed)
+    except WorldError as error:
+        raise InputError(str(error), hint="take --people out") from error
 
 
 def replacing(request: Request, tree: CompiledTree) -> Request:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -16,7 +16,6 @@ from executive.cli.page_view import PageView
 from executive.cli.report import RefereeReport
 from executive.cli.requests import Prepared
 from executive.cli.starts import PlacedRobot, alone
-from executive.cli.variations import plant_variation
 from executive.record.event_log import Listener
 from executive.record.profile import Profile
 from executive.run.control import Control
@@ -24,10 +23,10 @@ from executive.run.outcome import RobotResult
 from executive.run.runner import Observer, RunEntry
 from executive.run.worker import WorkThread
 from executive.tree.compiler import CompiledTree
+from executive.words.variation import NO_VARIATION, Variation
 from plant.pipeline import Pipeline
 from plant.referee import Referee
 from plant.simulation import Simulation
-from plant.variation import AS_IT_IS, Variation
 from plant.worlds.world import World
 from skills.files.errors import InputError
 from skills.robot import Clock
@@ -45,11 +44,12 @@ class SimulatedBackend:
         *,
         seed: int,
         record: bool,
-        variation: Variation = AS_IT_IS,
+        variation: Variation = NO_VARIATION,
+        spared: Collection[str] = (),
     ) -> None:
-        """Build the plant, things set by the seed. Raises InputError when they do not fit into the world."""
+        """Builds the plant, objects set by the seed. Raises InputError when they do not fit into the world."""
         self._world, self._robots, self._record = world, robots, record
-        self._simulation = simulate(world, robots, seed=seed, record=record, variation=variation)
+        self._simulation = simulate(world, robots, seed=seed, record=record, variation=variation, spared=spared)
         self._steps = WorkThread("errand-plant")
         self._pipeline = Pipeline(self._simulation.engine, self._steps.do)
         self._keep: Callable[[], None] | None = None
@@ -157,7 +157,8 @@ def run_simulated(
         robots_of(prepared),
         seed=request.seed,
         record=request.record,
-        variation=plant_variation(prepared),
+        variation=request.variation,
+        spared=spoken_classes(prepared),
     )
     return run_request(
         prepared,
@@ -177,3 +178,10 @@ def robots_of(prepared: Prepared) -> Mapping[str, PlacedRobot]:
         return prepared.robots
     request, name = prepared.request, prepared.mission.robot_name
     return {name: alone(prepared.world, seed=request.seed, stack=request.stack, start=request.start)}
+
+
+def spoken_classes(prepared: Prepared) -> frozenset[str]:
+    """The classes of the objects that a mission speaks of; clutter is of none of them."""
+    named = {each.name for command in prepared.tree.commands for each in (command.item, command.object) if each}
+    known = prepared.knowledge
+    return frozenset(one for name in named for one in known.classes(known.thing(name) or name))

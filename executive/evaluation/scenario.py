@@ -11,7 +11,7 @@ from typing import Any, Final
 from executive.evaluation.runs import Evaluation, RunSpec
 from executive.evaluation.scenario_schema import EvaluationFile, FaultsFile, MissionEntry, VariationsFile
 from executive.evaluation.seeds import seed_range
-from executive.words.variation import Variation
+from executive.words.variation import Variation, light_called
 from skills.files.errors import InputError
 from skills.files.outside import is_file, read_text
 from skills.files.schema import validate
@@ -106,12 +106,22 @@ class _Reader:
             raise self.source.error(path, f"there is no file '{name}'", "give its path from this file's folder")
         return found.resolve()
 
+    def _light(self, light: str | float, path: KeyPath) -> str:
+        """A light of the file by its name or its brightness. Raises InputError with the line: it is neither."""
+        words = light if isinstance(light, str) else f"{light:g}"
+        try:
+            light_called(words)
+        except InputError as error:
+            raise self.source.error(path, error.message, error.hint) from error
+        return words
+
     def _varied(self, lists: VariationsFile) -> Iterator[Callable[[RunSpec], RunSpec]]:
         """For each combination, what makes a run vary by it."""
         several = [name for name in type(lists).model_fields if len(getattr(lists, name)) > 1]
-        for light, clutter, people, friction in product(lists.light, lists.clutter, lists.people, lists.friction):
-            variation = Variation(light if isinstance(light, str) else f"{light:g}", clutter, people, friction)
-            told = {"light": variation.light, "clutter": clutter, "people": people, "friction": f"{friction:g}"}
+        lights = [self._light(light, ("variations", "light", index)) for index, light in enumerate(lists.light)]
+        for light, clutter, people, friction in product(lights, lists.clutter, lists.people, lists.friction):
+            variation = Variation(light, clutter, people, friction)
+            told = {"light": light, "clutter": clutter, "people": people, "friction": f"{friction:g}"}
             for faults, scenario, stack in product(
                 enumerate(lists.faults), enumerate(lists.scenario), enumerate(lists.stack)
             ):

@@ -1,54 +1,30 @@
-"""Goal conditions: what commands must bring about, and when it must hold, as plain data that a referee can judge."""
+"""Goal conditions: what must hold when a mission ends, as plain data that a referee judges."""
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Final
 
-from executive.words.command import START, Command, Task, Thing
-from executive.words.knowledge import ANYBODY, Knowledge, Pose
+from executive.words.geometry import inside
 
-__all__ = [
-    "Area",
-    "GoalCondition",
-    "GoalKind",
-    "When",
-    "clearing_goals",
-    "command_goal",
-    "drive_goal",
-    "given_goal",
-    "held_goal",
-    "lifted_goal",
-    "put_goal",
-    "surface_area",
-    "surfaces_to_search",
-]
-
-BELOW_TOP_M: Final = 0.05
-ABOVE_TOP_M: Final = 0.30
-FLOOR_M: Final = (-0.05, 0.30)
-NEAR_M: Final = 0.75
-POSE_NEAR_M: Final = 0.25
-DOOR_NEAR_M: Final = 0.3
+__all__ = ["GoalCondition", "GoalKind", "Region", "When"]
 
 
 class GoalKind(enum.Enum):
     """What must hold."""
 
-    GRASPED = "grasped"  # taken from a source area and lifted, and still held
-    HANDED_OVER = "handed over"  # let go, on what a person receives it with
-    PLACED = "placed"  # resting in a goal area, let go
-    WENT = "went"  # the robot in a goal area
-    ANSWERED = "answered"  # the answer is what is true of the source areas
-    DOOR_OPEN = "door open"  # the answer is whether the door in the source area is open
-    CLEARED = "cleared"  # nothing rests in the source areas; with goal areas, all that did rests there
+    GRASPED = "grasped"  # taken from a source region and lifted, and still held
+    HANDED_OVER = "handed over"  # on the tray of a person, let go
+    PLACED = "placed"  # resting in a goal region, let go
+    WENT = "went"  # the robot's body in a goal region
+    ANSWERED = "answered"  # the answer is what is true of the source regions
+    DOOR_OPEN = "door open"  # the answer is whether the door in the source region is open
+    CLEARED = "cleared"  # nothing rests in the source regions; with goal regions, all that did rests there, let go
 
 
 class When(enum.Enum):
-    """At which times a condition must hold. A later step of the same mission may end the last."""
+    """At which times a condition must hold. The step ran from `began_s` to `ended_s`."""
 
     SOME_TIME = "at some time"  # once while the step ran
     END_OF_STEP = "at the end of the step"
@@ -57,188 +33,68 @@ class When(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Area:
-    """A part of the world: corners seen from above, (x, y) in order, and heights (m) from low to high (None: any)."""
+class Region:
+    """A part of the world: an outline seen from above, (x, y) corners in order, and a range of heights (m).
+
+    For an object its body origin counts, for a robot the origin of its body: a table of 0.75 m whose objects have their
+    origin between base and 0.25 m above it is the range 0.70 to 1.00.
+    """
 
     name: str
-    polygon: tuple[tuple[float, float], ...]
-    heights_m: tuple[float, float] | None = None
+    polygon_W: tuple[tuple[float, float], ...]
+    z_min_m: float = -0.1
+    z_max_m: float = 3.0
+
+    def __post_init__(self) -> None:
+        if len(self.polygon_W) < 3 or not self.z_min_m < self.z_max_m:
+            raise ValueError(f"region {self.name!r} needs three corners or more and z_min_m below z_max_m")
+
+    def contains(self, p_W: Iterable[float]) -> bool:
+        """Whether a point (x, y, z) in the world lies inside."""
+        x, y, z = p_W
+        return self.z_min_m <= z <= self.z_max_m and inside(self.polygon_W, (x, y))
 
 
 @dataclass(frozen=True)
 class GoalCondition:
-    """One condition. `classes` fulfil it, `count` of them, together called `wanted`; they come from a `source` area
-    (none: anywhere) and they or the robot go to a `goal` area; `person` is the one to be handed to or asked for (None:
-    anyone); `when` tells at which times it must hold. What lies
-    in the `maybe` areas may be counted in an answer, or missed."""
+    """One goal condition.
+
+    `classes` are the object classes that fulfil it (none: any), `wanted` what they are called together (empty: the
+    classes) and `count` how many objects (0 counts as 1). `source` is where the objects were taken from (empty:
+    anywhere) or, for an answer, where the robot looked; an answer may count or miss what lies in `maybe`. `goal` is
+    where the objects or the robot go (any of the regions). `person` receives the object or, where the class is
+    "person", is asked for (None: anyone). `answer` is what was said, at `answered_s` (None: now). `robot` is the one
+    that acts (None: any).
+
+    `when` says at which times it must hold. The step ran from `began_s` (None: since `since_s`) to `ended_s` (None: it
+    ends now). An object that must stay until the end of the mission may be lifted again within the intervals
+    `taken_s`: there a later step of the same mission takes it. What happened before `since_s` (simulated time) does
+    not count: it was another mission's doing.
+    """
 
     kind: GoalKind
     classes: tuple[str, ...] = ()
     count: int = 1
-    source: tuple[Area, ...] = ()
-    goal: tuple[Area, ...] = ()
+    source: tuple[Region, ...] = ()
+    goal: tuple[Region, ...] = ()
+    maybe: tuple[Region, ...] = ()
     person: str | None = None
+    answer: bool | None = None
+    answered_s: float | None = None
+    robot: str | None = None
     wanted: str = ""
     when: When = When.END_OF_MISSION
-    maybe: tuple[Area, ...] = ()
+    began_s: float | None = None
+    ended_s: float | None = None
+    taken_s: tuple[tuple[float, float], ...] = ()
+    since_s: float = 0.0
 
+    @property
+    def from_s(self) -> float:
+        """When its step began."""
+        return self.since_s if self.began_s is None else max(self.began_s, self.since_s)
 
-def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition | None:
-    """The condition of a command; `elsewhere` are more surfaces from which its thing may be taken.
-
-    Waiting where the robot stands has none.
-    """
-    return _GOALS[command.task](command, knowledge, tuple(elsewhere))
-
-
-def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[GoalCondition, GoalCondition]:
-    """The conditions of two commands to take everything from a place to another: nothing is left, and all is there."""
-    source = _areas(get, knowledge, ())
-    place = None if bring.goal is None else knowledge.place(bring.goal)
-    assert place is not None
-    goal = tuple(surface_area(knowledge, name) for name in knowledge.surfaces_in(place))
-    return GoalCondition(GoalKind.CLEARED, source=source), GoalCondition(GoalKind.CLEARED, source=source, goal=goal)
-
-
-def door_goal(knowledge: Knowledge, between: tuple[str, str]) -> GoalCondition:
-    """Goal condition of the question whether a door is open. Raises StopIteration: the world has no such door."""
-    door = next(each for each in knowledge.doors if set(each.between) == set(between))
-    x, y = door.at
-    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    square = tuple((x + DOOR_NEAR_M * i, y + DOOR_NEAR_M * j) for i, j in corners)
-    return GoalCondition(GoalKind.DOOR_OPEN, source=(Area(f"door between {between[0]} and {between[1]}", square),))
-
-
-def drive_goal(pose: Pose) -> GoalCondition:
-    """The robot at a pose."""
-    return GoalCondition(GoalKind.WENT, goal=(_square(f"({pose.x:.2f}, {pose.y:.2f})", pose, POSE_NEAR_M),))
-
-
-def held_goal() -> GoalCondition:
-    """Anything in the gripper all the time."""
-    return GoalCondition(GoalKind.GRASPED, when=When.ALWAYS)
-
-
-def lifted_goal() -> GoalCondition:
-    """Anything lifted, and held."""
-    return GoalCondition(GoalKind.GRASPED)
-
-
-def put_goal(knowledge: Knowledge, surface: str) -> GoalCondition:
-    """Anything put on a surface."""
-    return GoalCondition(GoalKind.PLACED, goal=(surface_area(knowledge, surface),))
-
-
-def given_goal(person: str | None) -> GoalCondition:
-    """Anything handed over to a person (None: to anyone)."""
-    return GoalCondition(GoalKind.HANDED_OVER, person=person)
-
-
-def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
-    """The surfaces to look at, those where the thing usually is first; without a place, all that there are.
-
-    A usual place may be a room: then its surfaces count as usual.
-    """
-    inside = tuple(knowledge.surfaces) if place is None else knowledge.surfaces_in(place)
-    usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
-    return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
-
-
-def surface_area(knowledge: Knowledge, surface: str) -> Area:
-    """The space on top of a surface in which the origin of a thing lies that rests there."""
-    facts = knowledge.surfaces[surface]
-    return Area(surface, facts.polygon, (facts.height - BELOW_TOP_M, facts.height + ABOVE_TOP_M))
-
-
-def _classes(thing: Thing | None, knowledge: Knowledge) -> tuple[str, ...]:
-    assert thing is not None
-    return knowledge.classes(knowledge.thing(thing.name) or thing.name)
-
-
-def _areas(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> tuple[Area, ...]:
-    assert command.object is not None
-    place = None if command.goal is None else knowledge.place(command.goal)
-    surfaces = (*surfaces_to_search(knowledge, command.object.name, place), *elsewhere)
-    return tuple(surface_area(knowledge, name) for name in surfaces)
-
-
-def _grasped(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
-    classes, areas = _classes(command.object, knowledge), _areas(command, knowledge, elsewhere)
-    return GoalCondition(GoalKind.GRASPED, classes, command.object_count, areas, wanted=str(command.object))
-
-
-def _answered(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
-    assert command.object is not None
-    who = knowledge.somebody(command.object.name)
-    if who is not None:
-        place = None if command.goal is None else knowledge.place(command.goal)
-        rooms = tuple(Area(name, knowledge.places[name].polygon) for name in knowledge.rooms_to_search(who, place))
-        person = None if who == ANYBODY else who
-        return GoalCondition(
-            GoalKind.ANSWERED, (ANYBODY,), command.object_count, rooms, person=person, wanted=str(command.object)
-        )
-    classes, areas = _classes(command.object, knowledge), _areas(command, knowledge, elsewhere)
-    place = None if command.goal is None else knowledge.place(command.goal)
-    around = [name for name in knowledge.places if place in (None, name)]
-    floors = tuple(Area(f"the floor of the {name}", knowledge.places[name].polygon, FLOOR_M) for name in around)
-    asked = str(command.object)
-    return GoalCondition(GoalKind.ANSWERED, classes, command.object_count, areas, wanted=asked, maybe=floors)
-
-
-def _carried(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> GoalCondition:
-    item, goal = command.item or command.object, command.goal
-    assert goal is not None
-    classes = _classes(item, knowledge)
-    person = knowledge.person(goal)
-    if goal == START or person is not None:
-        return GoalCondition(GoalKind.HANDED_OVER, classes, command.item_count, person=person, wanted=str(item))
-    place = knowledge.place(goal)
-    assert place is not None
-    goals = tuple(surface_area(knowledge, name) for name in knowledge.surfaces_in(place))
-    return GoalCondition(GoalKind.PLACED, classes, command.item_count, goal=goals, wanted=str(item))
-
-
-def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
-    if command.item is not None:
-        return _carried(command, knowledge, elsewhere)
-    assert command.goal is not None
-    person = knowledge.person(command.goal)
-    if person is not None:
-        return GoalCondition(GoalKind.WENT, person=person, when=When.END_OF_STEP)  # the person may walk on
-    return GoalCondition(GoalKind.WENT, goal=(_place_area(knowledge, command.goal),))
-
-
-def _waited(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition | None:
-    return None if command.goal is None else _went(command, knowledge, elsewhere)
-
-
-def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondition | None:
-    if knowledge.dock is None:
-        return None
-    return GoalCondition(GoalKind.WENT, goal=(_square("the dock", knowledge.dock, POSE_NEAR_M),))
-
-
-def _place_area(knowledge: Knowledge, goal: str) -> Area:
-    """A room's outline; for a surface or the start a square about where the robot is to stand."""
-    place = knowledge.place(goal)
-    if place in knowledge.places:
-        return Area(place, knowledge.places[place].polygon)
-    return _square(goal, knowledge.start if goal == START or place is None else knowledge.place_pose(place))
-
-
-def _square(name: str, pose: Pose, near_m: float = NEAR_M) -> Area:
-    sides = ((-near_m, -near_m), (near_m, -near_m), (near_m, near_m), (-near_m, near_m))
-    return Area(name, tuple((pose.x + dx, pose.y + dy) for dx, dy in sides))
-
-
-_Goal = Callable[[Command, Knowledge, tuple[str, ...]], GoalCondition | None]
-_GOALS: Final[Mapping[Task | None, _Goal]] = MappingProxyType(
-    {
-        Task.GRASP: _grasped,
-        Task.FIND: _answered,
-        Task.PLACE: _carried,
-        Task.WAIT: _waited,
-        Task.CHARGE: _charged,
-        None: _went,
-    }
-)
+    @property
+    def needed(self) -> int:
+        """How many objects fulfil it."""
+        return max(1, self.count)

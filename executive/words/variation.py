@@ -1,15 +1,29 @@
-"""What is varied of a world from run to run: light, clutter, people who walk about, friction."""
+"""Variation of a world from run to run: light, clutter, people who walk about, friction."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from types import MappingProxyType
 from typing import Annotated, Final
 
-from skills.files.errors import InputError
-from skills.quantities import Quantity, QuantityError, number_of
+from skills.files.errors import InputError, suggestion
+from skills.quantities import Quantity, QuantityError, number_in, number_of
 
-__all__ = ["NORMAL_LIGHT", "NO_VARIATION", "Brightness", "Clutter", "Friction", "MorePeople", "Variation"]
+__all__ = [
+    "DAY_LIGHT",
+    "LIGHTS",
+    "NORMAL_LIGHT",
+    "NO_VARIATION",
+    "Brightness",
+    "Clutter",
+    "Friction",
+    "Light",
+    "MorePeople",
+    "Variation",
+    "light_called",
+]
 
 NORMAL_LIGHT: Final = "normal"
 MOST_CLUTTER: Final = 40
@@ -23,15 +37,50 @@ Friction = Annotated[float, Quantity(ge=0.05, le=5.0)]
 
 
 @dataclass(frozen=True)
-class Variation:
-    """How a world differs from what its files say.
+class Light:
+    """A light, as it differs from the usual day light.
 
-    `light` is one of the plant's lights by name, or a brightness (1.0 is day light). `clutter` more objects lie about,
+    All beams are multiplied by `brightness` and have a `colour` (red, green, blue; 0 to 1). With a `sun` (direction in
+    which its beam goes, world frame, and intensity), that one comes on top.
+    """
+
+    brightness: float = 1.0
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    sun: tuple[tuple[float, float, float], float] | None = None
+
+
+DAY_LIGHT: Final = Light()
+LIGHTS: Final[Mapping[str, Light]] = MappingProxyType(
+    {
+        NORMAL_LIGHT: DAY_LIGHT,
+        "dim": Light(0.4),
+        "bright": Light(1.5),
+        "evening": Light(0.6, (1.0, 0.78, 0.55)),
+        "low sun": Light(0.5, sun=((0.95, 0.0, -0.31), 1.6)),
+    }
+)
+"""The lights that have names."""
+
+
+def light_called(words: str) -> Light:
+    """The light of a name, or of a brightness (0 to 5). Raises InputError: it is neither."""
+    try:
+        return LIGHTS[words] if words in LIGHTS else Light(number_in(words, Brightness))
+    except QuantityError as error:
+        hint = suggestion(words, LIGHTS, f"known are {', '.join(LIGHTS)}, or give a brightness of 0 to 5")
+        raise InputError(f"unknown light '{words[:40]}'", hint=hint) from error
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A world's difference from what its files say.
+
+    `light` is one of `LIGHTS` by name, or a brightness (1.0 is day light). `clutter` more objects lie about,
     of classes that the mission does not ask for; `people` more people walk about; the friction of all loose objects
     and of the robots is multiplied by `friction`.
 
     Raises:
-        InputError: a value is out of range.
+        InputError: a value is out of range, or the light is unknown.
     """
 
     light: str = NORMAL_LIGHT
@@ -40,6 +89,7 @@ class Variation:
     friction: float = 1.0
 
     def __post_init__(self) -> None:
+        light_called(self.light)
         for name, kind in (("clutter", Clutter), ("people", MorePeople), ("friction", Friction)):
             try:
                 number_of(getattr(self, name), kind)

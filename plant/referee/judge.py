@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from executive.words.goal import GoalCondition, GoalKind, Region, When
 from plant.referee.contacts import Collision
-from plant.referee.goal import GoalCondition, GoalKind, Region, Verdict, When
 from plant.referee.object_history import SETTLE_S, Lift, ObjectHistory
 from plant.referee.truth import ON_TRAY_GAP_S, TimedPath, Truth
+from plant.referee.verdict import Verdict
 from skills.robot import FloatArray
 
 NEAR_PERSON_M = 2.0

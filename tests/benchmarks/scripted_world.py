@@ -17,7 +17,6 @@ from executive.tree.compiler import CompiledTree, StepPart
 from executive.words.geometry import inside
 from executive.words.goal import GoalCondition, GoalKind, When
 from executive.words.knowledge import ANYBODY, Knowledge
-from plant.referee import GoalCondition as Asked
 from plant.referee import Verdict
 from plant.referee.judge import LOOKS_AT_DOOR_S, judge
 from plant.referee.object_history import ObjectHistory, ObjectSample
@@ -245,7 +244,7 @@ class ScriptedWorld:
                 note_stay(self.given.setdefault((name, history.on_tray_of), []), now_s)
         extend(self.path, np.array([*self.robot_W, 0.5]), now_s)
 
-    def judge(self, conditions: Sequence[Asked], now_s: float) -> Verdict:
+    def judge(self, conditions: Sequence[GoalCondition], now_s: float) -> Verdict:
         """The referee's verdict."""
         people = {name: TimedPath(np.array([[*p_W, 0.9, 0.0]])) for name, p_W in PEOPLE.items()}
         robots = {"Alice": TimedPath(np.array(self.path))}
@@ -342,17 +341,17 @@ class _Person:
             x, y = self.robot_at(ended_s)
             if goal.person is not None:
                 return math.dist((x, y), PEOPLE[goal.person]) <= NEAR_PERSON_M
-            return any(inside(area.polygon, (x, y)) for area in goal.goal)
+            return any(inside(region.polygon_W, (x, y)) for region in goal.goal)
         mine = [move for move in self.world.moves if move.robot and self.fits(goal, move.name)]
         if goal.kind is GoalKind.GRASPED:
-            sources = {area.name for area in goal.source}
+            sources = {region.name for region in goal.source}
             since_s = begun_s if goal.when is When.SOME_TIME else -1.0
             taken = [
                 m.name for m in mine if m.after == HAND and m.before in sources and since_s <= m.t_s <= ended_s + 0.01
             ]
             held = [name for name in taken if goal.when is When.SOME_TIME or self.place_at(name, ended_s) == HAND]
             return len(set(held)) >= needed
-        goals = {area.name for area in goal.goal}
+        goals = {region.name for region in goal.goal}
         if goal.kind is GoalKind.HANDED_OVER:
             goals = {goal.person} if goal.person is not None else set(PEOPLE)
         put = [m for m in mine if m.after in goals and begun_s <= m.t_s <= ended_s + 0.01]
@@ -374,8 +373,8 @@ class _Person:
         """How many of what was asked for there were."""
         if goal.classes == (ANYBODY,):
             people = [p for name, p in PEOPLE.items() if goal.person in (None, name)]
-            return sum(any(inside(area.polygon, p) for area in goal.source) for p in people)
-        places = {area.name for area in goal.source}
+            return sum(any(inside(region.polygon_W, p) for region in goal.source) for p in people)
+        places = {region.name for region in goal.source}
         return sum(self.fits(goal, name) and self.place_at(name, t_s) in places for name in OBJECTS)
 
     def fits(self, goal: GoalCondition, name: str) -> bool:

@@ -12,7 +12,8 @@ from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, Multibod
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.referee import GoalCondition, GoalKind, Referee, Region, When
+from executive.words.goal import GoalCondition, GoalKind, Region, When
+from plant.referee import Referee
 from plant.referee.entities import Kind
 from plant.referee.judge import judge
 from plant.referee.truth import TimedPath, Truth

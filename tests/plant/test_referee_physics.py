@@ -11,7 +11,8 @@ from pydrake.multibody.tree import PdControllerGains, PrismaticJoint, SpatialIne
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.referee import GoalCondition, GoalKind, Referee, Region, When
+from executive.words.goal import GoalCondition, GoalKind, Region, When
+from plant.referee import Referee
 from plant.spot.kind import SPOT
 
 FRICTION = CoulombFriction(0.9, 0.9)

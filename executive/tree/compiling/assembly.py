@@ -27,19 +27,11 @@ from executive.tree.compiling.search import surfaces_elsewhere
 from executive.tree.compiling.skill_steps import skill_plan
 from executive.tree.compiling.steps import step_plan
 from executive.tree.compiling.trips import are_trips, refuse_several, trips_plan
+from executive.tree.goals import clearing_goals, command_goal, drive_goal, given_goal, lifted_goal, put_goal
 from executive.tree.node import NodeSpec
 from executive.words.command import START, Command, Task
 from executive.words.expression import kind_of, literal
-from executive.words.goal import (
-    GoalCondition,
-    When,
-    clearing_goals,
-    command_goal,
-    drive_goal,
-    given_goal,
-    lifted_goal,
-    put_goal,
-)
+from executive.words.goal import GoalCondition, When
 from executive.words.knowledge import Knowledge, Pose
 from executive.words.slug import slug
 from executive.words.steps import Mission, MissionStep, OnFailure, SkillCall, StepPolicy

@@ -23,6 +23,7 @@ from executive.tree.compiling.decisions import (
 from executive.tree.compiling.doors import door_plan
 from executive.tree.compiling.interrupts import HANDLING, dock_plan
 from executive.tree.compiling.part import Assembled, StepPart
+from executive.tree.goals import command_goal, door_goal, held_goal
 from executive.tree.node import NodeSpec
 from executive.words.blocks import (
     Ask,
@@ -41,7 +42,6 @@ from executive.words.blocks import (
 from executive.words.command import Command, Task
 from executive.words.condition import READINGS, AllOf, Condition, DoorOpen, Look, ValueIs, parts_of
 from executive.words.expression import Expression, Kind, Template, Value, kind_of
-from executive.words.goal import command_goal, door_goal, held_goal
 from executive.words.slug import slug
 from executive.words.steps import MissionStep, StepPolicy
 from skills.api import Part

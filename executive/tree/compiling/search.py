@@ -9,10 +9,10 @@ from typing import Final
 
 from executive.tree.behaviours.board import FromBoard, SurfaceOfDetection, beside
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
+from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.words.command import Thing
 from executive.words.geometry import inside
-from executive.words.goal import surfaces_to_search
 from executive.words.knowledge import Knowledge, Pose
 from skills.api import Cause
 from skills.files.errors import listing

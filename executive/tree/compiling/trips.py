@@ -7,9 +7,9 @@ from typing import Final
 
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.compiling.steps import carry_plan, grasp_plan
+from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.words.command import START, Command, Task
-from executive.words.goal import surfaces_to_search
 
 __all__ = ["are_trips", "refuse_several", "trips_plan"]
 

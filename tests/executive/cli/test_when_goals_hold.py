@@ -9,8 +9,8 @@ from executive.words import blocks
 from executive.words.command import parse_command
 from executive.words.condition import DoorOpen, Look, ValueIs
 from executive.words.expression import Expression
+from executive.words.goal import GoalKind, When
 from executive.words.steps import Mission, MissionStep, SkillCall, StepPolicy
-from plant.referee import GoalKind, When
 from skills.api import Cause, Failed, Succeeded
 from skills.check_door.skill import CheckDoorInputs
 from tests.executive.conftest import KNOWLEDGE, scripted_skill

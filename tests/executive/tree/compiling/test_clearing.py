@@ -5,7 +5,7 @@ import pytest
 from executive.cli.goal_conditions import conditions_of
 from executive.run.outcome import Outcome
 from executive.tree.behaviours.board import Constant
-from plant.referee import GoalKind
+from executive.words.goal import GoalKind
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
 from skills.files.errors import InputError
 

@@ -6,8 +6,8 @@ from executive.run.outcome import Outcome
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiler import compile_mission
 from executive.tree.estimate import expected
+from executive.tree.goals import surfaces_to_search
 from executive.words.command import parse_command
-from executive.words.goal import surfaces_to_search
 from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
 from skills.files.errors import InputError, SourceLine

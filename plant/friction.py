@@ -1,40 +1,21 @@
-"""How a simulation differs from what its world's files say."""
+"""Friction of what moves in a plant."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 from pydrake.geometry import ProximityProperties, RoleAssign, SceneGraph
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 
-from plant.worlds.lights import DAY_LIGHT, Light
-
-__all__ = ["AS_IT_IS", "Variation", "multiply_friction"]
+__all__ = ["multiply_friction"]
 
 _MATERIAL: Final = "material"
 _FRICTION: Final = "coulomb_friction"
 
 
-@dataclass(frozen=True)
-class Variation:
-    """The `light`, how many more objects lie about (`clutter`), and a factor on `friction` coefficients.
-
-    Clutter is of none of the classes in `spared`. The factor is on those of all that moves: loose objects and robots.
-    """
-
-    light: Light = DAY_LIGHT
-    clutter: int = 0
-    spared: frozenset[str] = frozenset()
-    friction: float = 1.0
-
-
-AS_IT_IS: Final = Variation()
-
-
 def multiply_friction(plant: MultibodyPlant, scene_graph: SceneGraph, factor: float) -> None:
-    """Multiply the friction coefficients of all bodies that are not fixed to the world; the plant is finalized."""
+    """Multiplies the friction coefficients of all bodies that are not fixed to the world; the plant is finalized."""
     inspector, source = scene_graph.model_inspector(), plant.get_source_id()
     for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
         for geometry in () if plant.IsAnchored(body) else plant.GetCollisionGeometriesForBody(body):

@@ -1,0 +1,192 @@
+"""Goal conditions of commands and skills: what each must bring about in the world that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+from executive.words.command import START, Command, Task, Thing
+from executive.words.goal import GoalCondition, GoalKind, Region, When
+from executive.words.knowledge import ANYBODY, Knowledge, Pose
+
+__all__ = [
+    "clearing_goals",
+    "command_goal",
+    "door_goal",
+    "drive_goal",
+    "given_goal",
+    "held_goal",
+    "lifted_goal",
+    "put_goal",
+    "surface_region",
+    "surfaces_to_search",
+]
+
+BELOW_TOP_M: Final = 0.05
+ABOVE_TOP_M: Final = 0.30
+FLOOR_M: Final = (-0.05, 0.30)
+NEAR_M: Final = 0.75
+POSE_NEAR_M: Final = 0.25
+DOOR_NEAR_M: Final = 0.3
+
+
+def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition | None:
+    """The condition of a command; `elsewhere` are more surfaces from which its thing may be taken.
+
+    Waiting where the robot stands has none.
+    """
+    return _GOALS[command.task](command, knowledge, tuple(elsewhere))
+
+
+def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[GoalCondition, GoalCondition]:
+    """The conditions of two commands to take everything from a place to another: nothing is left, and all is there."""
+    source = _regions(get, knowledge, ())
+    place = None if bring.goal is None else knowledge.place(bring.goal)
+    assert place is not None
+    goal = tuple(surface_region(knowledge, name) for name in knowledge.surfaces_in(place))
+    return GoalCondition(GoalKind.CLEARED, source=source), GoalCondition(GoalKind.CLEARED, source=source, goal=goal)
+
+
+def door_goal(knowledge: Knowledge, between: tuple[str, str]) -> GoalCondition:
+    """Goal condition of the question whether a door is open. Raises StopIteration: the world has no such door."""
+    door = next(each for each in knowledge.doors if set(each.between) == set(between))
+    x, y = door.at
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    square = tuple((x + DOOR_NEAR_M * i, y + DOOR_NEAR_M * j) for i, j in corners)
+    return GoalCondition(GoalKind.DOOR_OPEN, source=(Region(f"door between {between[0]} and {between[1]}", square),))
+
+
+def drive_goal(pose: Pose) -> GoalCondition:
+    """The robot at a pose."""
+    return GoalCondition(GoalKind.WENT, goal=(_square(f"({pose.x:.2f}, {pose.y:.2f})", pose, POSE_NEAR_M),))
+
+
+def held_goal() -> GoalCondition:
+    """Anything in the gripper all the time."""
+    return GoalCondition(GoalKind.GRASPED, when=When.ALWAYS)
+
+
+def lifted_goal() -> GoalCondition:
+    """Anything lifted, and held."""
+    return GoalCondition(GoalKind.GRASPED)
+
+
+def put_goal(knowledge: Knowledge, surface: str) -> GoalCondition:
+    """Anything put on a surface."""
+    return GoalCondition(GoalKind.PLACED, goal=(surface_region(knowledge, surface),))
+
+
+def given_goal(person: str | None) -> GoalCondition:
+    """Anything handed over to a person (None: to anyone)."""
+    return GoalCondition(GoalKind.HANDED_OVER, person=person)
+
+
+def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
+    """The surfaces to look at, those where the thing usually is first; without a place, all that there are.
+
+    A usual place may be a room: then its surfaces count as usual.
+    """
+    inside = tuple(knowledge.surfaces) if place is None else knowledge.surfaces_in(place)
+    usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
+    return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
+
+
+def surface_region(knowledge: Knowledge, surface: str) -> Region:
+    """The space on top of a surface in which the origin of a thing lies that rests there."""
+    facts = knowledge.surfaces[surface]
+    return Region(surface, facts.polygon, facts.height - BELOW_TOP_M, facts.height + ABOVE_TOP_M)
+
+
+def _classes(thing: Thing | None, knowledge: Knowledge) -> tuple[str, ...]:
+    assert thing is not None
+    return knowledge.classes(knowledge.thing(thing.name) or thing.name)
+
+
+def _regions(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> tuple[Region, ...]:
+    assert command.object is not None
+    place = None if command.goal is None else knowledge.place(command.goal)
+    surfaces = (*surfaces_to_search(knowledge, command.object.name, place), *elsewhere)
+    return tuple(surface_region(knowledge, name) for name in surfaces)
+
+
+def _grasped(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
+    classes, regions = _classes(command.object, knowledge), _regions(command, knowledge, elsewhere)
+    return GoalCondition(GoalKind.GRASPED, classes, command.object_count, regions, wanted=str(command.object))
+
+
+def _answered(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
+    assert command.object is not None
+    who = knowledge.somebody(command.object.name)
+    if who is not None:
+        place = None if command.goal is None else knowledge.place(command.goal)
+        rooms = tuple(Region(name, knowledge.places[name].polygon) for name in knowledge.rooms_to_search(who, place))
+        person = None if who == ANYBODY else who
+        return GoalCondition(
+            GoalKind.ANSWERED, (ANYBODY,), command.object_count, rooms, person=person, wanted=str(command.object)
+        )
+    classes, regions = _classes(command.object, knowledge), _regions(command, knowledge, elsewhere)
+    place = None if command.goal is None else knowledge.place(command.goal)
+    around = [name for name in knowledge.places if place in (None, name)]
+    floors = tuple(Region(f"the floor of the {name}", knowledge.places[name].polygon, *FLOOR_M) for name in around)
+    asked = str(command.object)
+    return GoalCondition(GoalKind.ANSWERED, classes, command.object_count, regions, wanted=asked, maybe=floors)
+
+
+def _carried(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> GoalCondition:
+    item, goal = command.item or command.object, command.goal
+    assert goal is not None
+    classes = _classes(item, knowledge)
+    person = knowledge.person(goal)
+    if goal == START or person is not None:
+        return GoalCondition(GoalKind.HANDED_OVER, classes, command.item_count, person=person, wanted=str(item))
+    place = knowledge.place(goal)
+    assert place is not None
+    goals = tuple(surface_region(knowledge, name) for name in knowledge.surfaces_in(place))
+    return GoalCondition(GoalKind.PLACED, classes, command.item_count, goal=goals, wanted=str(item))
+
+
+def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
+    if command.item is not None:
+        return _carried(command, knowledge, elsewhere)
+    assert command.goal is not None
+    person = knowledge.person(command.goal)
+    if person is not None:
+        return GoalCondition(GoalKind.WENT, person=person, when=When.END_OF_STEP)  # the person may walk on
+    return GoalCondition(GoalKind.WENT, goal=(_place_region(knowledge, command.goal),))
+
+
+def _waited(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition | None:
+    return None if command.goal is None else _went(command, knowledge, elsewhere)
+
+
+def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondition | None:
+    if knowledge.dock is None:
+        return None
+    return GoalCondition(GoalKind.WENT, goal=(_square("the dock", knowledge.dock, POSE_NEAR_M),))
+
+
+def _place_region(knowledge: Knowledge, goal: str) -> Region:
+    """A room's outline; for a surface or the start a square about where the robot is to stand."""
+    place = knowledge.place(goal)
+    if place in knowledge.places:
+        return Region(place, knowledge.places[place].polygon)
+    return _square(goal, knowledge.start if goal == START or place is None else knowledge.place_pose(place))
+
+
+def _square(name: str, pose: Pose, near_m: float = NEAR_M) -> Region:
+    sides = ((-near_m, -near_m), (near_m, -near_m), (near_m, near_m), (-near_m, near_m))
+    return Region(name, tuple((pose.x + dx, pose.y + dy) for dx, dy in sides))
+
+
+_Goal = Callable[[Command, Knowledge, tuple[str, ...]], GoalCondition | None]
+_GOALS: Final[Mapping[Task | None, _Goal]] = MappingProxyType(
+    {
+        Task.GRASP: _grasped,
+        Task.FIND: _answered,
+        Task.PLACE: _carried,
+        Task.WAIT: _waited,
+        Task.CHARGE: _charged,
+        None: _went,
+    }
+)

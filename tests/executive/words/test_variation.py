@@ -1,0 +1,35 @@
+"""Variations of a world, and their lights."""
+
+import pytest
+
+from executive.words.variation import LIGHTS, Light, Variation, light_called
+from skills.files.errors import InputError
+
+
+def test_a_light_is_named_or_a_brightness() -> None:
+    assert light_called("dim") is LIGHTS["dim"]
+    assert light_called("0.7") == Light(0.7)
+
+
+@pytest.mark.parametrize("words", ["moonlight", "7", "-1"])
+def test_an_unknown_light_is_refused(words: str) -> None:
+    with pytest.raises(InputError, match=f"unknown light '{words}'"):
+        Variation(words)
+
+
+def test_a_misspelt_light_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(InputError) as caught:
+        Variation("dimm")
+    assert "dim" in caught.value.hint
+
+
+@pytest.mark.parametrize("values", [{"clutter": -1}, {"clutter": 41}, {"people": 9}, {"friction": 0.0}])
+def test_a_value_out_of_range_is_refused_with_the_range(values: dict[str, float]) -> None:
+    with pytest.raises(InputError, match="should be from"):
+        Variation(**values)  # type: ignore[arg-type]
+
+
+def test_a_variation_is_repeated_by_its_options_and_its_text() -> None:
+    varied = Variation("evening", 3, 1, 1.5)
+    assert varied.arguments() == ["--light=evening", "--clutter=3", "--people=1", "--friction=1.5"]
+    assert Variation.of_text(varied.to_text()) == varied

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from executive.store.database import told
+from executive.store.database import STORE_FILE
 from skills.files.errors import InputError
 
 __all__ = ["CallToken", "call_token"]
@@ -36,7 +36,7 @@ def call_token(given: str | None, store: Path) -> CallToken:
     if given is not None:
         return CallToken(_checked(given, None))
     file = store.with_name(f"{store.name}-token")
-    with told(store):
+    with STORE_FILE.failures(store):
         try:
             opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         except FileExistsError:

@@ -14,11 +14,10 @@ from executive.cli.requests import Prepared, commanded, prepare, prepared_for, r
 from executive.mission.request import Request
 from executive.record.reader import Event, read_events
 from executive.record.schemas import RUN
-from executive.store.database import full_disk
+from executive.store.database import STORE_FILE
 from executive.store.journal import StoreJournal
+from executive.store.memory import Recollection
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.store.recollection import Recollection
-from executive.store.records import Replacement
 from executive.store.resuming import ended_tree, resumed_tree
 from executive.words.slug import slug
 from skills.files.errors import InputError, disk_is_full
@@ -102,12 +101,9 @@ def _part_of(prepared: Prepared) -> str | None:
 
 def next_run(store: MissionStore, mission: StoredMission, prepared: Prepared, before: StoredMission) -> Durable:
     """A mission that begins in the world as another has left it."""
-    poses = store.poses(before.id) if prepared.robots else {}
-    if before.pose is not None:
-        poses = {**poses, prepared.mission.robot_name: before.pose}
     if prepared.robots:
-        store.place(mission.id, poses)
-    return replace(new_run(store, mission, prepared), take_up=True, poses=poses)
+        store.place(mission.id, before.poses)
+    return replace(new_run(store, mission, prepared), take_up=True, poses=before.poses)
 
 
 def same_world(one: StoredMission, other: StoredMission) -> bool:
@@ -140,8 +136,7 @@ def take_up(store: MissionStore, mission: StoredMission) -> TakenUp:
     prepared = prepare(as_it_was(mission, store.path))
     if prepared.request.fingerprint != mission.request.fingerprint:
         raise _other_version(store, mission)
-    replaced = store.replacements(mission.id)
-    every = [_with_replacement(store, mission, each, replaced) for each in prepared.all]
+    every = [_with_replacement(store, mission, each) for each in prepared.all]
     memories = [store.memory(mission.id, _part_of(each)) for each in every]
     resumed = [
         (ended_tree(each.tree, memory) if prepared.robots else None) or resumed_tree(each.tree, memory)
@@ -159,14 +154,12 @@ def take_up(store: MissionStore, mission: StoredMission) -> TakenUp:
     return TakenUp(together, durable, [recollection for _, recollection in resumed])
 
 
-def _with_replacement(
-    store: MissionStore, mission: StoredMission, prepared: Prepared, replaced: Mapping[str, Replacement]
-) -> Prepared:
+def _with_replacement(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Prepared:
     """What a robot is to do, or what has taken its place by a correction. Raises InputError: its tree is another."""
-    instead = replaced.get(prepared.mission.robot_name)
+    name = prepared.mission.robot_name
+    instead = mission.instead.get(name)
     if instead is None:
         return prepared
-    name = prepared.mission.robot_name
     asked = replace(prepared.request, name=instead.name, commands=instead.commands, robot=name)
     own = prepared_for(asked, commanded(asked, prepared.world), prepared.world, prepared.knowledge)
     if own.request.fingerprint != instead.fingerprint:
@@ -248,7 +241,7 @@ def kept(store: MissionStore, mission: StoredMission) -> Iterator[Callable[[RunR
     try:
         yield ended
     except OSError as error:
-        raise full_disk(store.path) if disk_is_full(error) else error from error
+        raise STORE_FILE.full_disk(store.path) if disk_is_full(error) else error from error
     except InputError:
         if over:
             raise

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
+
+from pydantic import ConfigDict, TypeAdapter
+from pydantic.dataclasses import dataclass
 
 from executive.language.questions import QuestionPolicy
 from executive.mission.scenario import NO_SCENARIO, Scenario
@@ -21,7 +25,7 @@ __all__ = ["Request", "Start"]
 _UNKNOWN: Final = "unknown"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=ConfigDict(defer_build=True))
 class Start:
     """Where the robot really stands, in place of the world's start.
 
@@ -44,7 +48,7 @@ class Start:
             raise InputError(f"--start {text[:60]}: {error.what}", hint=error.hint) from None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", defer_build=True))
 class Request:
     """A sentence, or a mission file, or neither where a conversation left only commands.
 
@@ -95,6 +99,15 @@ class Request:
         """True where there is neither a sentence nor a file."""
         return self.sentence is None and self.file is None and bool(self.commands)
 
+    def to_json(self) -> str:
+        """The JSON form, which `from_json` reads; what is not said is left out."""
+        return _form().dump_json(self, exclude_defaults=True).decode()
+
+    @staticmethod
+    def from_json(text: str | bytes) -> Request:
+        """The request that `to_json` wrote. Raises ValueError."""
+        return _form().validate_json(text)
+
     def from_anywhere(self) -> Request:
         """The same with whole paths, for a process that works in another folder."""
         file = None if self.file is None else self.file.resolve()
@@ -106,3 +119,8 @@ class Request:
             for name, robot in self.robots.items()
         }
         return replace(self, file=file, world=world, out=self.out.resolve(), stack=stack, map=own_map, robots=robots)
+
+
+@cache
+def _form() -> TypeAdapter[Request]:
+    return TypeAdapter(Request)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Final
@@ -57,16 +56,6 @@ class Scenario:
         doors = (f"the {door['name']} {_times(door)}" for door in self.doors)
         moves = (f"somebody moves the {_moved(move)} at {move['at']:g} s" for move in self.moves)
         return (*(f"fault: {words}" for words in self.faults), *people, *doors, *moves)
-
-    def to_text(self) -> str:
-        """As JSON."""
-        return json.dumps({"faults": self.faults, "people": self.people, "doors": self.doors, "moves": self.moves})
-
-    @staticmethod
-    def of_text(text: str) -> Scenario:
-        """What `to_text` wrote."""
-        told = json.loads(text)
-        return Scenario(tuple(told["faults"]), 0, told["people"], tuple(told["doors"]), tuple(told["moves"]))
 
 
 NO_SCENARIO: Final = Scenario()

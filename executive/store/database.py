@@ -1,171 +1,169 @@
-"""Opens the store's SQLite file, and turns every failure to do so into one error with a hint."""
+"""Opens the SQLite files that Errand writes, and turns every failure to do so into one error with a hint."""
 
 from __future__ import annotations
 
+import fcntl
+import os
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from types import TracebackType
+from typing import Final, Self
 
 from skills.files.errors import InputError, disk_is_full
 
-VERSION: Final = 9
-APPLICATION_ID: Final = 0x45525244  # "ERRD"
+__all__ = ["STORE_FILE", "Database", "FileKind", "StoreError", "transaction"]
+
 BUSY_S: Final = 2.0
-_DAMAGED: Final = "move it away (its missions are lost), or name another by --store"
-_SCHEMA: Final = """
-CREATE TABLE mission (
-    id INTEGER PRIMARY KEY AUTOINCREMENT,
-    state TEXT NOT NULL,
-    name TEXT NOT NULL,
-    sentence TEXT,
-    file TEXT,
-    text TEXT,
-    require_wake INTEGER NOT NULL,
-    world TEXT,
-    world_name TEXT NOT NULL,
-    robot TEXT NOT NULL,
-    seed INTEGER NOT NULL,
-    out TEXT NOT NULL,
-    record INTEGER NOT NULL,
-    stack TEXT,
-    map TEXT,
-    given TEXT NOT NULL,
-    start TEXT,
-    commands TEXT NOT NULL,
-    fingerprint TEXT NOT NULL,
-    queued INTEGER NOT NULL,
-    starts INTEGER NOT NULL DEFAULT 0,
-    message TEXT NOT NULL DEFAULT '',
-    clock_s REAL,
-    pose TEXT
-);
-CREATE TABLE step (
-    mission INTEGER NOT NULL REFERENCES mission (id) ON DELETE CASCADE,
-    path_id TEXT NOT NULL,
-    status TEXT NOT NULL,
-    cause TEXT,
-    message TEXT NOT NULL,
-    checkpoint TEXT,
-    clock_s REAL NOT NULL,
-    PRIMARY KEY (mission, path_id)
-);
-CREATE TABLE value (
-    mission INTEGER NOT NULL REFERENCES mission (id) ON DELETE CASCADE,
-    key TEXT NOT NULL,
-    text TEXT NOT NULL,
-    PRIMARY KEY (mission, key)
-);
-"""
-_TRIGGERS: Final = """
-CREATE TABLE standing (
-    mission INTEGER PRIMARY KEY REFERENCES mission (id) ON DELETE CASCADE,
-    trigger TEXT NOT NULL,
-    missed TEXT NOT NULL,
-    anchor TEXT NOT NULL,
-    since TEXT NOT NULL
-);
-CREATE TABLE origin (
-    mission INTEGER PRIMARY KEY REFERENCES mission (id) ON DELETE CASCADE,
-    standing INTEGER NOT NULL,
-    why TEXT NOT NULL
-);
-CREATE TABLE battery (
-    mission INTEGER PRIMARY KEY REFERENCES mission (id) ON DELETE CASCADE,
-    lowest REAL NOT NULL,
-    last REAL NOT NULL,
-    ended TEXT
-);
-"""
-_SCENARIOS_AND_TIMES: Final = """
-ALTER TABLE mission ADD COLUMN scenario TEXT;
-ALTER TABLE mission ADD COLUMN time_of_day TEXT;
-ALTER TABLE mission ADD COLUMN time_limit_s REAL;
-"""
-_VARIATIONS: Final = """
-ALTER TABLE mission ADD COLUMN variation TEXT;
-"""
-_FLEET: Final = """
-CREATE TABLE given (
-    mission INTEGER PRIMARY KEY REFERENCES mission (id) ON DELETE CASCADE,
-    robot TEXT,
-    reassigned INTEGER NOT NULL DEFAULT 0,
-    done INTEGER NOT NULL DEFAULT 0,
-    blocked TEXT,
-    referee TEXT
-);
-"""
-_CHAINS: Final = """
-ALTER TABLE given ADD COLUMN part_of INTEGER;
-ALTER TABLE given ADD COLUMN follows INTEGER;
-"""
-_ROBOTS: Final = """
-ALTER TABLE mission ADD COLUMN robots TEXT;
-CREATE TABLE part (
-    mission INTEGER NOT NULL REFERENCES mission (id) ON DELETE CASCADE,
-    robot TEXT NOT NULL,
-    pose TEXT,
-    instead TEXT,
-    PRIMARY KEY (mission, robot)
-);
-"""
-_OLDEST: Final = 4
-_ADDED: Final = {5: _TRIGGERS + _SCENARIOS_AND_TIMES, 6: _VARIATIONS, 7: _FLEET, 8: _CHAINS, 9: _ROBOTS}
-"""What each version has added to the one before; `_OLDEST` is `_SCHEMA`."""
 
 
-def connect(path: Path, *, create: bool) -> sqlite3.Connection:
-    """Open the store, made new where `create` allows it.
+@dataclass(frozen=True)
+class FileKind:
+    """One kind of file: its tables, what tells it from other databases, and the words of its errors.
 
-    A killed process loses nothing that was committed: the file is in write-ahead mode. Raises InputError: there is
-    none, it cannot be opened, it is damaged, or another version wrote it.
+    `name` is what messages call it, `option` names another; `absent` says what writes it, `lost` what is lost with it,
+    `older` what to do with one of another version, `claimed` what the process does that has claimed it. `go_on` says
+    how to go on after the disk was full, where "{path}" stands for the file.
     """
-    if not create and not path.is_file():
-        raise InputError("there is no store", hint="run or queue a mission first, or name one by --store", file=path)
-    if path.is_file() and path.stat().st_size == 0:
-        raise InputError("the store is damaged (it is empty)", hint=_DAMAGED, file=path)
-    with told(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
+
+    name: str
+    option: str
+    application_id: int
+    version: int
+    schema: str
+    absent: str
+    lost: str
+    older: str
+    claimed: str
+    go_on: str
+
+    def full_disk(self, path: Path) -> StoreError:
+        """The disk has become full while the file was written."""
+        go_on = self.go_on.format(path=path)
+        return StoreError("the disk is full", hint=f"what was written is kept: free space, then {go_on}")
+
+    def damaged(self, path: Path, why: object) -> StoreError:
+        """The file cannot be read."""
+        hint = f"move it away ({self.lost} are lost), or name another by {self.option}"
+        return StoreError(f"the {self.name} is damaged ({why})", hint=hint, file=path)
+
+    @contextmanager
+    def failures(self, path: Path) -> Iterator[None]:
+        """Turns failures of the database and of the disk into a StoreError."""
+        what, hint = f"cannot use the {self.name}", f"name another by {self.option}"
         try:
-            _prepare(connection, path)
-        except BaseException:
-            connection.close()
-            raise
-        return connection
-
-
-def _prepare(connection: sqlite3.Connection, path: Path) -> None:
-    """Set the modes, check whose file it is, and make the tables that it lacks."""
-    (application,) = connection.execute("PRAGMA application_id").fetchone()
-    (version,) = connection.execute("PRAGMA user_version").fetchone()
-    (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
-    if tables and application != APPLICATION_ID:
-        raise InputError("it is a database, but no store of missions", hint="name another file by --store", file=path)
-    if tables and not _OLDEST <= version <= VERSION:
-        hint = "finish its missions with the version that wrote it, or name another file by --store"
-        raise InputError(f"the store has version {version}, and this errand reads {VERSION}", hint=hint, file=path)
-    connection.execute("PRAGMA journal_mode = WAL")
-    connection.execute("PRAGMA synchronous = NORMAL")
-    connection.execute("PRAGMA foreign_keys = ON")
-    if version != VERSION:
-        with transaction(connection):
-            _migrate(connection)
-
-
-def _migrate(connection: sqlite3.Connection) -> None:
-    """Make the tables that are not there yet; another process may just have done so."""
-    (version,) = connection.execute("PRAGMA user_version").fetchone()
-    added = [_ADDED[number] for number in range(max(version, _OLDEST) + 1, VERSION + 1)]
-    for statement in filter(str.strip, ";".join([*([] if version else [_SCHEMA]), *added]).split(";")):
-        connection.execute(statement)
-    connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-    connection.execute(f"PRAGMA user_version = {VERSION}")
+            yield
+        except sqlite3.OperationalError as error:
+            if "full" in str(error):
+                raise self.full_disk(path) from error
+            if "locked" in str(error) or "busy" in str(error):
+                hint = "end the program that keeps it open, then try again"
+                raise StoreError(f"another program has locked the {self.name}", hint=hint, file=path) from error
+            raise StoreError(f"{what} ({error})", hint=hint, file=path) from error
+        except sqlite3.DatabaseError as error:
+            raise self.damaged(path, error) from error
+        except OSError as error:
+            if disk_is_full(error):
+                raise self.full_disk(path) from error
+            raise StoreError(f"{what} ({error.strerror})", hint=hint, file=path) from error
 
 
 class StoreError(InputError):
-    """The store cannot be read or written, whichever mission it is about."""
+    """A file cannot be read or written, whichever part of it is asked for."""
+
+
+class Database:
+    """One open file. Use it as a context manager, or close it."""
+
+    kind: FileKind
+
+    def __init__(self, path: Path, *, create: bool = True) -> None:
+        """Open the file, made new where `create` allows it.
+
+        A killed process loses nothing that was committed: the file is in write-ahead mode. Raises InputError: there is
+        none, it cannot be opened, it is damaged, or another version wrote it.
+        """
+        self.path = path
+        if not create and not path.is_file():
+            raise InputError(f"there is no {self.kind.name}", hint=self.kind.absent, file=path)
+        if path.is_file() and path.stat().st_size == 0:
+            raise self.kind.damaged(path, "it is empty")
+        with self.kind.failures(self.path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
+            try:
+                self._prepare()
+            except BaseException:
+                self._connection.close()
+                raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close it; idempotent."""
+        self._connection.close()
+
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """Only one process at a time works on a file; the claim ends with the process, however that ends.
+
+        Raises InputError: another process has claimed it.
+        """
+        with ExitStack() as stack:
+            with self.kind.failures(self.path):
+                file = stack.enter_context(self.path.with_name(f"{self.path.name}-claim").open("a+"))
+                try:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError as error:
+                    file.seek(0)
+                    what = f"process {file.read() or '?'} {self.kind.claimed}"
+                    hint = f"wait until it is done, or name another by {self.kind.option}"
+                    raise InputError(what, hint=hint, file=self.path) from error
+                file.truncate(0)
+                file.write(str(os.getpid()))
+                file.flush()
+            yield
+
+    @contextmanager
+    def writing(self) -> Iterator[sqlite3.Connection]:
+        """The database, for changes of which all are kept or none. Raises StoreError: it cannot be written."""
+        with self.kind.failures(self.path), transaction(self._connection):
+            yield self._connection
+
+    def rows(self, query: str, *values: object) -> list[sqlite3.Row]:
+        """The rows that a query finds. Raises StoreError: the database cannot be read."""
+        with self.kind.failures(self.path):
+            cursor = self._connection.cursor()
+            cursor.row_factory = sqlite3.Row
+            return cursor.execute(query, values).fetchall()
+
+    def _prepare(self) -> None:
+        """Set the modes, check whose file it is, and make the tables of a new one."""
+        kind, connection = self.kind, self._connection
+        (application,) = connection.execute("PRAGMA application_id").fetchone()
+        (version,) = connection.execute("PRAGMA user_version").fetchone()
+        (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        if tables and application != kind.application_id:
+            what, hint = f"it is a database, but no {kind.name}", f"name another file by {kind.option}"
+            raise InputError(what, hint=hint, file=self.path)
+        if tables and version != kind.version:
+            what = f"the {kind.name} has version {version}, and this errand reads {kind.version}"
+            raise InputError(what, hint=f"{kind.older}, or name another file by {kind.option}", file=self.path)
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = NORMAL")
+        connection.execute("PRAGMA foreign_keys = ON")
+        if not tables:
+            with transaction(connection):
+                for statement in filter(str.strip, kind.schema.split(";")):
+                    connection.execute(statement)
+                connection.execute(f"PRAGMA application_id = {kind.application_id}")
+                connection.execute(f"PRAGMA user_version = {kind.version}")
 
 
 @contextmanager
@@ -181,32 +179,49 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
     connection.execute("COMMIT")
 
 
-@contextmanager
-def told(path: Path) -> Iterator[None]:
-    """Failures of the database become a StoreError."""
-    try:
-        yield
-    except sqlite3.OperationalError as error:
-        if "full" in str(error):
-            raise full_disk(path) from error
-        hint = "end the program that keeps it open, then try again" if _busy(error) else "name another by --store"
-        what = "another program has locked the store" if _busy(error) else f"cannot use the store ({error})"
-        raise StoreError(what, hint=hint, file=path) from error
-    except sqlite3.DatabaseError as error:
-        raise StoreError(f"the store is damaged ({error})", hint=_DAMAGED, file=path) from error
-    except OSError as error:
-        if disk_is_full(error):
-            raise full_disk(path) from error
-        raise StoreError(
-            f"cannot use the store ({error.strerror})", hint="name another by --store", file=path
-        ) from error
-
-
-def full_disk(store: Path) -> StoreError:
-    """The way on when the disk has become full under a mission of a store."""
-    hint = f"what was written is kept: free space, then go on with `errand resume --store {store}`"
-    return StoreError("the disk is full", hint=hint)
-
-
-def _busy(error: sqlite3.OperationalError) -> bool:
-    return "locked" in str(error) or "busy" in str(error)
+STORE_FILE: Final = FileKind(
+    name="store",
+    option="--store",
+    application_id=0x45525244,  # "ERRD"
+    version=10,
+    absent="run or queue a mission first, or name one by --store",
+    lost="its missions",
+    older="finish its missions with the version that wrote it",
+    claimed="runs a mission of this store",
+    go_on="go on with `errand resume --store {path}`",
+    schema="""
+CREATE TABLE IF NOT EXISTS mission (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    state TEXT NOT NULL,
+    request TEXT NOT NULL,
+    queued INTEGER NOT NULL,
+    starts INTEGER NOT NULL DEFAULT 0,
+    message TEXT NOT NULL DEFAULT '',
+    clock_s REAL,
+    poses TEXT NOT NULL DEFAULT '{}',
+    instead TEXT NOT NULL DEFAULT '{}',
+    lowest_charge REAL,
+    last_charge REAL,
+    ended TEXT,
+    trigger TEXT,
+    missed TEXT,
+    anchor TEXT,
+    since TEXT,
+    standing INTEGER,
+    why TEXT NOT NULL DEFAULT '',
+    given TEXT
+);
+CREATE TABLE IF NOT EXISTS step (
+    mission INTEGER NOT NULL REFERENCES mission (id) ON DELETE CASCADE,
+    path_id TEXT NOT NULL,
+    record TEXT NOT NULL,
+    PRIMARY KEY (mission, path_id)
+);
+CREATE TABLE IF NOT EXISTS value (
+    mission INTEGER NOT NULL REFERENCES mission (id) ON DELETE CASCADE,
+    key TEXT NOT NULL,
+    text TEXT NOT NULL,
+    PRIMARY KEY (mission, key)
+);
+""",
+)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from executive.store.missions import MissionState, MissionStore
+from executive.store.values import form
 
 __all__ = ["GivenMission", "GivenMissions"]
 
 _FAILED: Final = (MissionState.FAILURE, MissionState.ERROR, MissionState.CANCELLED)
-_PUT: Final = "INSERT INTO given (mission) VALUES (?) ON CONFLICT (mission) DO NOTHING"
 
 
 @dataclass(frozen=True)
@@ -20,7 +19,7 @@ class GivenMission:
     """What is known of a mission that was given out.
 
     `robot` has it, or had it last; it was given to another `reassigned` times. The first `done` of its commands are
-    done and not done again; `blocked` is why it cannot begin again where it is broken off now. `referee` is what a
+    done and not done again; `blocked` is why it cannot begin again where it is interrupted now. `referee` is what a
     referee said in the end, as JSON values.
 
     A mission that no robot could do alone is done in parts, which are missions `part_of` it; a part that `follows`
@@ -44,37 +43,27 @@ class GivenMissions:
 
     def all(self) -> Mapping[int, GivenMission]:
         """All of them, by their numbers."""
-        rows = self._store.rows("SELECT * FROM given ORDER BY mission")
-        return {
-            row["mission"]: GivenMission(
-                robot=row["robot"],
-                reassigned=row["reassigned"],
-                done=row["done"],
-                blocked=row["blocked"],
-                referee=None if row["referee"] is None else json.loads(row["referee"]),
-                part_of=row["part_of"],
-                follows=row["follows"],
-            )
-            for row in rows
-        }
+        rows = self._store.rows("SELECT id, given FROM mission WHERE given IS NOT NULL ORDER BY id")
+        return {row["id"]: form(GivenMission).validate_json(row["given"]) for row in rows}
 
     def give(self, mission: int, robot: str) -> None:
         """A robot has the mission from now on."""
-        again = "reassigned = reassigned + (robot IS NOT NULL AND robot <> ?)"
-        self._set(mission, f"{again}, robot = ?, blocked = NULL", robot, robot)
+        known = self._of(mission)
+        again = known.robot is not None and known.robot != robot
+        self._put(mission, replace(known, robot=robot, reassigned=known.reassigned + again, blocked=None))
 
     def progress(self, mission: int, done: int, blocked: str | None) -> None:
         """How many commands are done, and why what is under way cannot begin again (None: it can)."""
-        self._set(mission, "done = ?, blocked = ?", done, blocked)
+        self._put(mission, replace(self._of(mission), done=done, blocked=blocked))
 
     def hand_back(self, mission: int) -> None:
         """The mission waits for another robot."""
-        self._set(mission, "blocked = NULL")
+        self._put(mission, replace(self._of(mission), blocked=None))
 
     def split(self, mission: int, parts: Sequence[int]) -> None:
         """The mission is done in parts, one after the other."""
         for part, before in zip(parts, (None, *parts), strict=False):
-            self._set(part, "part_of = ?, follows = ?", mission, before)
+            self._put(part, replace(self._of(part), part_of=mission, follows=before))
 
     def settle(self) -> None:
         """What does not go on, since a part before it was not done, ends as a failure; what has no part left to do ends
@@ -94,9 +83,12 @@ class GivenMissions:
 
     def judge(self, mission: int, referee: Mapping[str, Any] | None) -> None:
         """What a referee saw."""
-        self._set(mission, "referee = ?", None if referee is None else json.dumps(dict(referee)))
+        self._put(mission, replace(self._of(mission), referee=referee))
 
-    def _set(self, mission: int, change: str, *values: object) -> None:
+    def _of(self, mission: int) -> GivenMission:
+        return self.all().get(mission, GivenMission())
+
+    def _put(self, mission: int, known: GivenMission) -> None:
+        text = form(GivenMission).dump_json(known, exclude_defaults=True).decode()
         with self._store.writing() as connection:
-            connection.execute(_PUT, (mission,))
-            connection.execute(f"UPDATE given SET {change} WHERE mission = ?", (*values, mission))
+            connection.execute("UPDATE mission SET given = ? WHERE id = ?", (text, mission))

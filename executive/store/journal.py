@@ -6,37 +6,30 @@ import json
 import math
 import sqlite3
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from typing import Any, Final
+
+from py_trees.common import Status
 
 from executive.mission.request import Request
 from executive.run.journal import TickNote
 from executive.store.database import transaction
-from executive.store.recollection import Recollection
-from executive.store.records import pose_text, row_of
-from executive.store.values import to_text
+from executive.store.memory import Recollection, StepRecord
+from executive.store.values import form, to_text
 from executive.tree.compiler import CompiledTree
-from executive.tree.snapshot import Change
 from executive.words.slug import slug
 from skills.geometry import wrap
 from skills.robot import Pose2D
 
 MOVED_M: Final = 0.02
 TURNED_RAD: Final = 0.02
-_PUT_STEP: Final = "INSERT OR REPLACE INTO step VALUES (?, ?, ?, ?, ?, ?, ?)"
+_PUT_STEP: Final = "INSERT OR REPLACE INTO step VALUES (?, ?, ?)"
 _PUT_VALUE: Final = "INSERT OR REPLACE INTO value VALUES (?, ?, ?)"
-_PUT_CHARGE: Final = """
-INSERT INTO battery (mission, lowest, last) VALUES (?, ?, ?)
-ON CONFLICT (mission) DO UPDATE SET lowest = min(lowest, excluded.lowest), last = excluded.last, ended = NULL
+_NOTE: Final = """
+UPDATE mission SET clock_s = :clock_s, poses = json_patch(poses, :poses),
+lowest_charge = coalesce(min(lowest_charge, :lowest), lowest_charge, :lowest),
+last_charge = coalesce(:last, last_charge), ended = NULL WHERE id = :id
 """
-_PUT_POSE: Final = """
-INSERT INTO part (mission, robot, pose) VALUES (?, ?, ?) ON CONFLICT (mission, robot) DO UPDATE SET pose = excluded.pose
-"""
-_PUT_INSTEAD: Final = """
-INSERT INTO part (mission, robot, instead) VALUES (?, ?, ?)
-ON CONFLICT (mission, robot) DO UPDATE SET instead = excluded.instead
-"""
-_REPLACED: Final = ("name", "commands", "fingerprint", "sentence", "file", "text")
-_REPLACE: Final = f"UPDATE mission SET {', '.join(f'{name} = :{name}' for name in _REPLACED)} WHERE id = :id"
 
 
 class StoreJournal:
@@ -47,16 +40,14 @@ class StoreJournal:
     `keep_world` is called before what a tick brought is written, for a simulated world must not lag behind it.
     """
 
-    def __init__(
-        self, connection: sqlite3.Connection, mission: int, robot: str | None = None, *, charges: bool = True
-    ) -> None:
-        """`robot` is the one of several whose part it keeps; `charges` tells whether its battery's is noted, too."""
-        self._connection, self._mission, self._robot, self._counts = connection, mission, robot, charges
+    def __init__(self, connection: sqlite3.Connection, mission: int, robot: str | None, *, main: str) -> None:
+        """`robot` is the one of several whose part it keeps; the battery of the `main` one is noted, too."""
+        self._connection, self._mission, self._robot, self._main = connection, mission, robot, main
         self._board: Mapping[str, Any] = {}
         self._written: dict[str, Any] = {}
-        self._steps: dict[str, tuple[object, ...]] = {}
+        self._steps: dict[str, StepRecord] = {}
         self._values: dict[str, str] = {}
-        self._checkpoints: dict[str, str] = {}
+        self._checkpoints: dict[str, Mapping[str, Any]] = {}
         self._pose: Pose2D | None = None
         self._charges: tuple[float, float] | None = None  # the lowest so far, and the last
         self._recollection: Recollection | None = None
@@ -71,11 +62,11 @@ class StoreJournal:
 
     def replaced(self, tree: CompiledTree) -> StoreJournal:
         """Keep the mission that takes this one's place in its stead, with nothing done of it yet."""
-        journal = StoreJournal(self._connection, self._mission, self._robot, charges=self._counts)
+        journal = StoreJournal(self._connection, self._mission, self._robot, main=self._main)
         journal.troubles, journal.keep_world = self.troubles, self.keep_world
         if self._request_of is None:
             return journal
-        request = self._request_of(tree)
+        text = self._request_of(tree).to_json()
         journal.replaceable(self._request_of)
         try:
             with transaction(self._connection):
@@ -83,10 +74,10 @@ class StoreJournal:
                     delete = f"DELETE FROM {table} WHERE mission = ? AND {of_robot(key)}"
                     self._connection.execute(delete, (self._mission, *prefix_of(self._robot)))
                 if self._robot is None:
-                    self._connection.execute(_REPLACE, {**row_of(request), "id": self._mission})
+                    self._connection.execute("UPDATE mission SET request = ? WHERE id = ?", (text, self._mission))
                 else:
-                    instead = json.dumps((request.name, request.commands, request.fingerprint))
-                    self._connection.execute(_PUT_INSTEAD, (self._mission, self._robot, instead))
+                    put = "UPDATE mission SET instead = json_set(instead, '$.' || ?, json(?)) WHERE id = ?"
+                    self._connection.execute(put, (_json(self._robot), text, self._mission))
         except sqlite3.Error as error:
             self._trouble(f"the mission that took this one's place could not be kept ({error})")
         return journal
@@ -110,18 +101,13 @@ class StoreJournal:
     def _take_steps(self, note: TickNote) -> None:
         for change in note.changes:
             if self._recollection is None or not self._recollection.pending(change.path_id):
+                after = change.after
                 self._checkpoints.pop(change.path_id, None)
-                self._steps[change.path_id] = self._row(change, note.now_s, None)
+                self._steps[change.path_id] = StepRecord(after.status, after.cause, after.message, note.now_s)
         for path_id, checkpoint in note.checkpoints.items():
-            text = json.dumps(dict(checkpoint))
-            if self._checkpoints.get(path_id) != text:
-                self._checkpoints[path_id] = text
-                self._steps[path_id] = (self._mission, path_id, "RUNNING", None, "", text, note.now_s)
-
-    def _row(self, change: Change, now_s: float, checkpoint: str | None) -> tuple[object, ...]:
-        after = change.after
-        cause = None if after.cause is None else after.cause.name
-        return (self._mission, change.path_id, after.status.name, cause, after.message, checkpoint, now_s)
+            if self._checkpoints.get(path_id) != checkpoint:
+                self._checkpoints[path_id] = dict(checkpoint)
+                self._steps[path_id] = StepRecord(Status.RUNNING, None, "", note.now_s, dict(checkpoint))
 
     def _take_values(self, board: Mapping[str, Any]) -> None:
         if board is self._board:
@@ -137,27 +123,23 @@ class StoreJournal:
                 self._trouble(f"'{key}': {error}")
 
     def _take_charge(self, charge: float | None) -> None:
-        if charge is not None and self._counts:
+        if charge is not None and self._robot in (None, self._main):
             self._charges = (charge if self._charges is None else min(self._charges[0], charge), charge)
 
     def _write(self, note: TickNote) -> None:
         pose = note.pose or self._pose
-        text = None if pose is None else pose_text(pose)
         dropped = () if self._recollection is None else tuple(self._recollection.dropped)
+        steps = [(self._mission, path, form(StepRecord).dump_json(step).decode()) for path, step in self._steps.items()]
+        poses = {} if pose is None else {self._robot or self._main: asdict(pose)}
+        lowest, last = self._charges or (None, None)
+        told = {"id": self._mission, "clock_s": note.now_s, "lowest": lowest, "last": last, "poses": _json(poses)}
         try:
             with transaction(self._connection):
                 run = self._connection.executemany
                 run("DELETE FROM step WHERE mission = ? AND path_id = ?", [(self._mission, path) for path in dropped])
-                run(_PUT_STEP, self._steps.values())
+                run(_PUT_STEP, steps)
                 run(_PUT_VALUE, [(self._mission, key, value) for key, value in self._values.items()])
-                run(_PUT_CHARGE, [] if self._charges is None else [(self._mission, *self._charges)])
-                own = text if self._robot is None else None
-                self._connection.execute(
-                    "UPDATE mission SET clock_s = ?, pose = coalesce(?, pose) WHERE id = ?",
-                    (note.now_s, own, self._mission),
-                )
-                if self._robot is not None and text is not None:
-                    self._connection.execute(_PUT_POSE, (self._mission, self._robot, text))
+                self._connection.execute(_NOTE, told)
         except sqlite3.Error as error:
             self._trouble(f"the store could not be written ({error})")
             return
@@ -179,6 +161,10 @@ def prefix_of(robot: str | None) -> tuple[str, str]:
     """How a robot's path ids and blackboard keys begin, twice; those of any robot for None."""
     prefix = "" if robot is None else f"{slug(robot)}/"
     return prefix, prefix
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _no_world() -> None:

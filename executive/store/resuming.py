@@ -19,8 +19,7 @@ from py_trees.common import Status
 
 from executive.run.executions import execution_keys
 from executive.run.findings import finding_keys
-from executive.store.recollection import Recollection
-from executive.store.records import Memory, StepRecord
+from executive.store.memory import Memory, Recollection, StepRecord
 from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decorators import ExplainedDecorator, Guard

@@ -10,7 +10,6 @@ from typing import Final
 
 from executive.mission.request import Request
 from executive.store.missions import MissionState, MissionStore, StoredMission, insert
-from executive.store.records import request_of, row_of
 from executive.store.triggers import Every, Missed, OnBatteryFull, Once, Schedule, Timed, Trigger, local, trigger_of
 from skills.files.errors import InputError
 
@@ -21,9 +20,7 @@ LATE: Final = timedelta(seconds=90)
 SET_BACK: Final = timedelta(hours=1)
 """A clock that is set back by less has no occurrence come twice; by more, occurrences come as it shows their times."""
 MOST_WAITING: Final = 100
-_ENDED_SQL: Final = (
-    "SELECT lowest, last, ended, world_name, robot FROM battery JOIN mission ON id = mission WHERE ended"
-)
+_ENDED: Final = "SELECT request, lowest_charge, last_charge, ended FROM mission WHERE ended AND last_charge IS NOT NULL"
 
 
 @dataclass(frozen=True)
@@ -59,17 +56,14 @@ class StandingMissions:
         now = self._store.now()
         if isinstance(trigger, Once) and trigger.latest(now, now, self._zone) is not None:
             raise InputError(f"{trigger} has passed", hint="give a time to come, or queue the mission without --at")
-        times = {"anchor": now.isoformat(), "since": now.isoformat()}
+        told = {"trigger": str(trigger), "missed": missed.value, "anchor": now.isoformat(), "since": now.isoformat()}
         with self._store.writing() as connection:
-            values = {**row_of(request), "queued": False, "state": MissionState.STANDING.value}
-            number = insert(connection, "mission", values)
-            told = {"mission": number, "trigger": str(trigger), "missed": missed.value, **times}
-            insert(connection, "standing", told)
+            number = insert(connection, request, state=MissionState.STANDING, queued=False, **told)
         return StandingMission(number, request, trigger, missed, now, now)
 
     def missions(self) -> tuple[StandingMission, ...]:
         """All of them, in the order in which they came."""
-        rows = self._store.rows("SELECT * FROM mission JOIN standing ON standing.mission = id ORDER BY id")
+        rows = self._store.rows("SELECT * FROM mission WHERE trigger IS NOT NULL ORDER BY id")
         return tuple(map(_standing, rows))
 
     def fire(self, chosen: Sequence[tuple[StandingMission, Request]], why: str) -> tuple[StoredMission, ...]:
@@ -90,7 +84,7 @@ class StandingMissions:
         full before `serving_since`. That an occurrence has been dealt with is written together with its mission.
         """
         now, numbers = self._store.now(), list[int]()
-        ended = self._store.rows(_ENDED_SQL)
+        ended = self._store.rows(_ENDED)
         for each in self.missions():
             if each.since - now > SET_BACK:
                 self._deal_with(each, now, None)
@@ -117,25 +111,25 @@ class StandingMissions:
             return each.trigger.latest(now, each.anchor, self._zone)
         if not isinstance(each.trigger, OnBatteryFull):
             return None
-        own, full = (each.request.world_name, each.request.robot), each.trigger
-        times = (
-            datetime.fromisoformat(row["ended"])
-            for row in ended
-            if (row["world_name"], row["robot"]) == own and full.rises(row["lowest"], row["last"])
-        )
+        full, times = each.trigger, list[datetime]()
+        for row in ended:
+            request = Request.from_json(row["request"])
+            same = (request.world_name, request.robot) == (each.request.world_name, each.request.robot)
+            if same and full.rises(row["lowest_charge"], row["last_charge"]):
+                times.append(datetime.fromisoformat(row["ended"]))
         return max((at for at in times if at <= now), default=None)
 
     def _deal_with(self, each: StandingMission, now: datetime, why: str | None) -> list[int]:
         """Note that all occurrences up to now have been dealt with, and queue a mission where there is a reason."""
         with self._store.writing() as connection:
             told = (now.isoformat(), each.id)
-            still_there = connection.execute("UPDATE standing SET since = ? WHERE mission = ?", told).rowcount
+            still_there = connection.execute("UPDATE mission SET since = ? WHERE id = ?", told).rowcount
             return [_queue(connection, each.id, each.request, why)] if why is not None and still_there else []
 
     def _refuse_more(self, connection: sqlite3.Connection, each: StandingMission) -> None:
-        if not connection.execute("SELECT 1 FROM standing WHERE mission = ?", (each.id,)).fetchone():
+        if not connection.execute("SELECT 1 FROM mission WHERE id = ?", (each.id,)).fetchone():
             raise InputError(f"standing mission {each.id} was removed", hint="`errand queue list` shows the others")
-        counting = "SELECT count(*) FROM origin JOIN mission ON id = mission WHERE standing = ? AND state = 'queued'"
+        counting = "SELECT count(*) FROM mission WHERE standing = ? AND state = 'queued'"
         (waiting,) = connection.execute(counting, (each.id,)).fetchone()
         if waiting >= MOST_WAITING:
             raise TooManyError(f"{waiting} missions of standing mission {each.id} wait already", hint="try again later")
@@ -146,15 +140,13 @@ class TooManyError(InputError):
 
 
 def _queue(connection: sqlite3.Connection, standing: int, request: Request, why: str) -> int:
-    number = insert(connection, "mission", {**row_of(request), "queued": True, "state": MissionState.QUEUED.value})
-    insert(connection, "origin", {"mission": number, "standing": standing, "why": why})
-    return number
+    return insert(connection, request, state=MissionState.QUEUED, queued=True, standing=standing, why=why)
 
 
 def _standing(row: sqlite3.Row) -> StandingMission:
     return StandingMission(
         id=row["id"],
-        request=request_of(dict(row)),
+        request=Request.from_json(row["request"]),
         trigger=trigger_of(row["trigger"]),
         missed=Missed(row["missed"]),
         anchor=datetime.fromisoformat(row["anchor"]),

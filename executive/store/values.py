@@ -11,12 +11,20 @@ import enum
 import json
 import sys
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any, Final
 
 import numpy as np
+from pydantic import TypeAdapter
 from pydrake.math import RigidTransform
 
 _KIND: Final = "$kind"
+
+
+@cache
+def form(kind: Any) -> TypeAdapter[Any]:
+    """The JSON form of a type that is known, such as a request: writes and reads its values."""
+    return TypeAdapter(kind)
 
 
 def to_text(value: Any) -> str:

@@ -14,7 +14,6 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Final
 
-from executive.store.database import told
 from executive.store.missions import MissionStore
 from skills.files.errors import InputError
 
@@ -31,7 +30,7 @@ class WakeupPipe:
     def __init__(self, store: MissionStore) -> None:
         """Listen beside a store. Raises InputError: no pipe can be made there."""
         self._store, self._path = store, _path(store.path)
-        with told(store.path):
+        with store.kind.failures(store.path):
             with suppress(FileExistsError):
                 os.mkfifo(self._path, 0o600)
             self._pipe = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)  # never without a writer, so never at an end

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from types import MappingProxyType
@@ -114,15 +113,6 @@ class Variation:
             f"friction: {self.friction:g} times": self.friction != 1.0,
         }
         return tuple(words for words, varied in told.items() if varied)
-
-    def to_text(self) -> str:
-        """As JSON."""
-        return json.dumps(asdict(self))
-
-    @staticmethod
-    def of_text(text: str) -> Variation:
-        """What `to_text` wrote."""
-        return Variation(**json.loads(text))
 
 
 NO_VARIATION: Final = Variation()

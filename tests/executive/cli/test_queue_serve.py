@@ -17,7 +17,7 @@ from executive.cli.entry import app
 from executive.cli.queue_serve import MOST_STARTS, Ended, MissionRunner, QueueServer
 from executive.mission.request import Request
 from executive.run.journal import TickNote
-from executive.store.database import full_disk
+from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.triggers import Missed, OnCall, trigger_of
@@ -279,7 +279,7 @@ class TestMissionRunner:
     def test_a_full_disk_ends_the_server(self, runner, store, mission, monkeypatch):
         def refuse(*_, **__):
             store.begin(1)
-            raise full_disk(store.path)
+            raise STORE_FILE.full_disk(store.path)
 
         monkeypatch.setattr(queue_serve, "start_of", refuse)
         with pytest.raises(InputError, match="the disk is full"):
@@ -326,5 +326,5 @@ def test_a_server_of_its_own_runs_what_is_called_and_ends_at_a_polite_kill(tmp_p
     assert server.returncode == 0
     assert json.loads(told) == {"missions": [{"mission": 2, "outcome": "success", "achieved": True}]}
     with MissionStore(tmp_path / "missions.sqlite") as store:
-        (battery,) = store.rows("SELECT lowest, last, ended FROM battery")
-        assert 0.9 < battery["lowest"] <= battery["last"] <= 1.0 and battery["ended"]
+        (battery,) = store.rows("SELECT lowest_charge, last_charge, ended FROM mission WHERE ended")
+        assert 0.9 < battery["lowest_charge"] <= battery["last_charge"] <= 1.0 and battery["ended"]

@@ -12,7 +12,7 @@ from py_trees.common import Status
 from executive.mission.request import Request, Start
 from executive.mission.scenario import Scenario
 from executive.run.journal import TickNote
-from executive.store.database import VERSION
+from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.snapshot import Change, NodeState
 from executive.words.robots import RobotSetup
@@ -45,7 +45,7 @@ def test_a_simulated_world_is_kept_before_what_a_tick_brought_and_not_for_a_pose
         journal = store.journal(mission)
         journal.keep_world = lambda: kept.append(store.has_steps(mission))
         journal.note(note(pose=Pose2D(1.0, 2.0, 0.5)))
-        assert (kept, store.mission(mission).pose) == ([], Pose2D(1.0, 2.0, 0.5))
+        assert (kept, store.mission(mission).poses) == ([], {"Alice": Pose2D(1.0, 2.0, 0.5)})
         journal.note(note(changed("a/b", Status.RUNNING), now_s=1.1))
         assert (kept, store.has_steps(mission)) == ([False], True)
 
@@ -201,34 +201,20 @@ def test_another_programs_database_is_refused(path):
     with sqlite3.connect(path) as other:
         other.execute("CREATE TABLE recipes (name)")
     other.close()
-    with pytest.raises(InputError, match="no store of missions; name another file"):
+    with pytest.raises(InputError, match="no store; name another file"):
         MissionStore(path)
 
 
-def test_a_store_of_another_version_is_refused(path):
+def test_a_store_of_an_older_version_is_refused_with_what_to_do(path):
     MissionStore(path).close()
     with sqlite3.connect(path) as other:
-        other.execute(f"PRAGMA user_version = {VERSION + 1}")
+        other.execute(f"PRAGMA user_version = {STORE_FILE.version - 1}")
     other.close()
-    with pytest.raises(InputError, match=f"version {VERSION + 1}, and this errand reads {VERSION}"):
+    with pytest.raises(
+        InputError,
+        match=f"version {STORE_FILE.version - 1}, and this errand reads {STORE_FILE.version}; finish its missions",
+    ):
         MissionStore(path)
-
-
-def test_a_store_of_version_4_is_brought_up_to_date(path):
-    with MissionStore(path) as store:
-        kept = store.add(REQUEST, queued=True)
-    with sqlite3.connect(path) as old:
-        for table in ("standing", "origin", "battery", "given", "part"):
-            old.execute(f"DROP TABLE {table}")
-        for column in ("scenario", "time_of_day", "time_limit_s", "variation", "robots"):
-            old.execute(f"ALTER TABLE mission DROP COLUMN {column}")
-        old.execute("PRAGMA user_version = 4")
-    old.close()
-    with MissionStore(path, create=False) as store:
-        assert store.missions() == (kept,)
-        store.journal(kept.id).note(note(changed("a", Status.SUCCESS), charge=0.5))
-        store.finish(kept.id, MissionState.SUCCESS, "done")
-        assert store.rows("SELECT lowest, last FROM battery")[0]["last"] == 0.5
 
 
 def test_a_mission_keeps_its_robots(path):
@@ -254,8 +240,8 @@ def test_each_of_several_robots_has_its_own_steps_values_and_pose(path):
         alice, bob = store.memory(mission, "Alice"), store.memory(mission, "Bob")
         assert ([*alice.steps], alice.board, alice.pose) == (["alice/a"], {"alice/x": 1.0}, Pose2D(1.0, 0.0, 0.0))
         assert ([*bob.steps], bob.board, bob.pose) == (["bob/a"], {"bob/x": 2.0}, Pose2D(2.0, 0.0, 0.0))
-        assert store.poses(mission)["Carl"] == Pose2D(5.0, 5.0, 0.0)
-        assert [tuple(row) for row in store.rows("SELECT lowest, last FROM battery")] == [(0.5, 0.5)]
+        assert store.mission(mission).poses["Carl"] == Pose2D(5.0, 5.0, 0.0)
+        assert [tuple(row) for row in store.rows("SELECT lowest_charge, last_charge FROM mission")] == [(0.5, 0.5)]
 
 
 def test_the_lowest_charge_of_a_mission_is_kept_over_a_restart_and_the_last(path):
@@ -265,7 +251,9 @@ def test_the_lowest_charge_of_a_mission_is_kept_over_a_restart_and_the_last(path
         for tick, charge in enumerate((0.8, None, 0.3, 0.6)):
             journal.note(note(*([changed(f"a/{tick}", Status.SUCCESS)] if tick != 2 else []), charge=charge))
         store.journal(mission).note(note(changed("b", Status.SUCCESS), charge=0.9))
-        assert [tuple(row) for row in store.rows("SELECT lowest, last, ended FROM battery")] == [(0.3, 0.9, None)]
+        assert [tuple(row) for row in store.rows("SELECT lowest_charge, last_charge, ended FROM mission")] == [
+            (0.3, 0.9, None)
+        ]
 
 
 def test_a_folder_in_place_of_the_store_is_refused(tmp_path):

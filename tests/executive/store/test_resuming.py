@@ -10,8 +10,8 @@ from executive.mission.request import Request
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
+from executive.store.memory import Memory, StepRecord
 from executive.store.missions import MissionStore
-from executive.store.records import Memory, StepRecord
 from executive.store.resuming import resumed_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.node import NodeSpec

@@ -3,14 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from py_trees.common import Status
 
-from executive.store.records import StepRecord
+from skills.api import Cause
+from skills.robot import Pose2D
+
+__all__ = ["Memory", "Recollection", "StepRecord"]
 
 AWAKE_AFTER_S = 0.5
 PATIENCE_S = 10.0
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """What a node last said: its status, when that began, and for a skill under way its checkpoint."""
+
+    status: Status
+    cause: Cause | None
+    message: str
+    clock_s: float
+    checkpoint: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def ended(self) -> bool:
+        """True when the node came to an end."""
+        return self.status in (Status.SUCCESS, Status.FAILURE)
+
+
+@dataclass(frozen=True)
+class Memory:
+    """All that is known of a robot's interrupted mission: its nodes by path id, its blackboard, the last pose."""
+
+    steps: Mapping[str, StepRecord]
+    board: Mapping[str, Any]
+    pose: Pose2D | None
 
 
 class Recollection:

@@ -1,10 +1,8 @@
 """Scenario files: what they say, and what is refused with its line."""
 
-import json
-
 import pytest
 
-from executive.mission.scenario import Scenario
+from executive.mission.request import Request
 from executive.mission.scenario_file import load_scenario, scenario_of
 from executive.words.knowledge import Door, Knowledge, Person, Place, Pose, SurfaceFacts, ThingFacts
 from skills.files.errors import InputError
@@ -86,13 +84,14 @@ def test_an_object_is_put_at_a_point(read):
     assert move["to"] == (1.0, 2.0, 0.0)
 
 
-def test_a_scenario_comes_back_from_its_text(read):
+def test_a_scenario_comes_back_from_the_json_of_its_request(read):
     scenario = read(
         "faults: [arm refuses]\nevents:\n  - {person: Robin, at: 1, to: kitchen}\n"
         "  - {door: [hall, kitchen], opens: 4}\n  - {object: coke, at: 1, to: table}\n"
     )
-    back = Scenario.of_text(scenario.to_text())
-    assert json.loads(back.to_text()) == json.loads(scenario.to_text())
+    text = Request(scenario=scenario).to_json()
+    back = Request.from_json(text).scenario
+    assert Request(scenario=back).to_json() == text
     assert back.lines() == scenario.lines() == (
         "fault: arm refuses",
         "Robin sets off at 1 s",

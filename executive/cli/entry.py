@@ -69,7 +69,9 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "world": _Command("world_command", "world", "Worlds made of any map, and how a world looks."),
     "object": _Command("object_command", "object_group", "Objects of your own: any mesh becomes a model for worlds."),
     "plugins": _Command("plugins", "plugins", "What other distributions add, and what of it is broken."),
-    "warm-up": _Command("kernels", "warm_up", "Compile the numeric code for this machine, so that runs begin at once."),
+    "warm-up": _Command(
+        "warm_up_command", "warm_up", "Compile the numeric code for this machine, so that runs begin at once."
+    ),
     "new-skill": _Command("new_skill_command", "new_skill", "Write an installable package with a skill and tests."),
 }
 """The commands by name, in the order of the help."""

@@ -12,9 +12,9 @@ from typing import Any, Final
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from executive.app.mission_files import mission_file
 from executive.cli.evaluation_run import lost_outcome, prepared_run, run_one
 from executive.cli.feasibility import refuse_impossible
-from executive.cli.missions_command import mission_file
 from executive.cli.output import NOT_ACHIEVED, print_json
 from executive.cli.results_view import show_cases, standings_json
 from executive.cli.stack_command import stack_file

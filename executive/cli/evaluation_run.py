@@ -18,7 +18,6 @@ from executive.cli.feasibility import refuse_impossible
 from executive.cli.memory import return_memory
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Prepared, prepare
-from executive.cli.run_options import robots_of
 from executive.cli.simulated import run_simulated
 from executive.evaluation.evidence import evidence_of, steps_of
 from executive.evaluation.outcome import RunOutcome, Standing
@@ -26,6 +25,8 @@ from executive.evaluation.runs import RunSpec
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
 from executive.record.reader import read_events
+from executive.words.robots import parse_robots
+from plant.kinds import robot_kinds
 from skills.files.errors import InputError
 
 __all__ = ["lost_outcome", "request_of", "run_one"]
@@ -90,7 +91,7 @@ def request_of(spec: RunSpec, out: Path) -> Request:
         scenario_files=() if spec.scenario is None else (Path(spec.scenario),),
         time_limit_s=spec.time_limit_s,
         variation=spec.variation,
-        robots=robots_of(spec.robot_words or None),
+        robots=parse_robots(spec.robot_words, robot_kinds()) if spec.robot_words else {},
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +14,6 @@ import typer
 from numba.core.dispatcher import Dispatcher
 
 from executive.cli.mission_run import run_request
-from executive.cli.output import refusals
 from executive.cli.requests import prepare
 from executive.cli.simulated import SimulatedBackend
 from executive.cli.starts import DEFAULT_KIND, alone
@@ -23,10 +21,9 @@ from executive.cli.worlds import open_world
 from executive.mission.request import Request
 from executive.words.steps import DEFAULT_WORLD
 from skills.estimate.compiled import CompiledFunction
-from skills.files.errors import count_text
 from skills.navigate.lattice import search
 
-__all__ = ["compile_first", "compile_kernels", "newly_compiled", "warm_up"]
+__all__ = ["compile_first", "compile_kernels", "newly_compiled"]
 
 _MISSION: Final = """
 name: warm up
@@ -50,14 +47,6 @@ _DRIVES: Final = (
 TICK_S: Final = 0.05
 _DRIVEN_S: Final = 2.5
 _SURVEYED_S: Final = 4.0
-
-
-def warm_up() -> None:
-    """Compile the numeric code for this machine, so that the first run begins at once."""
-    begun_s = time.monotonic()
-    with refusals():
-        compile_kernels()
-    typer.echo(f"{count_text(newly_compiled(), 'function')} compiled in {time.monotonic() - begun_s:.0f} s")
 
 
 def compile_first() -> None:

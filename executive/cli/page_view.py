@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from executive.app.mission_files import shipped_missions
 from executive.cli.backend import Scene
 from executive.cli.feasibility import refuse_impossible
-from executive.cli.missions_command import shipped_missions
 from executive.cli.requests import Prepared, prepare
 from executive.cli.talk import Talk, load_ahead
 from executive.conversation import ReplyKind
@@ -55,8 +55,7 @@ class PageView:
 
     def begin(self, log: EventLog, scene: Scene | None) -> None:
         """Serve the page and print its address. Raises InputError when the port is taken."""
-        from executive.cli.replay_command import served
-        from executive.view.server import PageContent
+        from executive.view.server import PageContent, served
 
         log.listen(self._feed)
         sentences: dict[str, Action] = {}
@@ -82,7 +81,7 @@ class PageView:
 
     def stay(self, limit_s: float | None) -> None:
         """Keep serving until Ctrl-C or the limit (s, on the wall's clock), and close."""
-        from executive.cli.replay_command import wait
+        from executive.view.server import wait
 
         try:
             if self._server is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +11,7 @@ from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, refusals
 from executive.record.history import History, read_history
 from executive.view.replay import fed, to_html
-from executive.view.server import PageContent, PageServer
+from executive.view.server import PageContent, served, wait
 from skills.files.errors import InputError
 from skills.quantities import Port, Wait
 
@@ -50,19 +49,3 @@ def _serve(history: History, recording: Path | None, port: int, view_for_s: floa
     with served(content, port) as server:
         console_for(False).print(f"{server.url}\n(Ctrl-C ends it)", markup=False)
         wait(view_for_s)
-
-
-def served(content: PageContent, port: int) -> PageServer:
-    """A server for the content. Raises InputError when the port is taken."""
-    try:
-        return PageServer(content, port=port)
-    except OSError as error:
-        raise InputError(f"cannot serve at port {port} ({error.strerror})", hint="name another --port") from error
-
-
-def wait(limit_s: float | None) -> None:
-    """Block until Ctrl-C or the limit (s, on the wall's clock)."""
-    try:
-        threading.Event().wait(limit_s)
-    except KeyboardInterrupt:
-        return

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from executive.app.mission_files import mission_file
 from executive.cli.answers import answerer, ask_at_terminal
-from executive.cli.missions_command import mission_file
 from executive.cli.starts import DEFAULT_KIND, PlacedRobot
 from executive.cli.worlds import knowledge_of, open_world, refuse_blocked, with_map
 from executive.language.parser import load_parser

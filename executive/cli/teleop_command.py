@@ -18,7 +18,6 @@ from executive.cli.keys import keys_pressed
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, refusals
 from executive.cli.page_view import scene_actions
-from executive.cli.replay_command import served
 from executive.cli.run_options import START
 from executive.cli.saved_pose import save_pose
 from executive.cli.starts import alone
@@ -27,7 +26,7 @@ from executive.mission.request import Start
 from executive.run.worker import LockStepWorker
 from executive.view.actions import Action, RefusedError
 from executive.view.feed import Feed
-from executive.view.server import PageContent
+from executive.view.server import PageContent, served
 from plant.worlds.world import World
 from skills.api import SkillContext
 from skills.estimate.grid_map import load_grid_map

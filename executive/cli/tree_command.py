@@ -12,7 +12,7 @@ from typing import Annotated, Final
 
 import typer
 
-from executive.cli.missions_command import shipped_missions
+from executive.app.mission_files import shipped_missions
 from executive.cli.number_options import quantity_option
 from executive.cli.output import refusals
 from executive.cli.requests import prepare

@@ -10,6 +10,7 @@ import asyncio
 import json
 import secrets
 import socket
+import threading
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
@@ -208,3 +209,19 @@ def _values(body: bytes | None) -> Mapping[str, Any]:
         return json_object(body, what="the action's values", hint="send an object")
     except InputError as error:
         raise RefusedError(str(error)) from error
+
+
+def served(content: PageContent, port: int) -> PageServer:
+    """A server for the content. Raises InputError when the port is taken."""
+    try:
+        return PageServer(content, port=port)
+    except OSError as error:
+        raise InputError(f"cannot serve at port {port} ({error.strerror})", hint="name another --port") from error
+
+
+def wait(limit_s: float | None) -> None:
+    """Block until Ctrl-C or the limit (s, on the wall's clock)."""
+    try:
+        threading.Event().wait(limit_s)
+    except KeyboardInterrupt:
+        return

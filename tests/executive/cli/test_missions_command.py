@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from executive.app.mission_files import mission_file, shipped_missions
 from executive.cli import entry
-from executive.cli.missions_command import mission_file, shipped_missions
 from skills.files.errors import InputError
 
 MISSIONS = Path(__file__).parents[3] / "missions"

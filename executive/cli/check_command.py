@@ -13,12 +13,12 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from executive.cli.feasibility import check_prepared, route_planner_of
+from executive.app.feasibility import check_prepared, route_planner_of
+from executive.app.requests import Prepared, prepare
+from executive.app.worlds import refuse_unusable
 from executive.cli.output import BAD_INPUT, console_for, print_json, refusals
-from executive.cli.requests import Prepared, prepare
 from executive.cli.run_options import ROBOTS, SET, START, robots_of
 from executive.cli.stack_command import STACK
-from executive.cli.worlds import refuse_unusable
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
 from executive.tree.compiler import CompiledTree

@@ -14,13 +14,13 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from executive.app.evaluate.worker_pool import Pool
+from executive.app.evaluate.workers import Workers
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json, refusals, show_table
 from executive.cli.refine_command import refine_command
 from executive.cli.score_command import score_command
 from executive.cli.train_command import train_command
-from executive.cli.worker_pool import Pool
-from executive.evaluation.workers import Workers
 from plant.dataset.errors import DatasetError
 from skills.files.errors import InputError
 from skills.quantities import Count, Quantity, Seed

@@ -12,20 +12,20 @@ from typing import Any, Final
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from executive.app.evaluate.evaluation_run import lost_outcome, prepared_run, run_one
+from executive.app.evaluate.installed import installed_code
+from executive.app.evaluate.outcome import RunOutcome
+from executive.app.evaluate.results import ResultsFile
+from executive.app.evaluate.runs import Evaluation, RunSpec
+from executive.app.evaluate.scenario import load_evaluation
+from executive.app.evaluate.summary import Case, groups_of, totals_of
+from executive.app.evaluate.worker_pool import Pool
+from executive.app.evaluate.workers import Workers
+from executive.app.feasibility import refuse_impossible
 from executive.app.mission_files import mission_file
-from executive.cli.evaluation_run import lost_outcome, prepared_run, run_one
-from executive.cli.feasibility import refuse_impossible
 from executive.cli.output import NOT_ACHIEVED, print_json
 from executive.cli.results_view import show_cases, standings_json
 from executive.cli.stack_command import stack_file
-from executive.cli.worker_pool import Pool
-from executive.evaluation.installed import installed_code
-from executive.evaluation.outcome import RunOutcome
-from executive.evaluation.results import ResultsFile
-from executive.evaluation.runs import Evaluation, RunSpec
-from executive.evaluation.scenario import load_evaluation
-from executive.evaluation.summary import Case, groups_of, totals_of
-from executive.evaluation.workers import Workers
 from skills.files.errors import Problems
 
 __all__ = ["Handling", "evaluate_runs", "evaluate_scenario", "give_out_runs"]

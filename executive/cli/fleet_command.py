@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
-from executive.cli.durable import STORE
+from executive.app.durable import STORE
+from executive.app.report import VERDICTS
 from executive.cli.number_options import quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
-from executive.cli.report import VERDICTS
 from executive.cli.run_options import (
     FAULT,
     NO_RECORD,
@@ -73,10 +73,10 @@ def run(
     console = console_for(as_json)
     store = _store(queue)
     with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
-        from executive.cli.fleet_report import told
-        from executive.cli.fleet_run import run_fleet
-        from executive.cli.fleet_setup import simulated_fleet
-        from executive.cli.page_view import PageView
+        from executive.app.fleet_report import told
+        from executive.app.fleet_run import run_fleet
+        from executive.app.fleet_setup import simulated_fleet
+        from executive.app.page_view import PageView
 
         setups, queued = robots_of(robots), _to_do(missions)
         faults = _faults(fault or (), tuple(map(display_name, setups)))
@@ -115,7 +115,7 @@ def run(
 def status(queue: Queue, as_json: AsJson = False) -> None:
     """Show which robot has which mission, also while they run."""
     with refusals(), MissionStore(_store(queue), create=False) as missions:
-        from executive.cli.fleet_report import told
+        from executive.app.fleet_report import told
 
         results = told(missions, [each.id for each in missions.missions() if each.queued])
         names = {each.id: each.request.name for each in missions.missions()}

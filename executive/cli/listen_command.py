@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from executive.app.signals import interrupted_by_hang_up
+from executive.app.worlds import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, console_for, refusals
 from executive.cli.run_options import ROBOTS, robots_of
-from executive.cli.signals import interrupted_by_hang_up
-from executive.cli.worlds import knowledge_of, open_world
 from executive.language.parser import load_parser
 from executive.language.robots import Part
 from executive.language.understand import Status, Understanding

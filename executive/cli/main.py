@@ -12,14 +12,17 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from executive.cli.durable import STORE, give_up_broken, kept, new_run, run_arguments
-from executive.cli.feasibility import refuse_impossible
+from executive.app.durable import STORE, give_up_broken, kept, new_run, run_arguments
+from executive.app.evaluate.scenario import is_evaluation
+from executive.app.evaluate.seeds import seed_range
+from executive.app.feasibility import refuse_impossible
+from executive.app.mission_run import Finished
+from executive.app.page_view import PageView, queueing
+from executive.app.requests import Prepared, prepare
+from executive.app.simulated import run_simulated
 from executive.cli.listen_command import hear_request
-from executive.cli.mission_run import Finished
 from executive.cli.number_options import quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
-from executive.cli.page_view import PageView, queueing
-from executive.cli.requests import Prepared, prepare
 from executive.cli.run_options import (
     CLUTTER,
     FAULT,
@@ -41,7 +44,6 @@ from executive.cli.run_options import (
     time_of_day,
 )
 from executive.cli.shown import control_for, show_files, show_run, voice_for
-from executive.cli.simulated import run_simulated
 from executive.cli.stack_command import STACK
 from executive.cli.sweep import (
     COUNTS,
@@ -53,8 +55,6 @@ from executive.cli.sweep import (
     sweep,
     totals,
 )
-from executive.evaluation.scenario import is_evaluation
-from executive.evaluation.seeds import seed_range
 from executive.language.questions import QuestionPolicy
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
@@ -223,9 +223,9 @@ def evaluate(
         own = (say, world, given, wake, answer, questions, stack, own_map, start, fault, scenario)
         has_own = any(each is not None for each in own) or random_faults > 0 or each_fault
         if random_missions is not None or (file is not None and is_evaluation(file)):
+            from executive.app.evaluate.worker_pool import Pool
             from executive.cli.evaluate_scenario import Handling, evaluate_scenario
             from executive.cli.random_evaluation import evaluate_random_missions
-            from executive.cli.worker_pool import Pool
 
             how = Handling(console_for(as_json), Pool(jobs, workers, scheduler), results, out, anyway, as_json)
             if random_missions is not None:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from executive.app.signals import cancelled_by_signals
+from executive.app.worlds import open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
-from executive.cli.signals import cancelled_by_signals
-from executive.cli.worlds import open_world
 from executive.run.control import Control
 from skills.files.errors import InputError
 from skills.files.outside import read_text
@@ -71,7 +71,7 @@ def build(
         opened = open_world(world) if people else open_world(world).without_people()
         points = None if route is None else _route_points(route)
         mapper = _mapper(opened, out)
-        from executive.cli.kernels import compile_first
+        from executive.app.kernels import compile_first
 
         compile_first()
         building = _Building(opened, seed, mapper, points, out, console)
@@ -99,8 +99,8 @@ class _Building:
         out: Path,
         console: Console,
     ) -> None:
-        from executive.cli.assembly import simulate
-        from executive.cli.starts import alone
+        from executive.app.assembly import simulate
+        from executive.app.starts import alone
         from skills.geometry import compose
         from skills.mapping.survey import Survey
         from skills.robot import Pose2D
@@ -189,8 +189,8 @@ class _Building:
         )
 
     def _draw(self) -> None:
+        from executive.app.picture_files import write_picture
         from executive.cli.map_picture import map_picture
-        from executive.cli.picture_files import write_picture
 
         if not self._mapper.keyframes:
             return

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
+from executive.app.worlds import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, print_json, refusals
-from executive.cli.worlds import knowledge_of, open_world
 from executive.language.explain import explain
 from executive.language.explain_views import arcs_svg, explanation_lines
 from executive.language.parser import load_parser

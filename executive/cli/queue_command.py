@@ -11,10 +11,10 @@ from typing import Annotated, Any
 
 import typer
 
-from executive.cli.durable import STORE
+from executive.app.durable import STORE
+from executive.app.requests import prepare
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
-from executive.cli.requests import prepare
 from executive.cli.run_options import ROBOTS, SET, robots_of
 from executive.cli.serve_command import AsJson, Out, Store, serve
 from executive.cli.stack_command import STACK
@@ -92,7 +92,7 @@ def add(
         asked = replace(asked, robots=robots_of(robots))
         prepared = prepare(asked)
         if not anyway:
-            from executive.cli.feasibility import refuse_impossible
+            from executive.app.feasibility import refuse_impossible
 
             refuse_impossible(prepared)
         request = prepared.request.from_anywhere()

@@ -11,11 +11,11 @@ from typing import Any, Final, Protocol
 
 from rich.console import Console
 
-from executive.cli.durable import Durable, as_it_was, kept, new_run, next_run, plant_file, same_world, take_up
-from executive.cli.memory import return_memory
-from executive.cli.requests import Prepared, prepare
+from executive.app.durable import Durable, as_it_was, kept, new_run, next_run, plant_file, same_world, take_up
+from executive.app.memory import return_memory
+from executive.app.requests import Prepared, prepare
+from executive.app.simulated import run_simulated
 from executive.cli.shown import control_for, show_files, show_run
-from executive.cli.simulated import run_simulated
 from executive.run.control import Control
 from executive.store.database import StoreError
 from executive.store.missions import MissionState, MissionStore, StoredMission

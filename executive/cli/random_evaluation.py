@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from executive.app.evaluate.random_missions import KnownWorld, random_evaluation
+from executive.app.evaluate.runs import Evaluation
+from executive.app.evaluate.scenario import MOST_RUNS
+from executive.app.evaluate.seeds import first_seeds
+from executive.app.feasibility import abilities_in
+from executive.app.worlds import knowledge_of, open_world
 from executive.cli.evaluate_scenario import Handling, evaluate_runs
-from executive.cli.feasibility import abilities_in
-from executive.cli.worlds import knowledge_of, open_world
-from executive.evaluation.random_missions import KnownWorld, random_evaluation
-from executive.evaluation.runs import Evaluation
-from executive.evaluation.scenario import MOST_RUNS
-from executive.evaluation.seeds import first_seeds
 from executive.words.steps import DEFAULT_WORLD
 from skills.files.errors import InputError
 from skills.files.outside import is_file

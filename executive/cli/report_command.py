@@ -10,11 +10,9 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from executive.cli.output import console_for, print_json, refusals, show_table
-from executive.cli.results_view import command_of, log_folder, show_cases, standings_json
-from executive.evaluation.page import EvaluationPage, to_page
-from executive.evaluation.results import ResultsFile
-from executive.evaluation.summary import (
+from executive.app.evaluate.page import EvaluationPage, to_page
+from executive.app.evaluate.results import ResultsFile
+from executive.app.evaluate.summary import (
     Case,
     causes_of,
     compared,
@@ -23,6 +21,8 @@ from executive.evaluation.summary import (
     time_rows,
     totals_of,
 )
+from executive.cli.output import console_for, print_json, refusals, show_table
+from executive.cli.results_view import command_of, log_folder, show_cases, standings_json
 from skills.files.errors import InputError
 
 __all__ = ["report"]

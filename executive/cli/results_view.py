@@ -9,10 +9,9 @@ from typing import Any
 
 from rich.console import Console
 
-from executive.cli.evaluation_run import request_of
-from executive.cli.output import show_table
-from executive.evaluation.runs import RunSpec
-from executive.evaluation.summary import (
+from executive.app.evaluate.evaluation_run import request_of
+from executive.app.evaluate.runs import RunSpec
+from executive.app.evaluate.summary import (
     GROUP_HEAD,
     STANDING_HEAD,
     Case,
@@ -22,6 +21,7 @@ from executive.evaluation.summary import (
     standing_texts,
     to_look_at,
 )
+from executive.cli.output import show_table
 
 __all__ = ["command_of", "log_folder", "show_cases", "standings_json"]
 

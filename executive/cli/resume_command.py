@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
-from executive.cli.durable import STORE
+from executive.app.durable import STORE
 from executive.cli.number_options import quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.queue_run import go_on, run_or_set_aside, run_queue

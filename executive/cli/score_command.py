@@ -14,11 +14,11 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from executive.cli.detector_choice import detector_of
+from executive.app.detector_choice import detector_of
+from executive.app.picture_files import read_picture, write_picture
 from executive.cli.learning import check_libraries
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json, refusals
-from executive.cli.picture_files import read_picture, write_picture
 from executive.cli.score_report import scores_json, show_scores
 from executive.cli.worst_sheet import Shown, contact_sheet
 from skills.detection import Detection

@@ -9,10 +9,10 @@ from typing import Annotated, Final
 
 import typer
 
-from executive.cli.durable import STORE
+from executive.app.durable import STORE
+from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json, refusals
-from executive.cli.signals import ended_by_signals
 from executive.store.missions import MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.wakeup import WakeupPipe
@@ -45,7 +45,7 @@ def serve(
     as_json: AsJson = False,
 ) -> None:
     """Wait for triggers and run what is queued, until Ctrl-C: at times, on a full battery, calls and messages."""
-    from executive.cli.listeners import CallAddress, Listeners
+    from executive.app.listeners import CallAddress, Listeners
     from executive.cli.queue_run import resumable_line
     from executive.cli.queue_serve import MissionRunner, QueueServer
 

@@ -11,11 +11,11 @@ from typing import Any, Final, Protocol
 from rich.console import Console
 from rich.text import Text
 
-from executive.cli.durable import STORE
+from executive.app.durable import STORE
+from executive.app.mission_run import Finished, both
+from executive.app.requests import Prepared
+from executive.app.talk import Talk, load_ahead
 from executive.cli.live import live_view
-from executive.cli.mission_run import Finished, both
-from executive.cli.requests import Prepared
-from executive.cli.talk import Talk, load_ahead
 from executive.language.parser import load_parser
 from executive.record.event_log import Listener
 from executive.record.schemas import SPEECH

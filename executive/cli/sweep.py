@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from executive.cli.report import VERDICTS, RefereeReport, RunReport
+from executive.app.report import VERDICTS, RefereeReport, RunReport
 from executive.mission.request import Request
 from executive.mission.scenario import NO_SCENARIO, Scenario
 from executive.words.slug import slug

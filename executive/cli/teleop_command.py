@@ -12,16 +12,16 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from executive.cli.assembly import simulate
-from executive.cli.backend import Scene
+from executive.app.assembly import simulate
+from executive.app.backend import Scene
+from executive.app.page_view import scene_actions
+from executive.app.saved_pose import save_pose
+from executive.app.starts import alone
+from executive.app.worlds import open_world, refuse_blocked
 from executive.cli.keys import keys_pressed
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, refusals
-from executive.cli.page_view import scene_actions
 from executive.cli.run_options import START
-from executive.cli.saved_pose import save_pose
-from executive.cli.starts import alone
-from executive.cli.worlds import open_world, refuse_blocked
 from executive.mission.request import Start
 from executive.run.worker import LockStepWorker
 from executive.view.actions import Action, RefusedError
@@ -64,7 +64,7 @@ def teleop(
         placed = alone(opened, seed=seed, start=None if start is None else Start.of(start))
         if start is not None:
             refuse_blocked(opened, placed.start)
-        from executive.cli.kernels import compile_first
+        from executive.app.kernels import compile_first
 
         compile_first()
         simulation = simulate(opened, {robot: placed}, seed=seed, record=False)

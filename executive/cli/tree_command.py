@@ -13,9 +13,9 @@ from typing import Annotated, Final
 import typer
 
 from executive.app.mission_files import shipped_missions
+from executive.app.requests import prepare
 from executive.cli.number_options import quantity_option
 from executive.cli.output import refusals
-from executive.cli.requests import prepare
 from executive.mission.request import Request
 from executive.record.history import read_history
 from executive.tree.node_view import NodeView, node_view, to_json

@@ -6,7 +6,7 @@ import time
 
 import typer
 
-from executive.cli.kernels import compile_kernels, newly_compiled
+from executive.app.kernels import compile_kernels, newly_compiled
 from executive.cli.output import refusals
 from skills.files.errors import count_text
 

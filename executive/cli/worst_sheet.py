@@ -10,7 +10,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from executive.cli.detector_choice import FOUND_COLOUR, draw_box
+from executive.app.detector_choice import FOUND_COLOUR, draw_box
 from skills.perception.training.scoring import Judged
 from skills.robot import Picture
 

@@ -22,8 +22,8 @@ from typing import Any, Final
 import numpy as np
 import shapely
 
-from executive.cli.assembly import simulate
-from executive.cli.starts import alone
+from executive.app.assembly import simulate
+from executive.app.starts import alone
 from executive.run.outcome import Outcome
 from plant.simulation import Simulation
 from plant.worlds.world import World, load_world

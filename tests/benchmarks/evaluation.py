@@ -21,14 +21,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from executive.cli.evaluation_run import run_one
+from executive.app.evaluate.cluster import local_cluster
+from executive.app.evaluate.evaluation_run import run_one
+from executive.app.evaluate.outcome import Evidence, RunOutcome
+from executive.app.evaluate.page import EvaluationPage, to_page
+from executive.app.evaluate.results import ResultsFile
+from executive.app.evaluate.runs import Evaluation, RunSpec
+from executive.app.evaluate.summary import Case
 from executive.cli.results_view import command_of
-from executive.evaluation.cluster import local_cluster
-from executive.evaluation.outcome import Evidence, RunOutcome
-from executive.evaluation.page import EvaluationPage, to_page
-from executive.evaluation.results import ResultsFile
-from executive.evaluation.runs import Evaluation, RunSpec
-from executive.evaluation.summary import Case
 
 SHORT = "Hey Alice, go to the living room"
 

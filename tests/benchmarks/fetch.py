@@ -23,10 +23,10 @@ from typing import Final
 
 import numpy as np
 
-from executive.cli.mission_run import run_request
-from executive.cli.several import prepare_several
-from executive.cli.simulated import SimulatedBackend
-from executive.evaluation.statistics import Rate
+from executive.app.evaluate.statistics import Rate
+from executive.app.mission_run import run_request
+from executive.app.several import prepare_several
+from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.words.robots import RobotSetup
 

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
-from executive.cli.assembly import shared_detector
-from executive.cli.worlds import knowledge_of, open_world
+from executive.app.assembly import shared_detector
+from executive.app.worlds import knowledge_of, open_world
 from executive.testing.bench import SkillBench
 from plant.dataset.compose import Placed, Scene, compose
 from plant.dataset.lighting import random_lighting

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from executive.cli.worlds import knowledge_of, open_world
+from executive.app.worlds import knowledge_of, open_world
 from plant.dataset.coco import document
 from plant.dataset.compose import ONLY_DISTRACTORS_EVERY, Placed
 from plant.dataset.objects import DISTRACTORS, ObjectModel

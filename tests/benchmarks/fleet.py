@@ -26,12 +26,12 @@ from typing import Any
 
 import numpy as np
 
-from executive.cli.fleet_dispatch import FleetDispatch
-from executive.cli.fleet_report import told
-from executive.cli.fleet_run import run_fleet
-from executive.cli.fleet_setup import simulated_fleet
-from executive.cli.requests import prepare
-from executive.cli.simulated import SimulatedBackend
+from executive.app.fleet_dispatch import FleetDispatch
+from executive.app.fleet_report import told
+from executive.app.fleet_run import run_fleet
+from executive.app.fleet_setup import simulated_fleet
+from executive.app.requests import prepare
+from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.record.reader import Event, read_events

@@ -25,10 +25,10 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from executive.cli.mission_run import run_request
-from executive.cli.requests import prepare
-from executive.cli.simulated import SimulatedBackend
-from executive.cli.starts import alone
+from executive.app.mission_run import run_request
+from executive.app.requests import prepare
+from executive.app.simulated import SimulatedBackend
+from executive.app.starts import alone
 from executive.mission.request import Request
 from plant.sensors.lidar import Lidar
 from plant.sensors.proprioception import OdometryModel

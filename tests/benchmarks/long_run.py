@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from executive.cli.durable import STORE, new_run
-from executive.cli.requests import prepare
-from executive.cli.simulated import run_simulated
+from executive.app.durable import STORE, new_run
+from executive.app.requests import prepare
+from executive.app.simulated import run_simulated
 from executive.mission.request import Request
 from executive.run.runner import Progress
 from executive.store.missions import MissionStore

@@ -39,9 +39,9 @@ import numpy as np
 from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 
-from executive.cli.assembly import run_entry, simulate
-from executive.cli.starts import alone
-from executive.cli.worlds import knowledge_of
+from executive.app.assembly import run_entry, simulate
+from executive.app.starts import alone
+from executive.app.worlds import knowledge_of
 from executive.cli.worst_sheet import Shown, contact_sheet
 from executive.run.journal import TickNote
 from executive.run.outcome import Outcome, RobotResult

@@ -21,7 +21,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from executive.evaluation.scenario import load_evaluation
+from executive.app.evaluate.scenario import load_evaluation
 from executive.language.parser import load_parser
 from executive.mission.file.overrides import overridden
 from executive.mission.file.resolve import for_robot, load_mission, mission_from_file

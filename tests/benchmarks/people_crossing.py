@@ -23,10 +23,10 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.cli.mission_run import run_request
-from executive.cli.requests import prepare
-from executive.cli.simulated import SimulatedBackend
-from executive.cli.starts import alone
+from executive.app.mission_run import run_request
+from executive.app.requests import prepare
+from executive.app.simulated import SimulatedBackend
+from executive.app.starts import alone
 from executive.mission.request import Request
 from plant.worlds.builder.maps import FREE, OCCUPIED, Grid
 from plant.worlds.builder.own import world_from_grid

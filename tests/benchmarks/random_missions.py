@@ -27,7 +27,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from executive.cli.goal_conditions import verdict_of
+from executive.app.goal_conditions import verdict_of
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.journal import TickNote

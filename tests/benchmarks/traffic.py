@@ -19,9 +19,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from executive.cli.mission_run import run_request
-from executive.cli.several import prepare_several
-from executive.cli.simulated import SimulatedBackend
+from executive.app.mission_run import run_request
+from executive.app.several import prepare_several
+from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.run.runner import Progress
 from executive.words.robots import RobotSetup

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cli.worlds import knowledge_of, open_world
+from executive.app.worlds import knowledge_of, open_world
 from executive.words.knowledge import Door, Knowledge
 from executive.words.robots import RobotSetup
 from plant.kinds import robot_kind

@@ -7,8 +7,8 @@ import shutil
 import pytest
 import yaml
 
-from executive.cli.requests import prepare
-from executive.cli.simulated import run_simulated
+from executive.app.requests import prepare
+from executive.app.simulated import run_simulated
 from executive.mission.request import Request
 from plant.worlds.world import WORLDS_FOLDER
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from executive.cli.requests import prepare
-from executive.cli.simulated import run_simulated
+from executive.app.requests import prepare
+from executive.app.simulated import run_simulated
 from executive.mission.request import Request, Start
 from skills.robot import Pose2D
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from executive.app.requests import prepare
+from executive.app.simulated import run_simulated
 from executive.cli.check_command import Checker
-from executive.cli.requests import prepare
-from executive.cli.simulated import run_simulated
 from executive.mission.request import Request
 
 MISSIONS = Path(__file__).parents[2] / "missions"

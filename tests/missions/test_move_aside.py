@@ -9,8 +9,8 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform
 
-from executive.cli.assembly import judge, run_entry
-from executive.cli.worlds import knowledge_of
+from executive.app.assembly import judge, run_entry
+from executive.app.worlds import knowledge_of
 from executive.run.outcome import Outcome
 from executive.run.runner import RunSettings, run
 from executive.run.worker import LockStepWorker

@@ -10,8 +10,8 @@ import pytest
 from py_trees.common import Status
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from executive.cli.assembly import judge, run_entry
-from executive.cli.worlds import knowledge_of, open_world
+from executive.app.assembly import judge, run_entry
+from executive.app.worlds import knowledge_of, open_world
 from executive.run.outcome import Outcome
 from executive.run.runner import RunSettings, run
 from executive.run.worker import LockStepWorker

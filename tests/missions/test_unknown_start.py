@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from executive.cli.requests import prepare
-from executive.cli.simulated import run_simulated
+from executive.app.requests import prepare
+from executive.app.simulated import run_simulated
 from executive.mission.request import Request, Start
 
 MISSION = Path(__file__).parents[2] / "missions" / "go_to_pose.yaml"

@@ -59,11 +59,11 @@ GOOD: Final[Mapping[str, Mapping[str, str]]] = {
 }
 """What each command is called with beside the hostile text; no key, no need."""
 WORK: Final = (
-    "executive.cli.simulated.simulate",
+    "executive.app.simulated.simulate",
     "executive.cli.teleop_command.simulate",
-    "executive.cli.assembly.simulate",
+    "executive.app.assembly.simulate",
     "executive.cli.main.sweep",
-    "executive.cli.worker_pool.Pool.opened",
+    "executive.app.evaluate.worker_pool.Pool.opened",
     "plant.dataset.shards.render",
     "plant.worlds.builder.own.world_from_grid",
     "plant.worlds.builder.own.world_from_cylinders",

@@ -5,18 +5,18 @@ import os
 
 import pytest
 import typer
-from scripted_backend import ScriptedBackend
 
-from executive.cli import requests
-from executive.cli.durable import kept
-from executive.cli.mission_run import run_request
+from executive.app import requests
+from executive.app.durable import kept
+from executive.app.mission_run import run_request
+from executive.app.requests import prepare
 from executive.cli.output import refusals
-from executive.cli.requests import prepare
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.record.reader import read_events
 from executive.run.outcome import Outcome
 from executive.store.missions import MissionState, MissionStore
+from tests.executive.app.scripted_backend import ScriptedBackend
 
 FULL_AT_S = 3.0
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 from typer.testing import CliRunner
 
-from executive.cli import entry, fleet_run
+from executive.app import fleet_run
+from executive.cli import entry
 from executive.cli.fleet_command import _faults, _to_do
 from executive.mission.request import Request
 from executive.store.given import GivenMissions

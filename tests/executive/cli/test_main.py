@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from executive.app.mission_run import Finished
+from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry, main
-from executive.cli.mission_run import Finished
-from executive.cli.report import RefereeReport, RunReport
 from executive.tree.node_view import node_view
 from plant.worlds.world import WORLDS_FOLDER
 

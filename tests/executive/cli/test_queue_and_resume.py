@@ -11,9 +11,10 @@ import pytest
 from py_trees.common import Status
 from typer.testing import CliRunner
 
-from executive.cli import entry, main, queue_run, requests
-from executive.cli.mission_run import Finished
-from executive.cli.report import RefereeReport, RunReport
+from executive.app import requests
+from executive.app.mission_run import Finished
+from executive.app.report import RefereeReport, RunReport
+from executive.cli import entry, main, queue_run
 from executive.mission.mission import mission_from_commands
 from executive.run.journal import TickNote
 from executive.store.missions import MissionStore

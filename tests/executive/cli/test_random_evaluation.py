@@ -6,11 +6,12 @@ from contextlib import contextmanager
 import pytest
 from typer.testing import CliRunner
 
-from executive.cli import entry, evaluation_run, worker_pool
-from executive.cli.mission_run import Finished
+from executive.app.evaluate import evaluation_run, worker_pool
+from executive.app.evaluate.workers import Finished as Done
+from executive.app.mission_run import Finished
+from executive.app.report import RefereeReport, RunReport
+from executive.cli import entry
 from executive.cli.random_evaluation import random_missions
-from executive.cli.report import RefereeReport, RunReport
-from executive.evaluation.workers import Finished as Done
 from executive.record.event_log import EventLog
 from executive.tree.node_view import node_view
 from skills.files.errors import InputError

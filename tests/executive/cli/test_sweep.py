@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from executive.app.report import RefereeReport, RunReport
 from executive.cli import sweep as module
-from executive.cli.report import RefereeReport, RunReport
 from executive.cli.sweep import condition_rows, conditions, folders, rows, sweep, totals
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario

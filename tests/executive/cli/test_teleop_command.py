@@ -8,12 +8,12 @@ import pytest
 from pydrake.math import RollPitchYaw
 from typer.testing import CliRunner
 
-from executive.cli.assembly import simulate
+from executive.app.assembly import simulate
+from executive.app.saved_pose import save_pose
+from executive.app.starts import alone
+from executive.app.worlds import open_world
 from executive.cli.entry import app
-from executive.cli.saved_pose import save_pose
-from executive.cli.starts import alone
 from executive.cli.teleop_command import TerminalKeys, context_for, page_actions, period
-from executive.cli.worlds import open_world
 from executive.mission.file.resolve import load_mission
 from executive.mission.request import Start
 from executive.view.actions import RefusedError

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.cli.goal_conditions import Share, conditions_of
+from executive.app.goal_conditions import Share, conditions_of
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from executive.words import blocks

@@ -2,9 +2,9 @@
 
 import pytest
 
-from executive.cli.requests import prepare
-from executive.cli.simulated import run_simulated
-from executive.cli.talk import conversation_of
+from executive.app.requests import prepare
+from executive.app.simulated import run_simulated
+from executive.app.talk import conversation_of
 from executive.mission.request import Request
 from executive.run.control import Control
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from executive.cli.worlds import knowledge_of
+from executive.app.worlds import knowledge_of
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.builder.plan import PLANS
 from plant.worlds.placement import place_people

@@ -1,0 +1,68 @@
+"""What stands behind a run, simulated or real: nothing else knows which it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from executive.app.artifacts import Artifacts
+from executive.app.durable import Durable
+from executive.app.report import RefereeReport
+from executive.record.profile import Profile
+from executive.run.outcome import RobotResult
+from executive.run.runner import RunEntry
+from executive.tree.compiler import CompiledTree
+from skills.robot import Clock
+
+if TYPE_CHECKING:
+    from executive.app.goal_conditions import Share
+
+
+class Scene(Protocol):
+    """A live picture of the world, for the page."""
+
+    @property
+    def url(self) -> str:
+        """Where it is served."""
+
+    def go_easy(self) -> None:
+        """Refresh it less often."""
+
+    def follow(self, wanted: bool) -> None:
+        """Let the camera go along with the robot, or show the whole world."""
+
+
+class Backend(Protocol):
+    """A robot and its clock, and what there is besides: a referee, a recording, a live picture."""
+
+    @property
+    def clock(self) -> Clock:
+        """The robot's clock."""
+
+    def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
+        """The robot of a tree's name with its estimators, its state kept or taken up where `durable` says so.
+
+        Raises:
+            InputError: there is no such robot, or something that it needs cannot be read.
+        """
+
+    def happened(self) -> Sequence[tuple[float, str]]:
+        """What has happened in the world by the run's scenario: times (s) and sentences; none of a real one."""
+
+    def work(self) -> Mapping[str, int]:
+        """What the backend itself computed, as counters by name; empty for a real robot."""
+
+    def attach(self, profile: Profile) -> None:
+        """Time the backend's own subsystems."""
+
+    def show_live(self) -> Scene | None:
+        """Begin to show the world, where that can be done."""
+
+    def judge(
+        self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
+    ) -> RefereeReport | None:
+        """What a referee saw of a mission since it began, of which others did some `before`; None: there is none."""
+
+    def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
+        """Write what was recorded into a folder; the recording's path, None where there is none."""

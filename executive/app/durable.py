@@ -1,0 +1,260 @@
+"""What makes a run outlive its process: the request in the store, the journal, and where the plant keeps its state."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Final
+
+from executive.app.report import RunReport
+from executive.app.requests import Prepared, commanded, prepare, prepared_for, replacing
+from executive.mission.request import Request
+from executive.record.reader import Event, read_events
+from executive.record.schemas import RUN
+from executive.store.database import STORE_FILE
+from executive.store.journal import StoreJournal
+from executive.store.memory import Recollection
+from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.store.resuming import ended_tree, resumed_tree
+from executive.words.slug import slug
+from skills.files.errors import InputError, disk_is_full
+from skills.robot import Pose2D
+
+STORE: Final = "missions.sqlite"
+_MOST_STARTS: Final = 1000
+
+
+def run_arguments(asked: Request, prepared: Prepared) -> list[str]:
+    """The arguments by which `errand run` does the same in a process of its own, where nobody can be asked.
+
+    A sentence has the answers in their places; to the questions of a file they are given again.
+    """
+    arguments = ["--say", prepared.request.sentence or ""] if asked.file is None else [str(asked.file)]
+    arguments += ["--world", asked.world] if asked.world else []
+    arguments += [] if asked.require_wake is None else ["--wake" if asked.require_wake else "--no-wake"]
+    arguments += ["--stack", str(asked.stack)] if asked.stack else []
+    arguments += [] if asked.start is None else [f"--start={asked.start}"]
+    arguments += [f"--set={name}={json.dumps(value)}" for name, value in asked.given.items()]
+    arguments += ["--map", str(asked.map)] if asked.map else []
+    arguments += [f"--fault={words}" for words in asked.scenario.faults]
+    arguments += [f"--random-faults={asked.scenario.random}"] if asked.scenario.random else []
+    arguments += [f"--scenario={path}" for path in asked.scenario_files]
+    arguments += asked.variation.arguments()
+    if asked.file is None:
+        return arguments
+    arguments += [part for answer in asked.answers for part in ("--answer", answer)]
+    return [*arguments, *([] if asked.questions is None else ["--questions", asked.questions.value])]
+
+
+@dataclass(frozen=True)
+class Durable:
+    """What a run needs to be taken up later, or to take up an earlier one.
+
+    `plant` is the name of the file in which the plant keeps its state for the mission `label`. With `take_up` it
+    begins from what was kept for `take_up_label` (None: for any). `journals` are those of the robots by their names,
+    `poses` where each last believed to be.
+    """
+
+    plant: Path
+    journals: Mapping[str, StoreJournal]
+    label: str
+    take_up: bool = False
+    take_up_label: str | None = None
+    poses: Mapping[str, Pose2D] = field(default_factory=dict)
+    log: str = "log.mcap"
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What could not be kept."""
+        return tuple(dict.fromkeys(trouble for each in self.journals.values() for trouble in each.troubles))
+
+
+def plant_file(store: MissionStore) -> Path:
+    """Where the plant of a store's missions keeps its state; nobody but the plant reads it."""
+    return store.path.with_suffix(".plant")
+
+
+def new_run(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Durable:
+    """A mission that begins in a fresh world."""
+    if prepared.robots:
+        store.place(mission.id, {name: robot.start for name, robot in prepared.robots.items()})
+    return Durable(plant_file(store), _journals(store, mission, prepared), str(mission.id))
+
+
+def _journals(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Mapping[str, StoreJournal]:
+    """The journals of a mission's robots; what takes the place of one's part by a correction is kept in its stead."""
+    return {
+        each.mission.robot_name: store.journal(mission.id, _part_of(each)).replaceable(
+            lambda tree: replacing(mission.request, tree)
+        )
+        for each in prepared.all
+    }
+
+
+def _part_of(prepared: Prepared) -> str | None:
+    """The robot under whose name the store keeps a part of a mission; None for the only robot of a run."""
+    return prepared.mission.robot_name if prepared.robots else None
+
+
+def next_run(store: MissionStore, mission: StoredMission, prepared: Prepared, before: StoredMission) -> Durable:
+    """A mission that begins in the world as another has left it."""
+    if prepared.robots:
+        store.place(mission.id, before.poses)
+    return replace(new_run(store, mission, prepared), take_up=True, poses=before.poses)
+
+
+def same_world(one: StoredMission, other: StoredMission) -> bool:
+    """Whether two missions are to be done by the same robots in one world."""
+    a, b = one.request, other.request
+    same = (a.world, a.world_name, a.seed, dict(a.robots)) == (b.world, b.world_name, b.seed, dict(b.robots))
+    return same and (a.robots or a.robot == b.robot) and (a.scenario, a.variation) == (b.scenario, b.variation)
+
+
+@dataclass(frozen=True)
+class TakenUp:
+    """A mission that was broken off, ready to go on; a recollection for each robot."""
+
+    prepared: Prepared
+    durable: Durable
+    recollections: Sequence[Recollection]
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What became of its past so far."""
+        return tuple(line for each in self.recollections for line in each.told)
+
+
+def take_up(store: MissionStore, mission: StoredMission) -> TakenUp:
+    """All that is needed to go on with a mission, each robot from where it was.
+
+    Raises:
+        InputError: what the store knows of it cannot be read, or its tree is no longer the one that was begun.
+    """
+    prepared = prepare(as_it_was(mission, store.path))
+    if prepared.request.fingerprint != mission.request.fingerprint:
+        raise _other_version(store, mission)
+    every = [_with_replacement(store, mission, each) for each in prepared.all]
+    memories = [store.memory(mission.id, _part_of(each)) for each in every]
+    resumed = [
+        (ended_tree(each.tree, memory) if prepared.robots else None) or resumed_tree(each.tree, memory)
+        for each, memory in zip(every, memories, strict=True)
+    ]
+    journals = _journals(store, mission, prepared)
+    for each, (_, recollection) in zip(every, resumed, strict=True):
+        journals[each.mission.robot_name].remembering(recollection)
+    names = [each.mission.robot_name for each in every]
+    poses = {name: memory.pose for name, memory in zip(names, memories, strict=True) if memory.pose is not None}
+    label, log = str(mission.id), _log_name(mission.starts + 1)
+    durable = Durable(plant_file(store), journals, label, True, label, poses, log)
+    first, *others = (replace(each, tree=tree) for each, (tree, _) in zip(every, resumed, strict=True))
+    together = replace(first, request=prepared.request, others=tuple(others))
+    return TakenUp(together, durable, [recollection for _, recollection in resumed])
+
+
+def _with_replacement(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Prepared:
+    """What a robot is to do, or what has taken its place by a correction. Raises InputError: its tree is another."""
+    name = prepared.mission.robot_name
+    instead = mission.instead.get(name)
+    if instead is None:
+        return prepared
+    asked = replace(prepared.request, name=instead.name, commands=instead.commands, robot=name)
+    own = prepared_for(asked, commanded(asked, prepared.world), prepared.world, prepared.knowledge)
+    if own.request.fingerprint != instead.fingerprint:
+        raise _other_version(store, mission)
+    return replace(prepared, mission=own.mission, tree=own.tree)
+
+
+def _other_version(store: MissionStore, mission: StoredMission) -> InputError:
+    hint = f"go back to the version that began it, or `errand queue remove {mission.id}` and give it again"
+    what = f"mission {mission.id} was begun with another version of errand, of the world or of the skills"
+    return InputError(what, hint=hint, file=store.path)
+
+
+def _log_name(start: int) -> str:
+    """The name of the log of a mission's first start, second start, and so on."""
+    return "log.mcap" if start == 1 else f"log-{start}.mcap"
+
+
+def mission_events(log: Path) -> tuple[Event, ...]:
+    """The events of a log, after those of the earlier starts of the mission, as far as their logs can still be read.
+
+    Raises InputError: the log itself cannot be read.
+    """
+    events, before = read_events(log), list[Event]()
+    for name in (_log_name(start) for start in range(1, _MOST_STARTS)):
+        if name == log.name:
+            break
+        with suppress(InputError):
+            earlier = read_events(log.with_name(name))
+            before += earlier if _facts(earlier) == _facts(events) else ()
+    return (*before, *events)
+
+
+def _facts(events: Sequence[Event]) -> object:
+    """What a log says at its beginning: the commands, the world, the seed."""
+    return next((event.data for event in events if event.topic == RUN), None)
+
+
+def as_it_was(mission: StoredMission, store: Path) -> Request:
+    """What was asked for then. A file that has changed since is taken as it was.
+
+    Raises:
+        InputError: the file has changed, and its old text cannot be laid beside it.
+    """
+    file, text = mission.request.file, mission.request.text
+    if file is None or text is None or _text(file) == text:
+        return mission.request
+    file = file.with_name(f".{slug(file.stem)}.mission-{mission.id}{file.suffix[:8]}")
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        what = f"the file of mission {mission.id} has changed, and its old text cannot be laid beside it"
+        raise InputError(f"{what} ({error.strerror})", hint="put the old file back", file=file) from error
+    return replace(mission.request, file=file)
+
+
+def _text(file: Path) -> str | None:
+    try:
+        return file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+@contextmanager
+def kept(store: MissionStore, mission: StoredMission) -> Iterator[Callable[[RunReport], None]]:
+    """Note in the store that a mission is under way, and, when told the report, how it ended.
+
+    A run that could not begin leaves things as they were; of one that is killed, or breaks off since the disk is full,
+    nobody notes anything. Raises InputError, which names the way on: the disk is full.
+    """
+    store.begin(mission.id)
+    over = False
+
+    def ended(report: RunReport) -> None:
+        nonlocal over
+        over = True
+        store.finish(mission.id, MissionState(report.outcome), report.message)
+
+    try:
+        yield ended
+    except OSError as error:
+        raise STORE_FILE.full_disk(store.path) if disk_is_full(error) else error from error
+    except InputError:
+        if over:
+            raise
+        if mission.queued or mission.starts:
+            store.never_began(mission)
+        else:
+            store.remove(mission.id)
+        raise
+
+
+def give_up_broken(store: MissionStore, mission: StoredMission) -> Sequence[StoredMission]:
+    """Missions that were broken off can no longer be taken up once another begins in a fresh world."""
+    broken = store.missions(MissionState.RUNNING)
+    for each in broken:
+        store.finish(each.id, MissionState.CANCELLED, f"broken off, and given up for mission {mission.id}")
+    return broken

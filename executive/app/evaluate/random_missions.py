@@ -1,0 +1,227 @@
+"""Random missions in English: sentences of all kinds that make sense in a world, each chosen by its seed."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+from executive.app.evaluate.runs import Evaluation, RunSpec
+from executive.words.knowledge import Knowledge
+from skills.detect.words import plural
+from skills.files.errors import InputError
+from skills.files.yaml_source import read_yaml
+
+__all__ = ["KINDS", "KnownWorld", "random_evaluation", "random_sentence"]
+
+_TABLE: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(Path(__file__).with_suffix(".yaml")).data
+KINDS: Final[Mapping[str, tuple[str, ...]]] = {kind: tuple(about["sentences"]) for kind, about in _TABLE.items()}
+"""The sentences of each kind of mission, with slots for what the world has."""
+TURNS: Final = tuple(kind for kind, about in _TABLE.items() for _ in range(about["turns"]))
+"""The kinds in the order of the seeds."""
+TIME_LIMIT_S: Final = 3600.0
+"""Clearing a workbench into a far room takes six trips."""
+_SHARE_OF_ALIASES: Final = 0.2
+_NUMBERS: Final = MappingProxyType({2: "two", 3: "three"})
+_ORDINARY: Final = ("a", "the")
+
+
+@dataclass(frozen=True)
+class KnownWorld:
+    """A world that missions are drawn for.
+
+    `name` is its name or folder, as runs take it; `carried` are the classes of objects that the robot can carry.
+    """
+
+    name: str
+    knowledge: Knowledge
+    carried: frozenset[str]
+
+
+def random_evaluation(worlds: Sequence[KnownWorld], seeds: Iterable[int], *, name: str) -> Evaluation:
+    """One run for each seed, in the worlds in turn; a run is the same whichever other seeds there are.
+
+    Raises:
+        InputError: nothing can be asked for in one of the worlds.
+    """
+    chosen = ((worlds[seed % len(worlds)], seed) for seed in seeds)
+    return Evaluation(name, tuple(_run(world, seed) for world, seed in chosen))
+
+
+def _run(world: KnownWorld, seed: int) -> RunSpec:
+    kind, sentence = random_sentence(world, seed)
+    return RunSpec(kind, seed, sentence=sentence, world=world.name, time_limit_s=TIME_LIMIT_S)
+
+
+def random_sentence(world: KnownWorld, seed: int) -> tuple[str, str]:
+    """The kind of mission whose turn it is at a seed, and a sentence of it. Of a kind that the world has no use for,
+    the next one is taken. Raises InputError: there is none at all."""
+    rng = random.Random(f"{seed}")
+    first = seed % len(TURNS)
+    for kind in dict.fromkeys((*TURNS[first:], *TURNS[:first])):
+        for pattern in rng.sample(KINDS[kind], len(KINDS[kind])):
+            slots = _Slots(world, random.Random(f"{seed} {pattern}"))
+            try:
+                return kind, pattern.format_map(slots)
+            except LookupError:
+                continue
+    hint = "give its knowledge.yaml places, surfaces or objects"
+    raise InputError(f"nothing can be asked for in the world {world.name}", hint=hint)
+
+
+class _Slots(dict[str, str]):
+    """The words for the slots of one sentence; equal slots get equal words. Raises LookupError: the world has none."""
+
+    def __init__(self, world: KnownWorld, rng: random.Random) -> None:
+        super().__init__()
+        self._known, self._carried, self._rng = world.knowledge, world.carried, rng
+        self._meant: dict[str, str] = {}
+
+    def __missing__(self, slot: str) -> str:
+        self[slot] = words = _SLOTS[slot](self)
+        return words
+
+    def choice(self, what: str, names: Iterable[str]) -> str:
+        """One of the names, the same each time that it is asked for. Raises LookupError: there are none."""
+        if what not in self._meant:
+            self._meant[what] = self._rng.choice(list(names))
+        return self._meant[what]
+
+    def called(self, name: str, aliases: Sequence[str]) -> str:
+        """A name or one of its aliases."""
+        return self._rng.choice(aliases) if aliases and self._rng.random() < _SHARE_OF_ALIASES else name
+
+    def placed(self, name: str) -> str:
+        """A room or surface with its article; a numbered one has none."""
+        known = self._known
+        facts = known.places[name] if name in known.places else known.surfaces[name]
+        called = self.called(name, facts.aliases)
+        numbered = called.split()[-1] in ("one", "two", "three", "four") or called[-1].isdigit()
+        return called if numbered else f"the {called}"
+
+    def object(self, article: str | None = None, *, what: str = "object", carried: bool = True) -> str:
+        """An object with its article."""
+        known = self._known
+        names = [name for name in known.things if name in self._carried or not carried]
+        other = [name for name in names if name != self._meant.get("object")] if what != "object" else names
+        name = self.choice(what, other)
+        return _with_article(article or self._rng.choice(_ORDINARY), self.called(name, known.things[name].aliases))
+
+    def usual_surfaces(self, names: Iterable[str]) -> list[str]:
+        """The surfaces where objects of these classes usually are."""
+        usual = (spot for name in names for spot in self._known.things[name].usual)
+        return list(dict.fromkeys(surface for spot in usual for surface in self._known.surfaces_in(spot)))
+
+    def home(self, names: Iterable[str]) -> str:
+        """The one room where these classes are. Raises LookupError: there is none, or several."""
+        rooms = {self._known.room(surface) for surface in self.usual_surfaces(names)}
+        if len(rooms) != 1:
+            raise LookupError
+        return self.placed(rooms.pop())
+
+    def chosen(self) -> list[str]:
+        """The class that the sentence is about."""
+        if "object" not in self._meant:
+            self.object()
+        return [self._meant["object"]]
+
+    def members(self) -> list[str]:
+        """The classes of the category that the sentence is about: those that the robot can carry."""
+        known, found = self._known, dict[str, list[str]]()
+        for category in known.categories():
+            found[category] = [name for name in known.classes(category) if name in self._carried]
+        return found[self.choice("category", [name for name, members in found.items() if len(members) > 1])]
+
+    def category(self) -> str:
+        """The category that the sentence is about."""
+        self.members()
+        return self._meant["category"]
+
+    def some(self) -> str:
+        """A number of objects of the category."""
+        most = len(self.members())
+        return f"{_NUMBERS[self._rng.choice([count for count in _NUMBERS if count <= most])]} {plural(self.category())}"
+
+    def room(self, what: str = "room") -> str:
+        """A room, another one than that of the other slots."""
+        taken = [self._meant.get(other) for other in ("room", "second room")]
+        return self.placed(self.choice(what, [name for name in self._known.places if name not in taken]))
+
+    def surface(self, names: Iterable[str] = ()) -> str:
+        """A surface where objects of these classes are not to be expected."""
+        usual = self.usual_surfaces(names)
+        return self.placed(self.choice("surface", [name for name in self._known.surfaces if name not in usual]))
+
+    def furnished(self, names: Iterable[str] = ()) -> str:
+        """A room with surfaces, where objects of these classes are not to be expected."""
+        known = self._known
+        homes = {known.room(surface) for surface in self.usual_surfaces(names)}
+        rooms = (name for name in known.places if known.surfaces_in(name) and name not in homes)
+        return self.placed(self.choice("furnished room", rooms))
+
+    def person(self, *, only: bool = False) -> str:
+        """Somebody, or the `only` one that there is."""
+        people = self._known.people
+        if only and len(people) != 1:
+            raise LookupError
+        return self.choice("person", people)
+
+    def room_of_person(self) -> str:
+        """The room where the person usually is."""
+        return self.placed(self._known.room(self._known.people[self.person()].at))
+
+    def to_clear(self) -> str:
+        """A surface whose usual objects the robot can all carry."""
+        return self.choice("cleared", self._clearable())
+
+    def _clearable(self) -> Iterator[str]:
+        for surface in self._known.surfaces:
+            usual = [name for name in self._known.things if surface in self.usual_surfaces([name])]
+            if usual and all(name in self._carried for name in usual):
+                yield surface
+
+    def cleared_onto(self) -> str:
+        """Another surface."""
+        return self.placed(self.choice("onto", [name for name in self._known.surfaces if name != self.to_clear()]))
+
+
+def _with_article(article: str, name: str) -> str:
+    return f"an {name}" if article == "a" and name[0].lower() in "aeiou" else f"{article} {name}"
+
+
+_SLOTS: Final[Mapping[str, Callable[[_Slots], str]]] = MappingProxyType(
+    {
+        "object": lambda slots: slots.object(),
+        "any carried object": lambda slots: slots.object("a"),
+        "the carried object": lambda slots: slots.object("the"),
+        "any object": lambda slots: slots.object("a", carried=False),
+        "the object": lambda slots: slots.object("the", carried=False),
+        "other object": lambda slots: slots.object(what="other object"),
+        "objects": lambda slots: plural(slots.object("the", carried=False).removeprefix("the ")),
+        "home": lambda slots: slots.home(slots.chosen()),
+        "one of its surfaces": lambda slots: slots.placed(
+            slots.choice("its surface", slots.usual_surfaces(slots.chosen()))
+        ),
+        "room for it": lambda slots: slots.furnished(slots.chosen()),
+        "surface for it": lambda slots: slots.surface(slots.chosen()),
+        "a drink": lambda slots: _with_article("a", slots.category()),
+        "drinks": lambda slots: plural(slots.category()),
+        "two drinks": lambda slots: slots.some(),
+        "home of drinks": lambda slots: slots.home(slots.members()),
+        "room for drinks": lambda slots: slots.furnished(slots.members()),
+        "surface for drinks": lambda slots: slots.surface(slots.members()),
+        "surface to clear": lambda slots: slots.placed(slots.to_clear()),
+        "cleared onto": lambda slots: slots.cleared_onto(),
+        "room": lambda slots: slots.room(),
+        "furnished room": lambda slots: slots.furnished(),
+        "second room": lambda slots: slots.room("second room"),
+        "surface": lambda slots: slots.surface(),
+        "person": lambda slots: slots.person(),
+        "only person": lambda slots: slots.person(only=True),
+        "room of a person": lambda slots: slots.room_of_person(),
+    }
+)
+"""The words for each slot. `drink` stands for any category with several members."""

@@ -1,0 +1,195 @@
+"""Reads a scenario file of `errand evaluate` and multiplies it out into runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any, Final
+
+from executive.app.evaluate.runs import Evaluation, RunSpec
+from executive.app.evaluate.scenario_schema import EvaluationFile, FaultsFile, MissionEntry, VariationsFile
+from executive.app.evaluate.seeds import seed_range
+from executive.words.variation import Variation, light_called
+from skills.files.errors import InputError
+from skills.files.outside import is_file, read_text
+from skills.files.schema import validate
+from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
+
+__all__ = ["FileFinder", "is_evaluation", "load_evaluation"]
+
+MOST_RUNS: Final = 200_000
+_NOTHING: Final = ("none", "default")
+FileFinder = Callable[[Path], Path]
+"""The file that a path means: itself, or one of that name that comes with Errand. Raises InputError."""
+
+
+def is_evaluation(path: Path) -> bool:
+    """Whether a file is a scenario for evaluations, and no mission. Raises InputError: it cannot be read."""
+    if path.suffix not in (".yaml", ".yml") or not is_file(path):
+        return False
+    data = read_yaml(path).data
+    return isinstance(data, dict) and "missions" in data and "steps" not in data
+
+
+def load_evaluation(path: Path, *, mission_file: FileFinder, stack_file: FileFinder) -> Evaluation:
+    """The runs of a scenario file, in the order of missions, worlds, robots, variations, seeds.
+
+    Raises:
+        InputError: with file and line; a key, a mission, a file or a value is wrong, or the runs are too many.
+    """
+    source = read_yaml(path)
+    reader = _Reader(validate(EvaluationFile, source), source, mission_file, stack_file)
+    runs = tuple(reader.runs())
+    if len(runs) > MOST_RUNS:
+        raise source.error((), f"these are {len(runs)} runs, more than {MOST_RUNS}", "split it into several files")
+    twice = len(runs) - len({run.id for run in runs})
+    if twice:
+        raise source.error((), f"{twice} of the runs stand in it twice", "list each mission, value and seed once")
+    return Evaluation(str(path), runs)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """One scenario file and how its names are found."""
+
+    file: EvaluationFile
+    source: YamlSource
+    mission_file: FileFinder
+    stack_file: FileFinder
+
+    def runs(self) -> Iterator[RunSpec]:
+        """All runs. Raises InputError."""
+        missions = [self._mission(entry, ("missions", index)) for index, entry in enumerate(self.file.missions)]
+        worlds = [None, *()] if self.file.worlds is None else [self._world(name) for name in self.file.worlds]
+        robots = _fleets(self.file.robots)
+        varied = [*self._varied(self.file.variations)]
+        seeds = self._seeds()
+        for mission, world, fleet, vary in product(missions, worlds, robots, varied):
+            first = vary(replace(mission, world=world, robots=fleet, time_limit_s=self.file.time_limit))
+            yield from (replace(first, seed=seed) for seed in seeds)
+
+    def _seeds(self) -> tuple[int, ...]:
+        if not isinstance(self.file.seeds, str):
+            return self.file.seeds
+        try:
+            return seed_range(self.file.seeds)
+        except InputError as error:
+            raise self.source.error(("seeds",), error.message, error.hint) from error
+
+    def _mission(self, entry: str | MissionEntry, path: KeyPath) -> RunSpec:
+        """The mission of an entry; a text with spaces that names no file is a sentence."""
+        if isinstance(entry, str):
+            is_file = entry.endswith((".yaml", ".yml")) or " " not in entry.strip()
+            entry = MissionEntry.model_validate({"file" if is_file else "say": entry})
+        if entry.say is not None:
+            return RunSpec(entry.name or entry.say, 0, sentence=entry.say, answers=entry.answers)
+        assert entry.file is not None
+        found = self._found(entry.file, path, self.mission_file)
+        texts = dict(_with_used(found))
+        label = entry.name or _label(entry.file, entry.set)
+        return RunSpec(label, 0, file=str(found), given=entry.set, answers=entry.answers, files=texts)
+
+    def _world(self, name: str) -> str:
+        folder = self.source.path.parent / name
+        return str(folder.resolve()) if is_file(folder / "world.dmd.yaml") else name
+
+    def _found(self, name: str, path: KeyPath, finder: FileFinder | None = None) -> Path:
+        """A file as seen from the scenario file, or one that comes with Errand. Raises InputError with the line."""
+        beside = self.source.path.parent / name
+        try:
+            found = beside if is_file(beside) or finder is None else finder(Path(name))
+        except InputError as error:
+            raise self.source.error(path, f"{name}: {error.message}", error.hint) from error
+        if not is_file(found):
+            raise self.source.error(path, f"there is no file '{name}'", "give its path from this file's folder")
+        return found.resolve()
+
+    def _light(self, light: str | float, path: KeyPath) -> str:
+        """A light of the file by its name or its brightness. Raises InputError with the line: it is neither."""
+        words = light if isinstance(light, str) else f"{light:g}"
+        try:
+            light_called(words)
+        except InputError as error:
+            raise self.source.error(path, error.message, error.hint) from error
+        return words
+
+    def _varied(self, lists: VariationsFile) -> Iterator[Callable[[RunSpec], RunSpec]]:
+        """For each combination, what makes a run vary by it."""
+        several = [name for name in type(lists).model_fields if len(getattr(lists, name)) > 1]
+        lights = [self._light(light, ("variations", "light", index)) for index, light in enumerate(lists.light)]
+        for light, clutter, people, friction in product(lights, lists.clutter, lists.people, lists.friction):
+            variation = Variation(light, clutter, people, friction)
+            told = {"light": light, "clutter": clutter, "people": people, "friction": f"{friction:g}"}
+            for faults, scenario, stack in product(
+                enumerate(lists.faults), enumerate(lists.scenario), enumerate(lists.stack)
+            ):
+                name, words, random = _faults(faults[1])
+                files = {
+                    key: None if value in _NOTHING else self._found(value, ("variations", key, index), finder)
+                    for key, (index, value), finder in (
+                        ("scenario", scenario, None),
+                        ("stack", stack, self.stack_file),
+                    )
+                }
+                all_told = {**told, "faults": name, "scenario": scenario[1], "stack": stack[1]}
+                values = {
+                    "variation": variation,
+                    "faults": words,
+                    "random_faults": random,
+                    "varied": {key: str(all_told[key]) for key in several},
+                    **{key: None if file is None else str(file) for key, file in files.items()},
+                }
+                yield _Vary(values, {str(file): read_text(file) for file in files.values() if file is not None})
+
+
+@dataclass(frozen=True)
+class _Vary:
+    """Puts values and the texts of files into a run."""
+
+    values: Mapping[str, Any]
+    files: Mapping[str, str]
+
+    def __call__(self, run: RunSpec) -> RunSpec:
+        return replace(run, **self.values, files={**run.files, **self.files})
+
+
+def _fleets(robots: Any) -> tuple[Mapping[str, str], ...]:
+    """The mappings of robots that are tried in turn."""
+    if robots is None:
+        return ({},)
+    return (robots,) if isinstance(robots, dict) else tuple(robots)
+
+
+def _faults(entry: str | FaultsFile) -> tuple[str, tuple[str, ...], int]:
+    """Name, words and number of random ones."""
+    if isinstance(entry, str):
+        return entry, () if entry in _NOTHING else (entry,), 0
+    drawn = (f"{entry.random} random",) if entry.random else ()
+    return entry.name or " and ".join((*entry.faults, *drawn)) or "none", entry.faults, entry.random
+
+
+def _label(file: str, given: Mapping[str, Any]) -> str:
+    values = ", ".join(f"{name}={value}" for name, value in given.items())
+    return Path(file).stem + (f" ({values})" if values else "")
+
+
+def _with_used(file: Path) -> Iterator[tuple[str, str]]:
+    """The path and text of a mission file, and of all that it uses and that lie in its folder."""
+    todo, known = [file], set[Path]()
+    while todo:
+        path = todo.pop()
+        if path in known or not is_file(path):
+            continue
+        known.add(path)
+        yield str(path), read_text(path)
+        todo += [(path.parent / used).resolve() for used in _uses(read_yaml(path).data)]
+
+
+def _uses(data: Any) -> Iterator[str]:
+    """The files that stand under a key `use` or `stack` anywhere in a document."""
+    if isinstance(data, dict):
+        yield from (value for key, value in data.items() if key in ("use", "stack") and isinstance(value, str))
+    for value in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
+        yield from _uses(value)

@@ -1,0 +1,159 @@
+"""What is known beforehand of whether a mission can be done: the routes in its world, and what the robot is able to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache, cached_property
+from pathlib import Path
+
+from executive.app.requests import Prepared
+from executive.app.route_cache import route_cache_of
+from executive.app.starts import DEFAULT_KIND
+from executive.app.worlds import refuse_unusable
+from executive.mission.stack_file import load_stack
+from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
+from executive.tree.estimate import Route, RoutePlanner, load_estimates
+from plant.kinds import robot_kind
+from plant.models.catalogue import load_catalogue
+from plant.worlds.world import World
+from skills.arm.kinematics import arm_model
+from skills.files.errors import Problems
+from skills.perception.attributes import known_attributes
+from skills.perception.class_forms import class_forms
+from skills.robot import Capabilities, Pose2D
+from skills.stack import RobotStack, default_component
+
+
+class _RoutesOnMap(RoutePlanner):
+    """Routes on the robot's map of a world for the robot's footprint; the map is read when the first is asked for.
+
+    A stack plans them with its costmap and planner; None stands for the default one, of which only these are loaded.
+    """
+
+    def __init__(self, world: World, stack: RobotStack | None, kind: str) -> None:
+        self._world, self._stack, self._kind = world, stack, kind
+
+    @cached_property
+    def _routes(self) -> PlannedRoutes:
+        from skills.estimate.grid_map import load_grid_map
+        from skills.navigate.footprint import Footprint
+
+        keepout_map = load_grid_map(self._world.keepout_map_path)
+        costmap, planner = (
+            default_component(slot) if self._stack is None else getattr(self._stack, slot)
+            for slot in ("costmap", "planner")
+        )
+        return PlannedRoutes(costmap.build(keepout_map), Footprint.of(robot_kind(self._kind).capabilities()), planner)
+
+    def route(self, start: Pose2D, goal: Pose2D) -> Route:
+        """The route from start to goal. Raises ValueError with one sentence when there is none, InputError."""
+        return self._routes.route(start, goal)
+
+
+def route_planner_of(
+    world: World, stack_file: Path | None = None, kind: str = DEFAULT_KIND, *, kept: bool = True
+) -> RoutePlanner:
+    """Routes of a kind of robot on its map of a world, as a stack file has them planned (None: the kind's own stack).
+
+    They are `kept` for later processes, or only as long as the planner. When there is no such map, the first route
+    raises InputError.
+
+    Raises:
+        InputError: with file and line where the stack file cannot be used.
+    """
+    stack_file = stack_file or robot_kind(kind).stack
+    stack = None if stack_file is None else load_stack(stack_file)
+    facts = robot_kind(kind).facts
+    files = (facts,) if stack_file is None else (facts, stack_file)
+    planned = _RoutesOnMap(world, stack, kind)
+    return route_cache_of(world, planned, *files) if kept else planned
+
+
+def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> Checked:
+    """What speaks against a request that was understood, and what it takes; `planner` is one that knows routes.
+
+    Raises:
+        InputError: the world's map or the request's stack file cannot be used.
+    """
+    world = prepared.world
+    return check_tree(
+        prepared.tree,
+        knowledge=prepared.knowledge,
+        start=world.start,
+        abilities=_by_sight(abilities_in(world, prepared.kind), prepared.stack_file, prepared.kind),
+        planner=planner or route_planner_of(world, prepared.stack_file, prepared.kind),
+        estimates=load_estimates(),
+    )
+
+
+def refuse_impossible(prepared: Prepared) -> None:
+    """Raise InputError for all that `errand check` finds, before anything moves."""
+    refuse_unusable(prepared.world)
+    problems = Problems()
+    for error in (error for each in prepared.all for error in check_prepared(each).errors):
+        problems.add(error)
+    problems.raise_any()
+
+
+def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
+    """What a kind of robot can lift, and what the lightest object of each class weighs in a world with imports."""
+    abilities = abilities_of(kind)
+    masses, others = dict(abilities.masses_kg), {rule.model for rule in world.seed_rules.objects}
+    for name in sorted(others & set(world.imports)):
+        own = world.imports[name].object
+        only = own.class_name not in others or own.class_name not in masses
+        masses[own.class_name] = own.mass_kg if only else min(own.mass_kg, masses[own.class_name])
+        others.add(own.class_name)
+    rules = world.seed_rules
+    takers = frozenset(person.name for person in rules.people if person.receives)
+    taken_m2: dict[str, float] = {}
+    for rule in rules.objects:
+        if len(rule.surfaces) == 1:
+            width_m = abilities.widths_m.get(rule.model, 0.0)
+            taken_m2[rule.surfaces[0]] = taken_m2.get(rule.surfaces[0], 0.0) + (width_m + rules.rules.clear_m) ** 2
+    return replace(abilities, masses_kg=masses, takers=takers, taken_m2=taken_m2, apart_m=rules.rules.clear_m)
+
+
+def _by_sight(abilities: Abilities, stack_file: Path | None, kind: str) -> Abilities:
+    """The abilities with only those classes that the detector of a stack knows. Raises InputError."""
+    file = stack_file or robot_kind(kind).stack
+    stack = None if file is None else load_stack(file)
+    if stack is None or stack.detector == default_component("detector"):
+        return abilities
+    from executive.app.assembly import shared_detector
+
+    return replace(abilities, classes=abilities.classes & frozenset(shared_detector(stack).class_names))
+
+
+@cache
+def abilities_of(kind: str) -> Abilities:
+    """What a kind of robot can lift and reach, and what the lightest and narrowest of each class are like, else 0.0."""
+    known = {name: form.mass_kg for name, form in class_forms().items() if name in load_catalogue()}
+    masses = {name: 0.0 if mass_kg is None else mass_kg[0] for name, mass_kg in known.items()}
+    capabilities = robot_kind(kind).capabilities()
+    return Abilities(
+        masses,
+        0.0 if capabilities.arm is None else capabilities.arm.max_payload_kg,
+        frozenset(class_forms()),
+        known_attributes(),
+        reached_heights_m(capabilities),
+        {name: form.width_m[0] for name, form in class_forms().items()},
+        math.inf if capabilities.gripper is None else capabilities.gripper.max_grasp_m,
+        capabilities.gripper is not None and capabilities.arm is not None,
+    )
+
+
+def reached_heights_m(capabilities: Capabilities) -> tuple[float, float]:
+    """The lowest and the highest surface (m over the floor) that an arm reaches: by its length alone, the body as low
+    and as high as it goes, as near to the surface as it stands. All heights without an arm that we can move."""
+    try:
+        model, arm = arm_model(capabilities), capabilities.arm
+    except ValueError:
+        return -math.inf, math.inf
+    assert arm is not None
+    x_m, _, z_m = model.p_BS
+    ahead_m = max(0.0, min(*arm.standing_m, *arm.nearer_m) - float(x_m))
+    upright_m = math.sqrt(max(0.0, arm.max_reach_m**2 - ahead_m**2))
+    low_m, high_m = capabilities.height_range_m
+    return low_m + float(z_m) - upright_m, high_m + float(z_m) + upright_m

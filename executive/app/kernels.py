@@ -1,0 +1,157 @@
+"""Compiles the numeric code of drives, scans, arms and maps into numba's cache, by doing a little of each."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+import numpy as np
+import typer
+from numba.core.dispatcher import Dispatcher
+
+from executive.app.mission_run import run_request
+from executive.app.requests import prepare
+from executive.app.simulated import SimulatedBackend
+from executive.app.starts import DEFAULT_KIND, alone
+from executive.app.worlds import open_world
+from executive.mission.request import Request
+from executive.words.steps import DEFAULT_WORLD
+from skills.estimate.compiled import CompiledFunction
+from skills.navigate.lattice import search
+
+__all__ = ["compile_first", "compile_kernels", "newly_compiled"]
+
+_MISSION: Final = """
+name: warm up
+steps: [{skill: navigate, with: {x: 5.2, y: 4.5, yaw: 3.1416}}]
+"""
+
+
+@dataclass(frozen=True)
+class _Drive:
+    """A kind of robot that drives, and the components in place of its default ones."""
+
+    kind: str = DEFAULT_KIND
+    stack: str | None = None
+
+
+_DRIVES: Final = (
+    _Drive(),
+    _Drive(stack="{localiser: {use: scan_matching}, costmap: {use: rolling}, controller: {use: mppi}}"),
+    _Drive(kind="fetch"),
+)
+TICK_S: Final = 0.05
+_DRIVEN_S: Final = 2.5
+_SURVEYED_S: Final = 4.0
+
+
+def compile_first() -> None:
+    """Run `errand warm-up` where nothing was compiled yet, and say so on standard error."""
+    if any(_cache_folder().glob("lattice.search-*.nbi")):
+        return
+    typer.echo("errand: compiles its numeric code for this machine, once; that takes about half a minute", err=True)
+    subprocess.run([sys.executable, "-m", "executive.cli", "warm-up"], stdout=subprocess.DEVNULL, check=False)
+
+
+def newly_compiled() -> int:
+    """How many functions this process compiled that numba's cache did not hold."""
+    modules = [module for name, module in sys.modules.items() if name.startswith(("skills.", "plant."))]
+    values = [value for module in modules for value in vars(module).values()]
+    codes = {id(code): code for code in (getattr(value, "machine_code", value) for value in values if _is_code(value))}
+    return sum(sum(code.stats.cache_misses.values()) for code in codes.values())
+
+
+def _is_code(value: object) -> bool:
+    return isinstance(value, Dispatcher) or (isinstance(value, CompiledFunction) and value.is_compiled)
+
+
+def _cache_folder() -> Path:
+    """Where numba keeps the planner's search."""
+    return Path(search.machine_code.stats.cache_path)  # type: ignore[attr-defined]
+
+
+def compile_kernels() -> None:
+    """Drive a little with each kind of robot and each component, bend an arm, and survey a little.
+
+    Takes some seconds where the cache already holds all of it.
+    """
+    with TemporaryDirectory() as folder:
+        for number, drive in enumerate(_DRIVES):
+            _begin(drive, Path(folder) / str(number))
+    _search()
+    _bend_arm()
+    _see_cells()
+    _survey()
+
+
+def _begin(drive: _Drive, folder: Path) -> None:
+    """Drive for some seconds towards a place, as a mission does."""
+    folder.mkdir()
+    mission, stack = folder / "warm_up.yaml", None
+    mission.write_text(_MISSION, encoding="utf-8")
+    if drive.stack is not None:
+        stack = folder / "stack.yaml"
+        stack.write_text(drive.stack, encoding="utf-8")
+    prepared = prepare(Request(file=mission, out=folder, record=False, time_limit_s=_DRIVEN_S), ask=None)
+    robots = {prepared.mission.robot_name: alone(prepared.world, stack=stack, kind=drive.kind)}
+    run_request(prepared, SimulatedBackend(prepared.world, robots, seed=1, record=False))
+
+
+def _search() -> None:
+    """Compare scans at places where the robot may be, as one does that does not know where it is."""
+    from skills.estimate.grid_map import load_grid_map
+    from skills.estimate.matching import score_poses
+
+    score_poses(load_grid_map(open_world(DEFAULT_WORLD).scan_map_path), np.ones((2, 3)), np.ones((1, 3)))
+
+
+def _bend_arm() -> None:
+    """Solve for the joints of an arm that has seven, and check it against a box."""
+    from pydrake.math import RigidTransform
+
+    from plant.kinds import robot_kind
+    from skills.arm.collision import ArmScene, Box, gaps_m
+    from skills.arm.kinematics import arm_model
+
+    capabilities = robot_kind("fetch").capabilities()
+    model = arm_model(capabilities)
+    q_rad = np.full(7, 0.5)
+    model.inverse(model.X_BH(q_rad))
+    scene, box = ArmScene(capabilities, model, {}), Box(RigidTransform([2.0, 0.0, 0.0]), (0.1, 0.1, 0.1))
+    scene.set_boxes([box])
+    scene.edge_free(q_rad, q_rad)
+    gaps_m(box, [box], np.zeros((1, 3)))
+
+
+def _see_cells() -> None:
+    """Take in a depth picture for the arm."""
+    from pydrake.math import RigidTransform
+
+    from skills.arm.solid_cells import Outline, with_picture
+    from skills.robot import FrameTree, Image, Intrinsics
+
+    lens, depth_m = Intrinsics(2, 2, 1.0, 1.0, 1.0, 1.0), np.ones((2, 2), dtype=np.float32)
+    image = Image(0.0, "hand", "odom", lens, lens, None, np.zeros((2, 2), dtype=np.uint8), depth_m, FrameTree({}))
+    own = Outline(RigidTransform(), np.zeros(2), np.zeros(2))
+    with_picture(np.empty((0, 3), dtype=np.int64), image, RigidTransform(), own)
+
+
+def _survey() -> None:
+    """Begin to make a map, and look for a place in it."""
+    from executive.app.assembly import simulate
+    from skills.mapping.closures import Window
+    from skills.mapping.mapper import Mapper
+    from skills.mapping.survey import Survey
+
+    world, name = open_world(DEFAULT_WORLD), "Alice"
+    simulation = simulate(world, {name: alone(world)}, seed=1, record=False)
+    robot, clock, mapper = simulation.robots[name], simulation.clock, Mapper(world.start)
+    survey = Survey(robot, robot.acquire_lease("errand warm-up"), mapper, home=world.start)
+    while clock.now() < _SURVEYED_S and not survey.done:
+        clock.advance(TICK_S)
+        survey.tick(clock.now())
+    mapper.find_in(mapper.submaps[0], mapper.keyframes[0].points_F, mapper.pose, Window(0.5, 0.1))

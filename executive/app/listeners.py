@@ -1,0 +1,162 @@
+"""What a server of the queue listens to besides the clock: HTTP calls, and the messages that plug-ins hear.
+
+A port is open, and a plug-in started, only while a standing mission waits for it.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from executive.app.call_token import CallToken, call_token
+from executive.app.trigger_calls import TriggerCalls
+from executive.store.trigger_source import TriggerSource, trigger_source
+from executive.store.triggers import OnCall, OnTopic, Trigger
+from executive.view.calls import CallServer
+from skills.files.errors import InputError
+from skills.files.plugins import PluginDefect, run_in_thread
+
+__all__ = ["CallAddress", "Listeners"]
+
+LIMIT_S: Final = 10.0
+"""A plug-in may take so long to start, and to stop."""
+_SEE: Final = "see the documentation of that package"
+_HOST: Final = re.compile(r"[A-Za-z0-9.:%_-]{1,253}")
+
+
+@dataclass(frozen=True)
+class CallAddress:
+    """Where HTTP calls are served, and the token that was given for them.
+
+    Raises:
+        InputError: the host is no name and no address.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8950
+    token: str | None = None
+
+    def __post_init__(self) -> None:
+        if not _HOST.fullmatch(self.host):
+            hint = "name this machine or an address of it, as in 127.0.0.1"
+            raise InputError(f"--host '{self.host[:60]}' is no name and no address", hint=hint)
+
+
+class Listeners:
+    """The port and the plug-ins of a store's standing missions. Use it as a context manager, or call `close`."""
+
+    def __init__(
+        self, store: Path, address: CallAddress, tell: Callable[[str], None], *, limit_s: float = LIMIT_S
+    ) -> None:
+        """`tell` prints a line, from any thread; a plug-in may take `limit_s` to start, and to stop."""
+        self._limit_s = limit_s
+        self._stuck: dict[str, str] = {}
+        self._store, self._address, self._tell = store, address, tell
+        self._calls = TriggerCalls(store, tell)
+        self._server: CallServer | None = None
+        self._sources: dict[str, tuple[tuple[str, ...], TriggerSource]] = {}
+        self._unheard: dict[str, str] = {}
+
+    def __enter__(self) -> Listeners:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def follow(self, triggers: Iterable[Trigger]) -> None:
+        """Listen to what these wait for, and to nothing else; a plug-in that is missing or does not start is told once.
+
+        Raises:
+            InputError: the address cannot be served.
+        """
+        waited_for = tuple(triggers)
+        wanted: dict[str, tuple[str, ...]] = {}
+        for each in waited_for:
+            if isinstance(each, OnTopic) and each.topic not in wanted.get(each.kind, ()):
+                wanted[each.kind] = (*wanted.get(each.kind, ()), each.topic)
+        self._follow_calls(any(isinstance(each, OnCall) for each in waited_for))
+        self._follow_topics(wanted)
+
+    def close(self) -> None:
+        """Listen no more; idempotent."""
+        self._follow_calls(False)
+        self._follow_topics({})
+
+    def _follow_calls(self, wanted: bool) -> None:
+        if self._server is not None and not wanted:
+            self._server.close()
+            self._server = None
+        if self._server is None and wanted:
+            self._server = self._served(call_token(self._address.token, self._store))
+
+    def _served(self, token: CallToken) -> CallServer:
+        host, port = self._address.host, self._address.port
+        try:
+            server = CallServer(self._calls.called, token=token.text, host=host, port=port)
+        except (OSError, UnicodeError) as error:
+            why = error.strerror if isinstance(error, OSError) else "there is no such name"
+            what = f"cannot serve calls at {host} port {port} ({why or error})"
+            raise InputError(what, hint="name another --host or --port") from error
+        self._tell(f"Calls: POST {server.url}NAME")
+        if token.new:
+            self._tell(f"The token, which is kept in {token.file}: {token.text}")
+        elif token.file is not None:
+            self._tell(f"The token is in {token.file}")
+        return server
+
+    def _follow_topics(self, wanted: Mapping[str, tuple[str, ...]]) -> None:
+        for kind, (topics, source) in list(self._sources.items()):
+            if wanted.get(kind) != topics:
+                del self._sources[kind]
+                self._stop(kind, source)
+        self._unheard = {kind: why for kind, why in self._unheard.items() if kind in wanted}
+        for kind, topics in wanted.items():
+            if kind in self._sources:
+                continue
+            try:
+                self._sources[kind] = (topics, self._started(kind, topics))
+            except InputError as error:
+                if self._unheard.get(kind) != str(error):
+                    self._tell(f"errand: missions that wait for topics of {kind} are not heard of: {error}")
+                self._unheard[kind] = str(error)
+            else:
+                self._unheard.pop(kind, None)
+
+    def _started(self, kind: str, topics: Sequence[str]) -> TriggerSource:
+        """A plug-in that listens. Raises InputError: there is none, or it does not start.
+
+        One that is not done within the limit is not asked again, and what it hears later is dropped.
+        """
+        if kind in self._stuck:
+            raise InputError(self._stuck[kind], hint=_SEE)
+        source, given_up = trigger_source(kind), threading.Event()
+
+        def fire(topic: str, payload: bytes) -> None:
+            if not given_up.is_set():
+                self._calls.heard(kind, topic, payload)
+
+        def start() -> None:
+            source.start(topics, fire)
+            if given_up.is_set():
+                source.stop()
+
+        try:
+            run_in_thread(start, limit_s=self._limit_s)
+        except PluginDefect as defect:
+            given_up.set()
+            message = f"trigger source '{kind}' does not start ({defect})"
+            if isinstance(defect.__cause__, TimeoutError):
+                self._stuck[kind] = message
+            raise InputError(message, hint=_SEE) from defect
+        return source
+
+    def _stop(self, kind: str, source: TriggerSource) -> None:
+        """Stop a plug-in; that it raises is told, and harms nothing else."""
+        try:
+            run_in_thread(source.stop, limit_s=self._limit_s)
+        except PluginDefect as defect:
+            self._tell(f"trigger source '{kind}' does not stop ({defect})")

@@ -1,0 +1,265 @@
+"""`report.html` in a run's folder: what was asked for, what came of it, and what was found out, with pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+from py_trees.common import Status
+
+from executive.app.artifacts import Artifacts, detection_picture, file_name, to_jpeg
+from executive.app.picture_files import read_picture
+from executive.app.report import VERDICTS, RobotReport, RunReport, counts_text
+from executive.app.requests import Prepared
+from executive.record.reader import Event
+from executive.record.schemas import TRANSITIONS
+from executive.run.outcome import Outcome
+from executive.tree.compiler import CompiledTree
+from executive.tree.node_view import NodeView
+from executive.view.collapse import DRAWN_NODES, folded_to, what_ran
+from executive.view.map_picture import map_picture
+from executive.view.report_page import (
+    AnswerRow,
+    PagePicture,
+    ReportPage,
+    ReportPart,
+    SeenRow,
+    StepRow,
+    Verdict,
+    to_report,
+)
+from executive.view.styles import ROBOT_COLOURS, Styles, style_of
+from executive.view.svg import to_svg
+from skills.files.errors import InputError
+
+__all__ = ["REPORT", "EndedTree", "map_of", "part_of", "save_report", "step_rows", "write_report"]
+
+REPORT: Final = "report.html"
+TREE: Final = "tree"
+_CAPTIONS: Final = {
+    "detection": "What was detected first",
+    "grasp": "The grasp",
+    "place": "Putting it down",
+    "hand_over": "Handing it over",
+}
+_MAP: Final = "The map, with the path of the robot"
+_MAPS: Final = "The map, with the path of each robot"
+_SKIPPED: Final = "skipped"
+_SKIPS: Final = frozenset({"skip", "ask"})
+
+
+@dataclass(frozen=True)
+class EndedTree:
+    """A robot's tree as it ended, and what is said of that."""
+
+    tree: CompiledTree
+    view: NodeView
+    report: RobotReport
+
+    @property
+    def picture(self) -> str:
+        """What ran of the tree, as SVG."""
+        return to_svg(folded_to(what_ran(self.view), DRAWN_NODES), title=self.tree.mission_name)
+
+    def steps(self, events: Sequence[Event]) -> tuple[StepRow, ...]:
+        """The steps of its mission, with their times by a log."""
+        mission = _below(self.view, self.tree.mission.path_id) or self.view
+        return tuple(step_rows(mission, frozenset(part.path_id for part in self.tree.parts), _spans(events)))
+
+
+def write_report(
+    prepared: Prepared,
+    report: RunReport,
+    ended: Sequence[EndedTree],
+    artifacts: Artifacts,
+    events: Sequence[Event],
+) -> Path:
+    """Write the report of a run and the picture of each tree into its folder; the report's path.
+
+    `ended` are the robots' trees, `events` are those of the run's log, `artifacts` has the run's pictures.
+    """
+    out, several = prepared.request.out, len(prepared.robots) > 1
+    names = tuple(prepared.robots)
+    for each in ended:
+        (out / f"{file_name(TREE, each.tree.robot_name, names)}.svg").write_text(each.picture, encoding="utf-8")
+    page = ReportPage(
+        title=", ".join(names) if several else prepared.mission.name,
+        request=_request(prepared),
+        commands=() if several else report.commands,
+        verdicts=() if several else tuple(_verdicts(report)),
+        facts=_facts(report, "" if several else ended[0].tree.robot_name),
+        answers=[
+            AnswerRow(
+                one.t_s,
+                one.question,
+                one.place or "",
+                one.answer,
+                one.sentence,
+                None if one.picture is None else artifacts.pictures[one.picture],
+            )
+            for one in report.answers
+        ],
+        said=[(one.t_s, one.text) for one in report.said],
+        seen=[SeenRow(each.t_s, each.name, _where(each.surface, each.place)) for each in report.seen_objects],
+        steps=() if several else ended[0].steps(events),
+        events=() if report.referee is None else report.referee.events,
+        map=map_of(artifacts, events, several=several),
+        pictures=() if several else tuple(_pictures(artifacts, ended[0].tree.robot_name, names)),
+        tree_svg="" if several else ended[0].picture,
+        parts=[part_of(each, names, artifacts, events) for each in ended] if several else (),
+    )
+    return save_report(out, page)
+
+
+def part_of(
+    ended: EndedTree, robots: Sequence[str], artifacts: Artifacts, events: Sequence[Event], *, title: str | None = None
+) -> ReportPart:
+    """What one of several robots did, for the report; under its name and kind unless there is a title."""
+    name, report = ended.tree.robot_name, ended.report
+    return ReportPart(
+        title=title or f"{name} ({report.kind})",
+        colour=ROBOT_COLOURS[sorted(robots).index(name) % len(ROBOT_COLOURS)],
+        commands=report.commands,
+        verdicts=tuple(_verdicts(report, counts=True)),
+        steps=ended.steps(events),
+        pictures=tuple(_pictures(artifacts, name, robots)) if title is None else (),
+        tree_svg=ended.picture,
+    )
+
+
+def save_report(out: Path, page: ReportPage) -> Path:
+    """Write a report's page into a folder; its path."""
+    path = out / REPORT
+    path.write_text(to_report(page), encoding="utf-8")
+    return path
+
+
+def step_rows(
+    node: NodeView, parts: frozenset[str], spans: Mapping[str, tuple[float, float]], depth: int = 0
+) -> Iterator[StepRow]:
+    """The steps of a mission: its parts, and above several of them what they belong to, one row each.
+
+    Decorators make one row with what they decorate: the status is theirs, the name that of the node within.
+    """
+    outer, within = node, [node]
+    while (only := _decorated(within[-1], parts)) is not None:
+        within.append(only)
+    inner, below = within[-1], _steps(within[-1])
+    nested = len(below) > 1 and inner.path_id not in parts and _parts_in(inner, parts) > (1 if depth else 0)
+    if depth or not nested:
+        row = _row(outer, within, spans, max(0, depth - 1))
+        yield replace(row, message="") if nested and row.word == Styles.SUCCESS.value.word else row
+    if nested:
+        for child in below:
+            yield from step_rows(child, parts, spans, depth + 1)
+
+
+def _decorated(node: NodeView, parts: frozenset[str]) -> NodeView | None:
+    """What a node is there for: its only child, or of one that is no sequence the only child with parts of the mission.
+
+    None for a part itself, and where there are several.
+    """
+    below = () if node.path_id in parts else _steps(node)
+    if len(below) > 1 and node.kind != "sequence":
+        below = tuple(child for child in below if _parts_in(child, parts))
+    return below[0] if len(below) == 1 else None
+
+
+def _parts_in(node: NodeView, parts: frozenset[str]) -> int:
+    return sum(one.path_id in parts for _, one in node.walk())
+
+
+def _steps(node: NodeView) -> tuple[NodeView, ...]:
+    return tuple(child for child in node.children if child.kind != "remember")
+
+
+def _row(outer: NodeView, within: Sequence[NodeView], spans: Mapping[str, tuple[float, float]], depth: int) -> StepRow:
+    inner, state = within[-1], outer.state
+    skipped = state.status is Status.SUCCESS and any(
+        above.kind in _SKIPS and below.state.status is Status.FAILURE for above, below in pairwise(within)
+    )
+    style = Styles.CANCELLED.value if skipped else style_of(state)
+    cause = f" ({state.cause.value})" if state.cause is not None else ""
+    word = _SKIPPED if skipped else f"{style.word}{cause}"
+    return StepRow(inner.title(), style, word, depth, spans.get(outer.path_id), state.message)
+
+
+def _spans(events: Sequence[Event]) -> dict[str, tuple[float, float]]:
+    """When each node began first and changed last (s), by path id."""
+    spans: dict[str, tuple[float, float]] = {}
+    for event in events:
+        if event.topic == TRANSITIONS:
+            t_s, path_id = float(event.data.get("t", event.stamp_s)), str(event.data["node"])
+            spans[path_id] = (spans.get(path_id, (t_s, t_s))[0], t_s)
+    return spans
+
+
+def _below(node: NodeView, path_id: str) -> NodeView | None:
+    return next((one for _, one in node.walk() if one.path_id == path_id), None)
+
+
+def _request(prepared: Prepared) -> str:
+    request = prepared.request
+    if request.sentence is not None:
+        return f"“{request.sentence}”"
+    return f"mission file {request.file.name}" if request.file is not None else "commands"
+
+
+def _verdicts(report: RunReport | RobotReport, *, counts: bool = False) -> Iterator[Verdict]:
+    """What the tree claims and what the referee saw, with its counts where they are asked for."""
+    cause = f" ({report.cause})" if report.cause else ""
+    yield Verdict(
+        "The tree claims", report.outcome == Outcome.SUCCESS.value, f"{report.outcome}{cause}", report.message
+    )
+    if report.referee is not None:
+        good = report.referee.success
+        why = f"{report.referee.why} ({counts_text(report.referee)})" if counts else report.referee.why
+        yield Verdict("The referee saw", good, VERDICTS[good], why)
+
+
+def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
+    """The facts of a run; without a robot's name those of all robots."""
+    facts = (
+        ("world", f"{report.world}, seed {report.seed}"),
+        ("duration", f"{report.sim_time_s:.1f} s simulated in {report.wall_time_s:.1f} s"),
+    )
+    if not robot_name:
+        return facts
+    contacts = () if report.referee is None else (("contacts", counts_text(report.referee)),)
+    return (("robot", robot_name), *facts, *contacts)
+
+
+def _where(surface: str | None, place: str | None) -> str:
+    on = f"on the {surface}" if surface else ""
+    return ", ".join(filter(None, (on, place))) or "somewhere else"
+
+
+def map_of(artifacts: Artifacts, events: Sequence[Event], *, several: bool) -> PagePicture | None:
+    """The world from above where the run was recorded, else the robot's own map; None where there is neither."""
+    caption = _MAPS if several else _MAP
+    if (drawn := _drawn(artifacts, "map")) is not None:
+        return PagePicture(caption, drawn)
+    try:
+        picture = map_picture(events)
+    except InputError:
+        return None
+    return PagePicture(caption, to_jpeg(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8)))
+
+
+def _pictures(artifacts: Artifacts, robot: str, robots: Sequence[str]) -> Iterator[PagePicture]:
+    """The pictures of a robot in a recorded run; of another, what was detected first."""
+    detection = artifacts.of(robot).detection
+    for name, caption in _CAPTIONS.items():
+        if (drawn := _drawn(artifacts, file_name(name, robot, robots))) is not None:
+            yield PagePicture(caption, drawn)
+        elif name == "detection" and detection is not None and not artifacts.pictures:
+            yield PagePicture(caption, to_jpeg(detection_picture(detection)))
+
+
+def _drawn(artifacts: Artifacts, name: str) -> bytes | None:
+    return to_jpeg(read_picture(artifacts.drawn[name])) if name in artifacts.drawn else None

@@ -1,0 +1,187 @@
+"""The simulated backend: robots in the plant, with its referee and its recorder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from executive.app.artifacts import Artifacts, draw_artifacts
+from executive.app.assembly import judge, run_entry, simulate, take_up_plant
+from executive.app.backend import Scene
+from executive.app.durable import Durable
+from executive.app.goal_conditions import Share
+from executive.app.mission_run import Finished, run_request
+from executive.app.page_view import PageView
+from executive.app.report import RefereeReport
+from executive.app.requests import Prepared
+from executive.app.starts import PlacedRobot, alone
+from executive.record.event_log import Listener
+from executive.record.profile import Profile
+from executive.run.control import Control
+from executive.run.outcome import RobotResult
+from executive.run.runner import Observer, RunEntry
+from executive.run.worker import WorkThread
+from executive.tree.compiler import CompiledTree
+from executive.words.variation import NO_VARIATION, Variation
+from plant.pipeline import Pipeline
+from plant.referee import Referee
+from plant.simulation import Simulation
+from plant.worlds.world import World
+from skills.files.errors import InputError
+from skills.robot import Clock
+
+__all__ = ["SimulatedBackend", "run_simulated"]
+
+
+class SimulatedBackend:
+    """Robots in the plant of a world (`executive.app.backend.Backend`)."""
+
+    def __init__(
+        self,
+        world: World,
+        robots: Mapping[str, PlacedRobot],
+        *,
+        seed: int,
+        record: bool,
+        variation: Variation = NO_VARIATION,
+        spared: Collection[str] = (),
+    ) -> None:
+        """Builds the plant, objects set by the seed. Raises InputError when they do not fit into the world."""
+        self._world, self._robots, self._record = world, robots, record
+        self._simulation = simulate(world, robots, seed=seed, record=record, variation=variation, spared=spared)
+        self._steps = WorkThread("errand-plant")
+        self._pipeline = Pipeline(self._simulation.engine, self._steps.do)
+        self._keep: Callable[[], None] | None = None
+
+    @property
+    def clock(self) -> Clock:
+        """The plant's clock, which steps it."""
+        return self._pipeline
+
+    @property
+    def referee(self) -> Referee:
+        """The plant's referee."""
+        return self._settled().referee
+
+    def _settled(self) -> Simulation:
+        """The simulation, once no step is under way."""
+        self._pipeline.settle()
+        return self._simulation
+
+    def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
+        """The robot with its estimators; the plant's state is taken up and kept where `durable` says so."""
+        robot = self._robots.get(tree.robot_name)
+        if robot is None:
+            hint = f"known: {', '.join(self._robots)}"
+            raise InputError(f"there is no robot '{tree.robot_name}' in {self._world.name}", hint=hint)
+        driven = self._pipeline.robots[tree.robot_name]
+        if durable is None:
+            return replace(run_entry(self._simulation, self._world, tree, robot.stack, told=robot.told), robot=driven)
+        told, believed = robot.told and not durable.take_up, durable.poses.get(tree.robot_name)
+        entry = run_entry(self._simulation, self._world, tree, robot.stack, believed=believed, told=told)
+        journal = durable.journals[tree.robot_name]
+        journal.keep_world = self._keeping(durable)
+        return replace(entry, robot=driven, journal=journal)
+
+    def _keeping(self, durable: Durable) -> Callable[[], None]:
+        """Keeps the plant's state, which the first robot to be had takes up where `durable` says so."""
+        if self._keep is None:
+            if durable.take_up:
+                take_up_plant(self._simulation, durable.plant, label=durable.take_up_label)
+            keep = self._simulation.keep_in(durable.plant, label=durable.label)
+
+            def keep_settled() -> None:
+                self._pipeline.settle()
+                keep()
+
+            self._keep = keep_settled
+        return self._keep
+
+    def happened(self) -> Sequence[tuple[float, str]]:
+        """What doors did, and what somebody moved."""
+        return self._pipeline.happened
+
+    def work(self) -> Mapping[str, int]:
+        """The plant's counters."""
+        counts: Mapping[str, int] = self._settled().work()
+        return counts
+
+    def attach(self, profile: Profile) -> None:
+        """Time the plant's steps, the referee, and each robot's control, sensors and pictures."""
+        profile.attach("plant", self._simulation.engine, "step")
+        profile.attach("referee", self._simulation.referee, "observe")
+        for robot in self._simulation.robots.values():
+            profile.attach("joint control", robot, "control")
+            profile.attach("LiDAR and other sensors", robot, "sense")
+            profile.attach("rendering", robot, "image")
+
+    def show_live(self) -> Scene:
+        """The plant's live scene."""
+        scene: Scene = self._simulation.show_live()
+        return scene
+
+    def judge(
+        self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
+    ) -> RefereeReport:
+        """What the plant's referee saw."""
+        verdict = judge(self._settled(), tree, result, before=before, since_s=since_s)
+        return RefereeReport(**asdict(verdict), events=self._simulation.referee.events)
+
+    def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
+        """Write recording and pictures, where the run was recorded."""
+        if not self._record:
+            return None
+        self._settled().save_recording(out / "recording.html")
+        draw_artifacts(artifacts, self._simulation, sorted(self._robots), out)
+        return out / "recording.html"
+
+
+def run_simulated(
+    prepared: Prepared,
+    *,
+    observer: Observer | None = None,
+    control: Control | None = None,
+    page: PageView | None = None,
+    durable: Durable | None = None,
+    profile: Profile | None = None,
+    listener: Listener | None = None,
+) -> Finished:
+    """Run a request in the plant, as `run_request` does. Raises InputError: the world cannot be used."""
+    from executive.app.kernels import compile_first
+
+    compile_first()
+    request = prepared.request
+    backend = SimulatedBackend(
+        prepared.world,
+        robots_of(prepared),
+        seed=request.seed,
+        record=request.record,
+        variation=request.variation,
+        spared=spoken_classes(prepared),
+    )
+    return run_request(
+        prepared,
+        backend,
+        observer=observer,
+        control=control,
+        page=page,
+        durable=durable,
+        profile=profile,
+        listener=listener,
+    )
+
+
+def robots_of(prepared: Prepared) -> Mapping[str, PlacedRobot]:
+    """The robots of a request: those that it names, or the one that its mission is for. Raises InputError."""
+    if prepared.robots:
+        return prepared.robots
+    request, name = prepared.request, prepared.mission.robot_name
+    return {name: alone(prepared.world, seed=request.seed, stack=request.stack, start=request.start)}
+
+
+def spoken_classes(prepared: Prepared) -> frozenset[str]:
+    """The classes of the objects that a mission speaks of; clutter is of none of them."""
+    named = {each.name for command in prepared.tree.commands for each in (command.item, command.object) if each}
+    known = prepared.knowledge
+    return frozenset(one for name in named for one in known.classes(known.thing(name) or name))

@@ -1,0 +1,123 @@
+"""The conversations beside a run of the command line: one with each robot, and who of them is meant."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+from executive.app.feasibility import refuse_impossible
+from executive.app.requests import Prepared
+from executive.conversation import Conversation, Reply, ReplyKind, Speech
+from executive.conversation.parts import Waiting
+from executive.language.parser import load_parser
+from executive.language.questions import RefusalError
+from executive.language.reference import Memory
+from executive.language.remarks import remark_of
+from executive.language.robots.calls import GREETING, Whom, calls_of
+from executive.language.understand import Understanding, understand
+from executive.language.wake import addressed_to
+from executive.mission.mission import mission_from_steps
+from executive.run.control import Control
+from executive.run.runner import Progress
+from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.registry import installed_skills
+from executive.words.steps import MissionStep
+
+__all__ = ["Talk", "conversation_of", "load_ahead"]
+
+
+def load_ahead() -> None:
+    """Begin to load the parser, in a thread of its own."""
+    threading.Thread(target=lambda: load_parser().parse("go"), name="errand-parser", daemon=True).start()
+
+
+class Talk:
+    """What is said to the robots of a run. All methods may be called from any thread.
+
+    Among several, a sentence is for the robot that it names, else for the first by name; a remark without a name, such
+    as "stop", is for all of them.
+    """
+
+    def __init__(self, prepared: Prepared, control: Control) -> None:
+        self._each = {each.mission.robot_name: (each, conversation_of(each, control)) for each in prepared.all}
+
+    def listen(self, listener: Callable[[str, Waiting | None], None]) -> None:
+        """Call `listener` after all that is said to a robot with its name and the question that it then asks."""
+        for name, (_, conversation) in self._each.items():
+            conversation.listen(partial(listener, name))
+
+    def begun(self) -> None:
+        """The run begins with the missions that were asked for: they can be corrected, and spoken of."""
+        for prepared, conversation in self._each.values():
+            conversation.begun(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
+
+    def observe(self, progress: Progress) -> None:
+        """See how far the run is; an observer for the runner."""
+        for _, conversation in self._each.values():
+            conversation.observe(progress)
+
+    def hear(self, text: str, robot: str | None = None) -> Reply:
+        """Do what was said, to a robot or to those that it names, and say what became of it. Never raises on text."""
+        if robot is not None and robot not in self._each:
+            return Reply(ReplyKind.REFUSED, f"{robot} has nothing to do in this run")
+        names, said = ((robot,), text) if robot is not None else self._meant(text)
+        replies = {name: self._each[name][1].hear(said) for name in names}
+        if len(replies) == 1:
+            return replies[names[0]]
+        kinds = [reply.kind for reply in replies.values()]
+        kind = next((each for each in kinds if each is not ReplyKind.REFUSED), ReplyKind.REFUSED)
+        return Reply(kind, "; ".join(f"{name}: {reply.text}" for name, reply in replies.items()))
+
+    def _meant(self, text: str) -> tuple[tuple[str, ...], str]:
+        """Whom a sentence is for, and what is said to them."""
+        names = tuple(self._each)
+        if len(names) == 1:
+            return names, text
+        calls = calls_of(names)
+        several = re.match(rf"\W*(?:{GREETING}[\s,]+)?({calls.called_together})[\s,:!.]+(?=\w)", text, re.IGNORECASE)
+        if several is not None:
+            try:
+                meant = calls.meant(several[1])
+            except RefusalError:
+                meant = Whom.ALL
+            return names if isinstance(meant, Whom) else meant, text[several.end() :]
+        called = addressed_to(text, names)
+        if called.name is not None:
+            return (called.name,), text
+        return names if remark_of(text) is not None else names[:1], text
+
+
+def conversation_of(prepared: Prepared, control: Control) -> Conversation:
+    """A conversation with the robot of a request, in its world."""
+    speech = Speech(
+        knowledge=prepared.knowledge,
+        robot_name=prepared.mission.robot_name,
+        understand=lambda text, memory: _understood(text, memory, prepared),
+        compile=lambda steps, taken: _compiled(steps, taken, prepared),
+    )
+    robot = prepared.knowledge.robot
+    return Conversation(speech, control, require_wake=robot.require_wake, others=robot.others)
+
+
+def _understood(text: str, memory: Memory | None, prepared: Prepared) -> Understanding:
+    return understand(
+        text,
+        parser=load_parser(),
+        knowledge=prepared.knowledge,
+        require_wake=False,
+        robot_name=prepared.mission.robot_name,
+        memory=memory,
+    )
+
+
+def _compiled(steps: Sequence[MissionStep], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
+    """The tree of a mission of these steps, under a name that is not taken. Raises InputError, as `check` does."""
+    mission = mission_from_steps(steps, world=prepared.world.name, robot_name=prepared.mission.robot_name)
+    names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
+    name = next(each for each in names if each not in taken)
+    tree = compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=installed_skills())
+    refuse_impossible(replace(prepared, tree=tree))
+    return tree

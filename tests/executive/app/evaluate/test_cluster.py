@@ -1,0 +1,121 @@
+"""Work given out to a Dask cluster, and what it says when the cluster is not fit for it; nightly in processes."""
+
+import logging
+
+import pytest
+
+from executive.app.evaluate import cluster
+from executive.app.evaluate.cluster import scheduler_at
+from skills.files.errors import InputError
+from tests.executive.app.evaluate import cheap_run
+
+distributed = pytest.importorskip("distributed")
+
+QUIET = {"dashboard_address": ":0", "memory_limit": 0, "silence_logs": logging.CRITICAL}
+
+
+IN_THREADS = {"threads_per_worker": 1, "processes": False, "protocol": "tcp", **QUIET}
+IN_PROCESSES = {"threads_per_worker": 1, "processes": True, **QUIET}
+
+
+@pytest.fixture(scope="module", params=[IN_THREADS, pytest.param(IN_PROCESSES, marks=pytest.mark.nightly)])
+def options(request):
+    """Workers that are threads of this process, or processes with a nanny each."""
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def address(options):
+    """A scheduler with two workers."""
+    with distributed.LocalCluster(n_workers=2, **options) as started:
+        yield started.scheduler_address
+
+
+def test_each_item_is_worked_on_once(address):
+    with scheduler_at(address) as workers:
+        finished = list(workers.give_out(cheap_run.square, range(20)))
+    assert sorted(one.item for one in finished) == list(range(20))
+    assert all(one.result == one.item**2 for one in finished)
+
+
+@pytest.mark.nightly
+def test_a_worker_that_is_killed_loses_nothing_and_doubles_nothing(tmp_path):
+    with (
+        distributed.LocalCluster(n_workers=2, **IN_PROCESSES) as started,
+        scheduler_at(started.scheduler_address) as workers,
+    ):
+        finished = list(workers.give_out(cheap_run.square_or_die, [(number, str(tmp_path)) for number in range(30)]))
+    assert sorted(one.item[0] for one in finished) == list(range(30))
+    assert all(one.result == one.item[0] ** 2 for one in finished)
+
+
+def test_workers_of_another_version_are_refused_before_anything_runs(address, monkeypatch):
+    monkeypatch.setattr(cluster, "_code_here", lambda: "9.9.9 of tomorrow")
+    with (
+        pytest.raises(InputError, match=r"has another version of Errand \(9\.9\.9 of tomorrow; here it is "),
+        scheduler_at(address),
+    ):
+        pass
+
+
+def test_what_a_run_raises_is_raised_here(address):
+    with scheduler_at(address) as workers, pytest.raises(ZeroDivisionError):
+        list(workers.give_out(cheap_run.divide, [1, 0]))
+
+
+def test_a_worker_with_two_threads_is_refused():
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, **QUIET) as started,
+        pytest.raises(InputError, match="has 2 threads, and a mission needs a process"),
+        scheduler_at(started.scheduler_address),
+    ):
+        pass
+
+
+def test_a_scheduler_without_workers_is_told(monkeypatch):
+    monkeypatch.setattr(cluster, "ANSWER_S", 0.3)
+    with (
+        distributed.LocalCluster(n_workers=0, processes=False, protocol="tcp", **QUIET) as started,
+        pytest.raises(InputError, match=r"has no workers; start one: dask worker tcp://"),
+        scheduler_at(started.scheduler_address),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("named", ["tcp://127.0.0.1:9", "here"])
+def test_a_scheduler_that_does_not_answer_is_told(named, monkeypatch):
+    monkeypatch.setattr(cluster, "ANSWER_S", 0.3)
+    with pytest.raises(InputError, match=f"no scheduler answers at {named}"), scheduler_at(named):
+        pass
+
+
+def test_workers_that_are_all_gone_are_told_and_what_has_landed_is_kept(options, monkeypatch):
+    monkeypatch.setattr(cluster, "GONE_S", 0.5)
+    started = distributed.LocalCluster(n_workers=1, **options)
+    landed = []
+    with (
+        started,
+        pytest.raises(InputError, match=r"no worker has been connected for 0\.5 s; start workers again; what"),
+        scheduler_at(started.scheduler_address) as workers,
+    ):
+        for finished in workers.give_out(cheap_run.slow_square, range(200)):
+            landed.append(finished.item)
+            if len(landed) == 3:
+                started.scale(0)
+                started.sync(started._correct_state)
+    assert 3 <= len(landed) < 200
+
+
+def test_a_scheduler_that_stops_is_told_and_what_has_landed_is_kept(options):
+    started = distributed.LocalCluster(n_workers=1, **options)
+    landed = []
+    with (
+        started,
+        pytest.raises(InputError, match="the scheduler has stopped answering"),
+        scheduler_at(started.scheduler_address) as workers,
+    ):
+        for finished in workers.give_out(cheap_run.slow_square, range(200)):
+            landed.append(finished.item)
+            if len(landed) == 3:
+                started.close()
+    assert 3 <= len(landed) < 200

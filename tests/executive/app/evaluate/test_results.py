@@ -1,0 +1,58 @@
+"""The results file."""
+
+from dataclasses import replace
+
+import pytest
+
+from executive.app.evaluate.outcome import Evidence, RunOutcome
+from executive.app.evaluate.results import ResultsFile
+from executive.app.evaluate.runs import Evaluation, RunSpec
+from skills.files.errors import InputError
+
+RUNS = tuple(RunSpec("go", seed, sentence="go") for seed in range(3))
+EVALUATION = Evaluation("scenario.yaml", RUNS)
+
+
+def outcome(run, result="success"):
+    report = {"outcome": result, "cause": None, "message": "", "referee": None, "sim_time_s": 1.0}
+    return RunOutcome(run.id, report, {"navigate": 1.0}, Evidence(((0.5, "go", "went"),), (("map", b"jpeg"),)))
+
+
+def test_results_are_kept_once_and_read_back(tmp_path):
+    with ResultsFile(tmp_path / "r.sqlite", create=True) as kept:
+        kept.begin(EVALUATION, code="1")
+        assert (kept.add(outcome(RUNS[1])), kept.add(outcome(RUNS[1], "failure"))) == (True, False)
+    with ResultsFile(tmp_path / "r.sqlite") as kept:
+        kept.begin(EVALUATION, code="1")
+        ((number, found),) = kept.outcomes()
+        assert (number, found.run_id, found.achieved, kept.done()) == (1, RUNS[1].id, True, {RUNS[1].id})
+        assert (tuple(kept.runs()), kept.evidence(RUNS[1].id)) == (RUNS, outcome(RUNS[1]).evidence)
+
+
+def test_results_of_another_scenario_or_version_are_refused(tmp_path):
+    with ResultsFile(tmp_path / "r.sqlite", create=True) as kept:
+        kept.begin(EVALUATION, code="1")
+        with pytest.raises(InputError, match="results of other runs"):
+            kept.begin(replace(EVALUATION, runs=RUNS[:2]), code="1")
+        with pytest.raises(InputError, match="another version of Errand"):
+            kept.begin(EVALUATION, code="2")
+
+
+def test_only_one_process_writes(tmp_path):
+    path = tmp_path / "r.sqlite"
+    own = ResultsFile(path, create=True)
+    with own, own.claimed(), ResultsFile(path) as other, pytest.raises(InputError, match="just now"):
+        other.claimed().__enter__()
+
+
+def test_what_is_no_results_file_is_refused(tmp_path):
+    (tmp_path / "text").write_text("no database, " * 100)
+    for name, says in (("text", "no results file"), ("none", "there is no results file")):
+        with pytest.raises(InputError, match=says):
+            ResultsFile(tmp_path / name)
+
+
+def test_wall_times_do_not_change_the_digest():
+    slow = outcome(RUNS[0])
+    fast = replace(slow, report={**slow.report, "wall_time_s": 3.0, "log": "elsewhere"}, spent_s=9.0, worker="b")
+    assert (slow.digest == fast.digest, slow.digest == outcome(RUNS[0], "failure").digest) == (True, False)

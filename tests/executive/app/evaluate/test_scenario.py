@@ -1,0 +1,53 @@
+"""Scenario files become runs."""
+
+import pytest
+
+from executive.app.evaluate.scenario import is_evaluation, load_evaluation
+from skills.files.errors import InputError
+
+
+def load(tmp_path, text):
+    file = tmp_path / "scenario.yaml"
+    file.write_text(text)
+    return load_evaluation(file, mission_file=lambda path: tmp_path / path, stack_file=lambda path: path)
+
+
+def test_the_runs_are_the_product_of_all_lists(tmp_path):
+    text = "missions: [go to the hall]\nworlds: [flat, shop]\nseeds: 1-3\n"
+    text += "variations: {light: [normal, dim], people: [0, 1]}\n"
+    evaluation = load(tmp_path, text)
+    # 1 mission x 2 worlds x 2 lights x 2 numbers of people x 3 seeds
+    assert (len(evaluation.runs), len({run.id for run in evaluation.runs})) == (24, 24)
+    assert evaluation.runs[0].varied == {"light": "normal", "people": "0"}
+
+
+def test_an_id_is_that_of_the_content_wherever_the_files_lie(tmp_path):
+    ids = []
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "go.yaml").write_text("name: go\nsteps: [{to: hall}]\n")
+        ids.append(load(tmp_path / name, "missions: [go.yaml]\nseeds: [1]\n").runs[0].id)
+    (tmp_path / "b" / "go.yaml").write_text("name: go\nsteps: [{to: kitchen}]\n")
+    changed = load(tmp_path / "b", "missions: [go.yaml]\nseeds: [1]\n").runs[0].id
+    assert (ids[0] == ids[1], changed == ids[0]) == (True, False)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("missions: [nowhere.yaml]\n", "scenario.yaml:1: there is no file 'nowhere.yaml'"),
+        ("missions: [go on]\nseeds: many\n", "scenario.yaml:2: 'many' is no range of seeds"),
+        ("missions: [go on]\nvariations:\n  lihgt: [dim]\n", "scenario.yaml:3: unknown"),
+        ("missions: [go on, go on]\nseeds: [1]\n", "1 of the runs stand in it twice"),
+    ],
+)
+def test_what_is_wrong_is_refused_with_its_line(tmp_path, text, says):
+    with pytest.raises(InputError) as raised:
+        load(tmp_path, text)
+    assert says in str(raised.value)
+
+
+def test_a_mission_file_is_no_scenario_for_evaluations(tmp_path):
+    file = tmp_path / "go.yaml"
+    file.write_text("name: go\nsteps: [{to: hall}]\n")
+    assert not is_evaluation(file)

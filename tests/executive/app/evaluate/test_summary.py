@@ -1,0 +1,83 @@
+"""What results say: claims against verdicts, groups, and the page that shows them."""
+
+import pytest
+
+from executive.app.evaluate.outcome import Evidence, RunOutcome, Standing
+from executive.app.evaluate.page import EvaluationPage, to_page
+from executive.app.evaluate.runs import RunSpec
+from executive.app.evaluate.summary import Case, group_rows, groups_of, standing_rows, standing_texts, to_look_at
+
+
+def case(seed, outcome, success=None, *, cause=None, holds=None, kind="fetch", world="flat"):
+    referee = {"success": success, "why": "the hammer is on the floor", "holds": holds}
+    report = {"outcome": outcome, "cause": cause, "message": "no path", "referee": referee, "sim_time_s": 9.0}
+    run = RunSpec(kind, seed, sentence=f"fetch me the hammer {seed}", world=world)
+    return Case(run, RunOutcome(run.id, {**report, "world": world}))
+
+
+CASES = (
+    case(1, "success", True),
+    case(2, "success", True, kind="go", world="lab"),
+    case(3, "success", False),
+    case(4, "success", None),
+    case(5, "failure", False, cause="PLANNING", holds=False),
+    case(6, "failure", False, cause="PLANNING"),
+    case(7, "failure", False, cause="TIMEOUT", holds=True),
+    case(8, "refused", False, cause="REFUSED"),
+    case(9, "error", False, cause="ERROR"),
+)
+
+
+@pytest.mark.parametrize(
+    ("number", "standing"),
+    [
+        (0, Standing.FULFILLED),
+        (2, Standing.FALSE_CLAIM),
+        (3, Standing.NOT_JUDGED),
+        (4, Standing.FAILED),
+        (5, Standing.FAILED),
+        (6, Standing.FULFILLED_YET_FAILED),
+        (7, Standing.REFUSED),
+        (8, Standing.BROKEN),
+    ],
+)
+def test_a_run_stands_where_its_claim_meets_its_verdict(number, standing):
+    assert CASES[number].outcome.standing is standing
+
+
+def test_claims_are_counted_against_verdicts_with_intervals_and_causes():
+    rows = {row.standing: row for row in standing_rows(CASES)}
+    assert {standing: row.rate.successes for standing, row in rows.items()} == {
+        Standing.FULFILLED: 2,
+        Standing.FALSE_CLAIM: 1,
+        Standing.NOT_JUDGED: 1,
+        Standing.FAILED: 2,
+        Standing.FULFILLED_YET_FAILED: 1,
+        Standing.REFUSED: 1,
+        Standing.BROKEN: 1,
+    }
+    assert rows[Standing.FAILED].causes == [("PLANNING", 2)]
+    # 2 of 9: Wilson's interval by hand
+    assert next(iter(standing_texts(CASES))) == ("claimed and fulfilled", "2", "22.2%", "6.3% to 54.7%", "")
+
+
+def test_what_is_to_be_looked_at_begins_with_false_claims():
+    assert [each.run.seed for each in to_look_at(CASES)] == [3, 4, 5, 6, 7, 8, 9]
+
+
+def test_a_false_claim_is_explained_by_the_referee_and_a_failure_by_the_robot():
+    assert (CASES[2].why, CASES[4].why) == ("the hammer is on the floor", "no path")
+
+
+def test_runs_are_grouped_by_kind_and_by_world_with_the_counts_of_each_standing():
+    rows = {row[0]: row for row in group_rows(groups_of(CASES))}
+    assert rows["mission: go"][1:3] == ("1", "1 (100.0%)")
+    assert rows["world: flat"][4:] == ("1", "1", "1", "2", "1", "1", "1")
+
+
+def test_the_page_lists_each_run_to_look_at_with_its_sentence_and_the_commands():
+    commands = ("errand run --say x", "errand log logs/3/log.mcap")
+    page = to_page(EvaluationPage("random", (), CASES, lambda _: Evidence(), lambda _: commands))
+    assert "claimed, not fulfilled: FALSE CLAIM</b> fetch me the hammer 3, flat, seed 3" in page
+    assert page.count("errand log logs/3/log.mcap") == 7
+    assert "fetch me the hammer 1," not in page

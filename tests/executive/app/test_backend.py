@@ -1,0 +1,99 @@
+"""A run on a backend without plant, referee and recorder: nothing but the backend knows that it is not simulated."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from executive.app import requests
+from executive.app.mission_run import run_request
+from executive.app.report import RunReport
+from executive.app.requests import prepare
+from executive.mission.request import Request
+from executive.mission.scenario import Scenario
+from executive.record.profile import Profile
+from executive.record.reader import read_events
+from executive.run.outcome import Outcome
+from tests.executive.app.scripted_backend import ScriptedBackend
+
+
+@pytest.fixture
+def prepared(tmp_path, monkeypatch):
+    monkeypatch.setattr(requests, "load_parser", lambda: None)  # no step here is a sentence
+    path = tmp_path / "drive.yaml"
+    path.write_text("name: drive\nsteps:\n  - {skill: navigate, with: {x: 1.0, y: 0.5}}\n")
+    return prepare(Request(file=path, out=tmp_path / "out", seed=4))
+
+
+def test_a_run_without_a_referee_is_achieved_when_the_tree_says_so(prepared):
+    backend = ScriptedBackend()
+    report = run_request(prepared, backend).report
+    assert (report.outcome, report.referee, report.achieved, report.false_claim) == ("success", None, True, False)
+    assert backend.asked == [("drive", Outcome.SUCCESS)]
+    x_m, y_m, _ = backend.robot.odometry().X_OB.translation()
+    assert (x_m, y_m) == (pytest.approx(1.0, abs=0.2), pytest.approx(0.5, abs=0.2))
+
+
+def test_its_report_says_that_nobody_else_saw_it(prepared):
+    report = run_request(prepared, ScriptedBackend()).report
+    told = json.loads(json.dumps(report.to_json()))
+    assert told["referee"] is None
+    assert RunReport.from_json(told) == report
+    assert not any("referee" in line or "collisions" in line for line in report.lines())
+
+
+def test_faults_and_events_are_at_work_logged_and_in_the_report(prepared):
+    class Busy(ScriptedBackend):
+        """One in whose world something happens."""
+
+        def happened(self):
+            return [(0.5, "a door closes")] if self.clock.now() > 0.5 else []
+
+    scenario = Scenario(("lidar: dropout 0.5 s at 1 s", "drive is stopped after 3 calls"))
+    disturbed = replace(prepared, request=replace(prepared.request, scenario=scenario))
+    report = run_request(disturbed, Busy()).report
+    assert (report.outcome, report.scenario) == ("failure", tuple(f"fault: {words}" for words in scenario.faults))
+    assert RunReport.from_json(json.loads(json.dumps(report.to_json()))) == report
+    events = read_events(prepared.request.out / "log.mcap")
+    told = [(event.data["what"], event.data["message"]) for event in events if event.topic == "control"]
+    assert ("event", "a door closes") in told
+    assert ("fault", "drive is stopped after 3 calls: begins") in told
+    assert next(event.data["scenario"] for event in events if event.topic == "run") == list(report.scenario)
+
+
+def test_a_fault_that_ends_is_logged_and_the_robot_goes_on(prepared):
+    scenario = Scenario(("lidar: dropout 0.5 s at 1 s",))
+    report = run_request(replace(prepared, request=replace(prepared.request, scenario=scenario)), ScriptedBackend())
+    assert report.report.outcome == "success"
+    events = read_events(prepared.request.out / "log.mcap")
+    told = [(round(event.stamp_s, 2), event.data["message"]) for event in events if event.topic == "control"]
+    assert told == [
+        (1.0, "lidar: dropout 0.5 s at 1 s: begins"),
+        (1.5, "lidar: dropout 0.5 s at 1 s: is over"),
+    ]
+
+
+def test_its_work_is_in_report_and_log_and_its_parts_are_timed(prepared):
+    profile = Profile()
+    report = run_request(prepared, ScriptedBackend(), profile=profile).report
+    logged = [event.data for event in read_events(prepared.request.out / "log.mcap") if event.topic == "work"]
+    assert logged == [dict(report.work)]
+    assert (report.work["calls"] > 10, report.work["planner_expansions"] > 0) == (True, True)
+    assert {"scripted", "planning", "costmap", "skills", "executive", "log"} <= set(profile.table())
+
+
+def test_log_and_tree_are_left_as_after_a_simulated_run(prepared):
+    run_request(prepared, ScriptedBackend())
+    out = prepared.request.out
+    assert sorted(path.name for path in out.iterdir()) == ["log.mcap", "report.html", "tree.svg"]
+    topics = {event.topic for event in read_events(out / "log.mcap")}
+    assert {"map", "run", "tree", "transitions", "pose", "state", "outcome"} <= topics
+
+
+def test_a_run_whose_tree_fails_is_not_achieved(prepared):
+    root, mission = prepared.tree.root, prepared.tree.mission
+    (drive,) = mission.children
+    short = replace(mission, children=(replace(drive, options={**drive.options, "limit_s": 0.01}),))
+    tree = replace(prepared.tree, root=replace(root, children=(*root.children[:-1], short)))
+    report = run_request(replace(prepared, tree=tree), ScriptedBackend()).report
+    assert (report.outcome, report.cause, report.achieved) == ("failure", "TIMEOUT", False)

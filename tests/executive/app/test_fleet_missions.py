@@ -1,0 +1,72 @@
+"""What a robot offers for a mission: by its routes, by where the object is, and by its battery."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from executive.app.fleet_missions import FleetMission, RobotNow, bid_for
+from executive.app.requests import prepare
+from executive.mission.request import Request
+from executive.tree.estimate import Route
+from skills.robot import Pose2D
+
+TAKE = "Take [Nothing] to [kitchen table] and do [grasp] to [coke]"
+PUT = "Take [coke] to [sideboard] and do [Nothing] to [Nothing]"
+CHARGE = "Take [Nothing] to [Nothing] and do [charge] to [Nothing]"
+HERE = Pose2D(10.6, 4.2, 0.0)
+KITCHEN_Y_M = 5.45
+
+
+class Routes:
+    """Ways of ten metres; none into the kitchen where that is `closed`."""
+
+    def __init__(self, *, closed=False):
+        self.closed = closed
+
+    def route(self, start, goal):
+        if self.closed and goal.y_m > KITCHEN_Y_M:
+            raise ValueError("there is no way")
+        return Route(10.0, 10.0)
+
+
+def prepared(*lines):
+    return prepare(Request(commands=lines, world="flat", name="work", robot="Alice"), ask=None)
+
+
+@pytest.fixture(scope="module")
+def mission():
+    return FleetMission(SimpleNamespace(id=1), {"Alice": prepared(TAKE, PUT)})
+
+
+@pytest.fixture(scope="module")
+def dock():
+    return prepared(CHARGE)
+
+
+def test_a_robot_that_can_do_it_offers_its_time_and_what_is_left_of_its_battery(mission):
+    bid = bid_for(mission, "Alice", RobotNow(HERE, 0.9, 0.15, Routes()))
+    assert bid.problems == ()
+    assert bid.duration_s > 30.0
+    assert 0.8 < bid.charge < 0.9
+
+
+def test_a_robot_does_not_offer_to_take_something_from_where_it_cannot_come(mission):
+    bid = bid_for(mission, "Alice", RobotNow(HERE, 0.9, 0.15, Routes(closed=True)))
+    assert "there is no way to the kitchen table, where the coke is to be taken" in bid.problems
+
+
+def test_a_robot_that_would_be_low_adds_the_time_to_charge(mission, dock):
+    full = bid_for(mission, "Alice", RobotNow(HERE, 0.9, 0.15, Routes(), dock))
+    low = bid_for(mission, "Alice", RobotNow(HERE, 0.15, 0.15, Routes(), dock))
+    assert (full.charges, low.charges, low.problems) == (False, True, ())
+    assert low.duration_s > full.duration_s + 0.6 * 300.0
+    assert low.charge > 0.7
+
+
+def test_a_robot_that_would_be_low_and_cannot_charge_offers_nothing(mission):
+    bid = bid_for(mission, "Alice", RobotNow(HERE, 0.15, 0.15, Routes()))
+    assert bid.problems[0].startswith("its battery has 15%, and ")
+
+
+def test_a_mission_for_another_robot_is_not_bid_for(mission):
+    assert bid_for(mission, "Bob", RobotNow(HERE, 0.9, 0.15, Routes())).problems == ("it is for Alice",)

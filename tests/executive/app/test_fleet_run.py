@@ -1,0 +1,566 @@
+"""A fleet's run with scripted robots: who does what, and what becomes of the mission of a robot that dies."""
+
+import io
+import json
+import signal
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from executive.app import fleet_dispatch, fleet_missions, fleet_robots
+from executive.app.auction import Bid
+from executive.app.fleet_dispatch import FleetDispatch
+from executive.app.fleet_missions import FleetMission
+from executive.app.fleet_report import told
+from executive.app.fleet_run import run_fleet
+from executive.app.page_view import PageView
+from executive.app.requests import Prepared
+from executive.cli import entry
+from executive.cli.fleet_command import _to_do, resumable_lines
+from executive.mission.mission import lines_of
+from executive.mission.request import Request
+from executive.record.reader import read_events
+from executive.run.runner import RunEntry
+from executive.store.given import GivenMissions
+from executive.store.missions import MissionStore
+from executive.tree.compiler import compile_mission
+from executive.words.command import Command, Task, parse_command
+from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from skills.api import Cause, Failed, Running, Succeeded
+from skills.faults.faulty_robot import with_faults
+from skills.files.errors import InputError
+from skills.robot import Pose2D
+from tests.benchmarks.fleet import begun_again
+from tests.executive.conftest import default_end
+
+KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
+BEDROOM = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
+TAKE = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
+PUT = "Take [coke] to [bedroom] and do [Nothing] to [Nothing]"
+ON_TABLE = "Take [coke] to [shelf] and do [Nothing] to [Nothing]"
+START = Pose2D(0.0, 0.0, 0.0)
+ROBOTS = ("Alice", "Bob")
+
+
+class Fleet:
+    """Scripted robots with a store, an auction in which Alice is a little faster, and faults by robot."""
+
+    def __init__(self, store, clock, knowledge, registry, make, script, monkeypatch, out):
+        self.script = script
+        self.store, self.clock, self.registry, self.out = store, clock, registry, out
+        battery = knowledge.battery.model_copy(update={"low": 0.05})
+        self.knowledge = knowledge.model_copy(update={"battery": battery})
+        self.unable, self.cannot = set(), lambda name, command: False
+        self.robots = {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
+        self.faults, self.make, self.missions, self.judged = {}, make, {}, []
+        self.shares, self.since_s = [], []
+        monkeypatch.setattr(fleet_dispatch, "entry_for", lambda prepared, backend, durable, work: self._entry(prepared))
+        monkeypatch.setattr(fleet_robots, "bid_for", self._bid)
+        self.tables, self.slower_s = None, 0.5
+        monkeypatch.setattr(fleet_robots.Offers, "takes_from", self._takes_from)
+        monkeypatch.setattr(fleet_missions, "prepared_for", lambda r, mission, *_: self._prepared(r, mission))
+
+    def _entry(self, prepared):
+        name = prepared.tree.robot_name
+        robot = with_faults(self.robots[name], self.clock, self.faults.get(name, ()), since_s=0.0)
+        return RunEntry(prepared.tree, robot, self.make.StillLocaliser(), self.make.EmptyCostmap())
+
+    def _bid(self, mission, name, now):
+        prepared = mission.options.get(name)
+        commands = () if prepared is None else prepared.tree.commands
+        unable = name in self.unable or any(self.cannot(name, command) for command in commands)
+        problems = ("out of reach",) if unable else ()
+        return Bid(mission.stored.id, name, 0.0, 1.0 + self.slower_s * ROBOTS.index(name), problems=problems)
+
+    def _takes_from(self, name, table):
+        return self.tables is None or table.place in self.tables
+
+    def _prepared(self, request, mission):
+        tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
+        world = SimpleNamespace(name="scripted", dock=START)
+        return Prepared(replace(request, commands=lines_of(tree.steps)), mission, world, self.knowledge, tree)
+
+    def queue(self, *lines):
+        request = Request(commands=lines, name="work", world_name="scripted")
+        stored = self.store.add(request, queued=True)
+        step = MissionStep(tuple(map(parse_command, lines)))
+        missions = {name: Mission("work", DEFAULT_WORLD, name, (step,)) for name in ROBOTS}
+        options = {name: self._prepared(request, mission) for name, mission in missions.items()}
+        self.missions[stored.id] = FleetMission(stored, options)
+
+    def show_live(self):
+        return None
+
+    def leave(self, artifacts, out):
+        return None
+
+    def judge(self, tree, result, *, before, since_s):
+        self.judged.append((tree.robot_name, result.outcome.value))
+        self.shares += [(share.tree.robot_name, share.done) for share in before]
+        self.since_s.append(since_s)
+
+    def run(self, page=None):
+        placed = {name: SimpleNamespace(start=START, kind="spot") for name in ROBOTS}
+        docks = {name: self._docking(name) for name in ROBOTS}
+        dispatch = FleetDispatch(self.store, dict(self.missions), placed, self, docks=docks)
+        run_fleet(dispatch, out=self.out, seed=3, page=page)
+        self.rows = rows = told(self.store, list(self.missions))
+        return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
+
+    def _docking(self, name):
+        step = MissionStep((Command(task=Task.CHARGE),))
+        return self._prepared(Request(), Mission("charge", DEFAULT_WORLD, name, (step,)))
+
+    def hold(self, skill):
+        self.robots[skill.context.robot.name].holding = True
+        return Succeeded("held", {"tried": (*skill.inputs.avoid, 1)})
+
+    def put_down(self, skill):
+        self.robots[skill.context.robot.name].let_go()
+        return Succeeded("placed")
+
+    def charge(self, skill):
+        self.robots[skill.context.robot.name].charge = 0.9
+        return Succeeded("charged")
+
+    def die_once_after(self, name, skill):
+        """The way to a place is the last that a robot does when one has done what `name` says."""
+        robot = self.robots[skill.context.robot.name]
+        if name in self.script.begun and not any(each.raising for each in self.robots.values()):
+            robot.raising["odometry"] = ConnectionError("no answer")
+            return Running("goes on")
+        return Succeeded("there")
+
+    def message(self, number):
+        return self.store.mission(number).message
+
+
+@pytest.fixture
+def fleet(tmp_path, clock, knowledge, registry, make, script, monkeypatch):
+    with MissionStore(tmp_path / "missions.sqlite") as store:
+        yield Fleet(store, clock, knowledge, registry, make, script, monkeypatch, tmp_path / "out")
+
+
+def test_three_missions_are_done_by_two_robots(fleet, script):
+    for line in (KITCHEN, BEDROOM, KITCHEN):
+        fleet.queue(line)
+    assert fleet.run() == [("Alice", "success", 0), ("Bob", "success", 0), ("Alice", "success", 0)]
+    assert script.begun == ["navigate"] * 3
+    assert sorted(fleet.judged) == [("Alice", "success"), ("Alice", "success"), ("Bob", "success")]
+    assert [robot.holder for robot in fleet.robots.values()] == [None, None]
+
+
+def test_the_mission_of_a_robot_that_dies_is_done_by_the_other(fleet, script):
+    fleet.queue(KITCHEN)
+    fleet.queue(BEDROOM)
+    fleet.faults["Alice"] = ["robot dies at 0.08 s"]
+    assert fleet.run() == [("Bob", "success", 1), ("Bob", "success", 0)]
+    assert script.begun == ["navigate"] * 3
+
+
+def test_commands_that_are_done_are_not_done_again_by_the_other(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT, KITCHEN)
+    script.ends["grasp"], script.ends["place"] = fleet.hold, fleet.put_down
+    script.ends["navigate"] = lambda skill: fleet.die_once_after("place", skill)
+    assert fleet.run() == [("Bob", "success", 1)]
+    assert (script.begun.count("grasp"), script.begun.count("place")) == (1, 1)
+    assert (fleet.robots["Alice"].holding, fleet.robots["Bob"].calls.count("drive")) == (False, script.steps)
+    assert (fleet.judged, fleet.shares, fleet.since_s) == ([("Bob", "success")], [("Alice", 2)], [0.0])
+    assert begun_again(read_events(fleet.out / "log.mcap")) == []
+
+
+def test_a_command_that_was_begun_again_after_it_was_done_is_found_in_the_log(fleet, script):
+    fleet.queue(KITCHEN, BEDROOM)
+    fleet.run()
+    (event,) = (each for each in read_events(fleet.out / "log.mcap") if _begins_first_command(each))
+    events = list(read_events(fleet.out / "log.mcap"))
+    last = max(n for n, each in enumerate(events) if each.topic == "transitions" and each.data["to"] == "SUCCESS")
+    assert begun_again([*events[:last], event, *events[last:]]) == [f"mission 1: {KITCHEN}"]
+
+
+def _begins_first_command(event):
+    return event.topic == "transitions" and event.data["node"].endswith("/1-kitchen") and event.data["to"] == "RUNNING"
+
+
+def test_what_is_in_the_gripper_of_a_robot_that_dies_is_told_and_not_fetched_again(fleet, script, registry):
+    registry["grasp"].changes_world = True
+    script.ends["grasp"] = fleet.hold
+    script.ends["navigate"] = lambda skill: fleet.die_once_after("grasp", skill)
+    fleet.queue(TAKE, PUT)
+    assert fleet.run() == [("Alice", "error", 0)]
+    assert script.begun.count("grasp") == 1
+    assert fleet.message(1).endswith("; the coke is in Alice's gripper")
+
+
+def test_without_another_robot_the_mission_is_told_as_failed_and_what_had_not_begun_stays_queued(fleet):
+    for line in (KITCHEN, BEDROOM, KITCHEN):
+        fleet.queue(line)
+    fleet.faults = {"Alice": ["robot dies at 0.08 s"], "Bob": ["robot dies at 0.08 s"]}
+    assert [outcome for _, outcome, _ in fleet.run()] == ["failure", "error", "queued"]
+
+
+def test_a_robot_whose_lease_is_anothers_is_left_out(fleet):
+    fleet.queue(KITCHEN)
+    fleet.robots["Alice"].holder = "the tablet"
+    assert fleet.run() == [("Bob", "success", 1)]
+
+
+def test_status_shows_what_runs_and_what_waits_while_it_does(fleet, script):
+    for line in (KITCHEN, BEDROOM, KITCHEN):
+        fleet.queue(line)
+    told_then = []
+
+    def ask(skill):
+        told_then.append(CliRunner().invoke(entry.app, ["fleet", "status", str(fleet.store.path), "--json"]))
+        return Succeeded("there")
+
+    script.ends["navigate"] = ask
+    fleet.run()
+    first, *_, last = (json.loads(each.stdout.splitlines()[-1])["missions"] for each in told_then)
+    states = [[(row["robot"], row["outcome"]) for row in rows] for rows in (first, last)]
+    assert states[0] == [("Alice", "running"), ("Bob", "running"), (None, "queued")]
+    assert states[1] == [("Alice", "success"), ("Bob", "success"), ("Alice", "running")]
+
+
+def test_whose_each_mission_is_stands_in_the_store(fleet):
+    fleet.queue(KITCHEN)
+    fleet.run()
+    given = GivenMissions(fleet.store).all()[1]
+    assert (given.robot, given.done, given.blocked) == ("Alice", 1, None)
+
+
+def test_each_mission_is_judged_from_its_own_beginning(fleet):
+    fleet.queue(KITCHEN)
+    fleet.queue(KITCHEN)
+    fleet.unable = {"Bob"}
+    fleet.run()
+    first_s, second_s = fleet.since_s
+    assert first_s == 0.0 < second_s
+
+
+def test_a_robot_that_is_low_gives_its_mission_back_and_charges(fleet, script):
+    fleet.queue(KITCHEN)
+    fleet.queue(BEDROOM)
+    fleet.robots["Alice"].charge, script.ends["charge"] = 0.1, fleet.charge
+    assert fleet.run() == [("Bob", "success", 1), ("Bob", "success", 0)]
+    assert script.begun.count("charge") == 1
+    assert [robot.holder for robot in fleet.robots.values()] == [None, None]
+
+
+def test_a_robot_that_is_low_puts_down_what_it_holds_before_it_gives_the_rest_back(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT, KITCHEN)
+
+    def hold(skill):
+        fleet.robots["Alice"].charge = 0.1
+        return fleet.hold(skill)
+
+    script.ends.update(grasp=hold, place=fleet.put_down, charge=fleet.charge)
+    assert fleet.run() == [("Bob", "success", 1)]
+    assert (script.begun.count("grasp"), script.begun.count("place")) == (1, 1)
+    assert fleet.shares == [("Alice", 2)]
+
+
+def test_a_mission_that_only_the_low_robot_can_do_goes_on_when_it_has_charged(fleet, script):
+    fleet.queue(KITCHEN)
+    fleet.unable = {"Bob"}
+    fleet.robots["Alice"].charge, script.ends["charge"] = 0.1, fleet.charge
+    assert fleet.run() == [("Alice", "success", 0)]
+    assert script.begun == ["navigate", "navigate", "charge", "navigate"]
+
+
+def test_a_robot_that_gets_no_current_at_its_dock_leaves_its_mission_to_the_other(fleet, script):
+    fleet.queue(KITCHEN)
+    fleet.robots["Alice"].charge = 0.1
+    script.ends["charge"] = lambda skill: Failed(Cause.EXECUTION, "no current")
+    assert fleet.run() == [("Bob", "success", 1)]
+
+
+def test_a_robot_that_is_lost_is_left_out_and_its_mission_done_by_the_other(fleet, script):
+    fleet.queue(KITCHEN)
+    lost = [True]
+
+    def lose(skill):
+        if skill.context.robot.name == "Alice" and lost:
+            skill.context.localiser.localised = False
+            return Failed(Cause.EXECUTION, "lost")
+        return Succeeded("there")
+
+    script.ends["navigate"] = lose
+    script.ends["relocalise"] = lambda skill: Failed(Cause.EXECUTION, "no match")
+    assert fleet.run() == [("Bob", "success", 1)]
+
+
+def only_alice_takes_and_only_bob_goes_to_the_bedroom(name, command):
+    takes_in_kitchen = command.task is Task.GRASP and command.goal == "kitchen"
+    return (name == "Bob" and takes_in_kitchen) or (name == "Alice" and command.goal == "bedroom")
+
+
+@pytest.fixture
+def chain(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    script.ends.update(grasp=fleet.hold, place=fleet.put_down)
+    fleet.cannot = only_alice_takes_and_only_bob_goes_to_the_bedroom
+    fleet.queue(TAKE, PUT)
+    return fleet
+
+
+def test_what_no_robot_can_do_alone_is_handed_over_by_a_table(chain, script):
+    assert chain.run() == [("Bob", "success", 0), ("Alice", "success", 0), ("Bob", "success", 0)]
+    assert [(row["id"], row["part_of"], row["after"]) for row in chain.rows] == [
+        (1, None, None),
+        (2, 1, None),
+        (3, 1, 2),
+    ]
+    first, second = (chain.store.mission(number).request.commands for number in (2, 3))
+    take = first[1].replace("[coke] to", "[Nothing] to").replace("do [Nothing] to [Nothing]", "do [grasp] to [coke]")
+    assert (first[0], second) == (TAKE, (take, PUT))
+    assert (script.begun.count("grasp"), script.begun.count("place")) == (2, 2)
+
+
+def test_a_chain_is_judged_as_a_whole_from_the_beginning_of_its_first_part(chain):
+    chain.run()
+    assert chain.judged == [("Alice", "success"), ("Bob", "success")]
+    assert (chain.shares, chain.since_s) == ([("Alice", 2)], [0.0, 0.0])
+
+
+def test_the_first_robot_leaves_the_table_to_the_second_and_goes_to_its_dock(chain, script):
+    script.ends["charge"] = chain.charge
+    chain.run()
+    assert script.begun.count("charge") == 1
+    assert [robot.holder for robot in chain.robots.values()] == [None, None]
+
+
+def test_where_the_second_robot_does_not_reach_what_the_first_puts_down_nothing_is_handed_over(chain):
+    chain.tables = ()
+    assert chain.run() == [(None, "failure", 0)]
+
+
+def test_the_second_part_begins_when_the_first_robot_has_left_the_table(chain, script):
+    begun = []
+
+    def charge(skill):
+        begun.append(len([each for each in script.begun if each == "grasp"]))
+        alice = chain.robots["Alice"]
+        if len(begun) < 5:
+            return Running("on its way")
+        alice.standing = Pose2D(2.0, 0.0, 0.0)
+        return Running("far enough") if len(begun) < 400 else chain.charge(skill)
+
+    script.ends["charge"] = charge
+    assert [outcome for _, outcome, _ in chain.run()] == ["success"] * 3
+    assert (begun[4], begun[-1]) == (1, 2)
+
+
+def test_when_the_first_part_fails_the_second_is_not_begun(chain, script):
+    script.ends["place"] = lambda skill: Failed(Cause.EXECUTION, "slipped")
+    assert [outcome for _, outcome, _ in chain.run()] == ["failure"] * 3
+    assert chain.message(3) == "mission 2, which comes before it, was not done"
+    assert chain.message(1).startswith("mission 2: ")
+
+
+def test_what_no_two_robots_can_do_either_ends_with_the_reason_of_each(chain):
+    chain.cannot = lambda name, command: command.goal == "bedroom"
+    assert chain.run() == [(None, "failure", 0)]
+    assert chain.message(1) == "no robot can do it: Alice: out of reach; Bob: out of reach"
+
+
+def test_what_one_robot_can_do_alone_is_not_split(chain):
+    chain.cannot = lambda name, command: name == "Alice" and command.goal == "bedroom"
+    assert chain.run() == [("Bob", "success", 0)]
+
+
+def test_the_log_has_whose_each_mission_is_whenever_that_changes(fleet):
+    fleet.queue(KITCHEN)
+    fleet.faults["Alice"] = ["robot dies at 0.08 s"]
+    fleet.run()
+    events = read_events(fleet.out / "log.mcap")
+    told = [event.data["missions"][0] for event in events if event.topic == "missions"]
+    assert [(each["robot"], each["outcome"], each["reassigned"]) for each in told] == [
+        ("Alice", "running", 0),
+        ("Alice", "queued", 0),
+        ("Bob", "running", 1),
+        ("Bob", "success", 1),
+    ]
+    assert {each["sentence"] for each in told} == {"work"}
+    assert {"Alice", "Bob"} <= {event.data.get("robot") for event in events if event.topic == "transitions"}
+
+
+def test_the_report_has_each_mission_and_the_steps_of_each_robot(fleet):
+    for line in (KITCHEN, BEDROOM):
+        fleet.queue(line)
+    fleet.run()
+    html = (fleet.out / "report.html").read_text(encoding="utf-8")
+    assert "2 of 2 missions done" in html
+    assert [title in html for title in ("Mission 1, Alice (spot): work", "Mission 2, Bob (spot): work")] == [True] * 2
+    assert html.count("<svg") == 2
+
+
+def test_a_mission_that_is_cancelled_on_its_robots_panel_is_over_and_the_robot_goes_on(fleet, script):
+    for line in (KITCHEN, BEDROOM, KITCHEN):
+        fleet.queue(line)
+    page = PageView(None, Console(file=io.StringIO()))
+    cancelled = []
+
+    def observe(progress):
+        if progress.ticks == 1 and not cancelled:
+            cancelled.append(page.control.cancel("not now", robot="Bob"))
+
+    page._progress = observe
+    try:
+        fleet.run(page)
+    finally:
+        page.close()
+    assert sorted(row["outcome"] for row in fleet.rows) == ["cancelled", "success", "success"]
+    assert fleet.message(2) == "not now"
+    assert [robot.holder for robot in fleet.robots.values()] == [None, None]
+
+
+def test_a_robot_that_gave_up_finding_its_place_is_lost_whatever_it_believes_afterwards(fleet, script):
+    fleet.queue(KITCHEN)
+
+    def lose(skill):
+        if skill.context.robot.name == "Alice":
+            skill.context.localiser.localised = False
+            return Running("turning")
+        return Succeeded("there")
+
+    def give_up(skill):
+        skill.context.localiser.localised = True
+        return Failed(Cause.EXECUTION, "no place on the map fits")
+
+    script.ends.update(navigate=lose, relocalise=give_up)
+    assert fleet.run() == [("Bob", "success", 1)]
+
+
+def sees_nothing(script, *names):
+    """Only robots that are not named see the object."""
+
+    def detect(skill):
+        if skill.context.robot.name in names:
+            return Failed(Cause.POSTCONDITION, "no coke was seen")
+        return default_end(script, "detect")(skill)
+
+    return detect
+
+
+def test_what_one_robot_does_not_find_the_other_is_sent_for(fleet, script):
+    fleet.queue(TAKE)
+    script.ends.update(detect=sees_nothing(script, "Alice"), grasp=fleet.hold)
+    assert fleet.run() == [("Bob", "success", 1)]
+
+
+def test_what_fell_down_is_taken_by_the_other(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT)
+
+    def lose(skill):
+        fleet.robots[skill.context.robot.name].let_go()
+        return Failed(Cause.EXECUTION, "it slipped")
+
+    script.ends["grasp"] = fleet.hold
+    script.ends["place"] = lambda skill: (lose if skill.context.robot.name == "Alice" else fleet.put_down)(skill)
+    assert fleet.run() == [("Bob", "success", 1)]
+    assert fleet.robots["Alice"].holding is fleet.robots["Bob"].holding is False
+
+
+def test_what_the_first_still_holds_is_not_given_to_the_other(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT)
+    script.ends.update(grasp=fleet.hold, place=lambda skill: Failed(Cause.PLANNING, "no place"))
+    assert [outcome for _, outcome, _ in fleet.run()] == ["failure"]
+    assert fleet.rows[0]["reassigned"] == 0
+
+
+def test_what_neither_robot_manages_ends_with_the_words_of_both(fleet, script):
+    fleet.queue(TAKE)
+    script.ends["detect"] = sees_nothing(script, "Alice", "Bob")
+    assert fleet.run() == [("Bob", "failure", 1)]
+    assert "; Alice before: it tried: " in fleet.message(1)
+
+
+def test_what_the_other_cannot_do_stays_with_the_first(fleet, script):
+    fleet.queue(TAKE)
+    fleet.unable = {"Bob"}
+    script.ends["detect"] = sees_nothing(script, "Alice")
+    assert fleet.run() == [("Alice", "failure", 0)]
+
+
+def test_a_mission_does_not_wait_for_a_robot_that_is_late(fleet, script):
+    for line in (KITCHEN, KITCHEN, KITCHEN):
+        fleet.queue(line)
+    fleet.slower_s = 1.5
+
+    def arrive(skill):
+        late = skill.context.robot.name == "Alice" and fleet.clock.now() < 20.0
+        return Running("does not get on") if late else Succeeded("there")
+
+    script.ends["navigate"] = arrive
+    assert [robot for robot, *_ in fleet.run()] == ["Alice", "Bob", "Bob"]
+
+
+def test_two_robots_do_not_put_things_on_one_surface_at_once(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, ON_TABLE)
+    fleet.queue(TAKE, ON_TABLE)
+    fleet.queue(BEDROOM)
+    at_work = []
+
+    def put_down(skill):
+        at_work.append({row["robot"] for row in told(fleet.store, [1, 2]) if row["outcome"] == "running"})
+        return fleet.put_down(skill)
+
+    script.ends.update(grasp=fleet.hold, place=put_down)
+    assert [robot for robot, *_ in fleet.run()] == ["Alice", "Alice", "Bob"]
+    assert at_work == [{"Alice"}, {"Alice"}]
+
+
+def interrupted_at(fleet, skill_ends):
+    """A Ctrl-C while a skill runs."""
+
+    def interrupt(skill):
+        if not fleet.interrupted:
+            fleet.interrupted = True
+            signal.raise_signal(signal.SIGINT)
+            return Running("on its way")
+        return skill_ends(skill)
+
+    fleet.interrupted = False
+    return interrupt
+
+
+def test_after_ctrl_c_the_next_run_goes_on_with_what_was_under_way(fleet, script):
+    for line in (KITCHEN, BEDROOM, KITCHEN):
+        fleet.queue(line)
+    script.ends["navigate"] = interrupted_at(fleet, lambda skill: Succeeded("there"))
+    assert [outcome for _, outcome, _ in fleet.run()] == ["queued", "success", "queued"]
+    assert resumable_lines(fleet.store, fleet.out) == [
+        f"2 missions are left in the queue; `errand fleet run {fleet.out}` with the same options goes on."
+    ]
+    assert [each.id for each in _to_do(fleet.store)] == [1, 3]
+    del fleet.missions[2]
+    assert [outcome for _, outcome, _ in fleet.run()] == ["success"] * 2
+
+
+def test_after_ctrl_c_with_something_in_the_gripper_the_mission_is_cancelled_and_can_be_resumed(
+    fleet, script, registry
+):
+    registry["grasp"].changes_world = True
+    fleet.queue(TAKE, PUT)
+    script.ends["grasp"] = fleet.hold
+    at_goal = interrupted_at(fleet, lambda skill: Succeeded("there"))
+    script.ends["navigate"] = lambda skill: at_goal(skill) if "grasp" in script.begun else Succeeded("there")
+    assert fleet.run() == [("Alice", "cancelled", 0)]
+    assert fleet.message(1) == "cancelled by SIGINT; the coke is in Alice's gripper"
+    with pytest.raises(InputError, match=r"nothing is queued; .*errand resume --mission 1 --store .* with one robot"):
+        _to_do(fleet.store)

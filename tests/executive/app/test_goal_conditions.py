@@ -1,0 +1,242 @@
+"""The goal conditions of missions, and what the referee is told of them."""
+
+import dataclasses
+
+import pytest
+
+from executive.app.goal_conditions import conditions_of, verdict_of
+from executive.tree.compiler import compile_mission
+from executive.tree.goals import command_goal
+from executive.words import blocks
+from executive.words.command import parse_command
+from executive.words.expression import Template
+from executive.words.goal import GoalKind, When
+from executive.words.steps import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
+from plant.referee import Verdict
+from skills.speak.skill import Speak
+
+
+def conditions(knowledge, *texts):
+    return tuple(command_goal(parse_command(text), knowledge) for text in texts)
+
+
+def test_fetch_asks_for_a_grasp_in_the_kitchen_and_a_hand_over(knowledge, make):
+    grasp, hand_over = conditions(knowledge, *make.FETCH)
+    assert (grasp.kind, grasp.classes) == (GoalKind.GRASPED, ("coke", "beer"))
+    assert {region.name for region in grasp.source} == {"counter", "shelf"}
+    assert (hand_over.kind, hand_over.classes, hand_over.person) == (GoalKind.HANDED_OVER, ("coke", "beer"), None)
+
+
+def test_surface_regions_begin_at_the_top(knowledge, make):
+    grasp, _ = conditions(knowledge, *make.FETCH)
+    counter = next(region for region in grasp.source if region.name == "counter")
+    assert (round(counter.z_min_m, 3), round(counter.z_max_m, 3)) == (0.85, 1.2)
+    assert counter.contains((5.8, -1.8, 0.95))
+
+
+def test_a_room_as_goal_means_any_surface_in_it(knowledge):
+    (placed,) = conditions(knowledge, "Take [coke] to [kitchen] and do [Nothing] to [Nothing]")
+    assert (placed.kind, {region.name for region in placed.goal}) == (GoalKind.PLACED, {"counter", "shelf"})
+
+
+# room asked for  who       the person of the condition  its rooms, the usual one first
+@pytest.mark.parametrize(
+    ("goal", "who", "person", "rooms"),
+    [
+        ("kitchen", "person", None, ["kitchen"]),
+        ("kitchen", "Sam", "Sam", ["kitchen"]),
+        ("Nothing", "Sam", "Sam", ["bathroom", "kitchen", "bedroom", "hall"]),
+    ],
+)
+def test_a_question_about_people_asks_for_them_in_rooms(knowledge, goal, who, person, rooms):
+    (asked,) = conditions(knowledge, f"Take [Nothing] to [{goal}] and do [find] to [{who}]")
+    assert (asked.kind, asked.classes, asked.person) == (GoalKind.ANSWERED, ("person",), person)
+    assert [region.name for region in asked.source] == rooms
+
+
+@pytest.mark.parametrize(("goal", "floors"), [("kitchen", ["the floor of the kitchen"]), ("counter", [])])
+def test_a_question_about_a_room_may_count_what_lies_on_its_floor(knowledge, goal, floors):
+    (asked,) = conditions(knowledge, f"Take [Nothing] to [{goal}] and do [find] to [coke]")
+    assert [region.name for region in asked.maybe] == floors
+
+
+def test_a_person_is_named(knowledge):
+    (condition,) = conditions(knowledge, "Take [coke] to [Sam] and do [Nothing] to [Nothing]")
+    assert (condition.kind, condition.person) == (GoalKind.HANDED_OVER, "Sam")
+
+
+def test_going_to_a_person_asks_for_that_person(knowledge):
+    (condition,) = conditions(knowledge, "Take [Nothing] to [Sam] and do [Nothing] to [Nothing]")
+    assert (condition.kind, condition.person) == (GoalKind.WENT, "Sam")
+
+
+@pytest.mark.parametrize(
+    ("goal", "point"), [("kitchen", (5.9, -1.9, 0.5)), ("counter", (4.5, -1.0, 0.5)), ("start", (0, 0, 0.5))]
+)
+def test_going_asks_for_the_body_there(knowledge, goal, point):
+    (condition,) = conditions(knowledge, f"Take [Nothing] to [{goal}] and do [Nothing] to [Nothing]")
+    assert condition.kind is GoalKind.WENT
+    assert condition.goal[0].contains(point)
+    assert not condition.goal[0].contains((-9.0, 9.0, 0.5))
+
+
+GET = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
+GO = "Take [Nothing] to [hall] and do [Nothing] to [Nothing]"
+SKIPPED = StepPolicy(on_failure=OnFailure.SKIP)
+
+
+@pytest.fixture
+def conditions_by(knowledge, registry, run_tree):
+    """The conditions of a mission's steps after it ran with the scripted robot."""
+
+    def after_running(*steps):
+        mission = Mission("m", "flat", "Alice", steps)
+        tree = compile_mission(mission, knowledge=knowledge, registry=registry)
+        return conditions_of(tree, run_tree(tree).robots[0])
+
+    return after_running
+
+
+def step(text, policy=SKIPPED):
+    return MissionStep((parse_command(text),), policy=policy)
+
+
+def test_a_step_that_was_skipped_has_no_condition(conditions_by, script):
+    script.seen_on = ()
+    assert [condition.kind for condition in conditions_by(step(GET), step(GO))] == [GoalKind.WENT]
+
+
+def test_a_step_that_could_have_been_skipped_but_was_done_has_its_condition(conditions_by):
+    assert [condition.kind for condition in conditions_by(step(GET))] == [GoalKind.GRASPED]
+
+
+def test_steps_of_a_used_mission_that_was_skipped_have_no_conditions(conditions_by, script):
+    script.seen_on = ()
+    used = Mission("inner", "flat", "Alice", (step(GO, StepPolicy()), step(GET, StepPolicy())))
+    outer = MissionStep(policy=SKIPPED, used=used)
+    assert [condition.kind for condition in conditions_by(outer, step(GO))] == [GoalKind.WENT]
+
+
+def test_a_drive_to_a_pose_asks_for_the_body_there(conditions_by):
+    (condition,) = conditions_by(MissionStep(skill=SkillCall("navigate", {"x": 4.0, "y": -1.0})))
+    assert condition.kind is GoalKind.WENT
+    assert condition.goal[0].contains((4.1, -0.9, 0.5))
+    assert not condition.goal[0].contains((4.5, -1.0, 0.5))
+
+
+def test_a_thing_may_be_taken_from_where_else_it_was_looked_for(conditions_by):
+    (condition,) = conditions_by(step("Take [Nothing] to [bedroom] and do [grasp] to [coke]"))
+    assert {region.name for region in condition.source} == {"bedside table", "counter", "shelf"}
+
+
+def test_an_answer_belongs_to_its_own_check(conditions_by, script):
+    find = "Take [Nothing] to [{}] and do [find] to [coke]"
+    kitchen, bedroom = conditions_by(step(find.format("kitchen")), step(find.format("bedroom")))
+    assert (kitchen.answer, bedroom.answer) == (True, False)
+
+
+@pytest.fixture
+def verdict_on(knowledge, registry, run_tree):
+    """The verdict on a mission that ran with the scripted robot, when all its conditions hold or none does."""
+
+    def after_running(*steps, holds=True):
+        tree = compile_mission(Mission("m", "flat", "Alice", steps), knowledge=knowledge, registry=registry)
+
+        def judge(conditions):
+            return Verdict(holds if conditions else None, "seen", 0, 0)
+
+        return verdict_of(tree, run_tree(tree).robots[0], judge)
+
+    return after_running
+
+
+STOW = MissionStep(skill=SkillCall("stow"))
+
+# steps, whether their conditions hold -> the verdict
+VERDICTS = [
+    ((step(GO, StepPolicy()),), True, True),
+    ((step(GO, StepPolicy()),), False, False),
+    ((STOW,), True, None),
+    ((step(GO, StepPolicy()), STOW), True, True),
+    ((step(GO, StepPolicy()), STOW), False, False),
+]
+
+
+@pytest.mark.parametrize(("steps", "holds", "success"), VERDICTS)
+def test_what_can_be_judged_decides_and_a_mission_of_nothing_else_is_not_judged(verdict_on, steps, holds, success):
+    assert verdict_on(*steps, holds=holds).success is success
+
+
+def test_a_step_without_condition_is_named(verdict_on):
+    assert "No goal condition stands for stow" in verdict_on(STOW).why
+    assert "Not judged: stow." in verdict_on(step(GO, StepPolicy()), STOW).why
+
+
+def test_where_the_robot_went_must_hold_until_it_drives_again(conditions_by):
+    assert [one.when for one in conditions_by(step(GO), step(GO))] == [When.END_OF_STEP, When.END_OF_MISSION]
+
+
+def test_a_mission_that_failed_is_never_fulfilled(verdict_on, script):
+    script.seen_on = ()
+    verdict = verdict_on(step(GET, StepPolicy()), holds=True)
+    assert verdict.success is False
+    assert "failure" in verdict.why
+
+
+@pytest.fixture
+def spoken(knowledge, registry, run_tree):
+    """The verdict on steps that say something, with the real skill; `forgets`: what was said is not on record."""
+
+    def after_running(*steps, forgets=False):
+        tree = compile_mission(
+            Mission("tell", "flat", "Alice", steps), knowledge=knowledge, registry={**registry, "speak": Speak}
+        )
+        result = run_tree(tree).worst
+        asked = []
+
+        def judge(given):
+            asked.extend(given)
+            return Verdict(True if given else None, "", 0, 0)
+
+        verdict = verdict_of(tree, dataclasses.replace(result, said=()) if forgets else result, judge)
+        return verdict, asked
+
+    return after_running
+
+
+HELLO = MissionStep(skill=SkillCall("speak", {"text": "Hello"}))
+
+
+def test_what_is_said_does_not_keep_the_robot_from_staying_where_it_went(spoken):
+    verdict, asked = spoken(HELLO, step(GO, StepPolicy()), HELLO)
+    assert verdict.success is True
+    assert [(one.kind, one.when) for one in asked] == [(GoalKind.WENT, When.END_OF_MISSION)]
+
+
+@pytest.mark.parametrize("block", [HELLO, MissionStep(block=blocks.Speak(Template("Hello")))])
+def test_a_mission_that_only_speaks_is_judged_by_what_was_said(spoken, block):
+    verdict, _ = spoken(MissionStep(block=blocks.Repeat((block,), 2)))
+    assert (verdict.success, verdict.why) == (True, 'It said "Hello".')
+    verdict, _ = spoken(MissionStep(block=blocks.Repeat((block,), 2)), forgets=True)
+    assert (verdict.success, verdict.why) == (False, 'It did not say "Hello".')
+
+
+# Was "Hello" a question that was asked while a step was to say it? Then the step has not said it.
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_question_does_not_count_as_the_text_of_a_step(knowledge, registry, run_tree, asked):
+    mission = Mission("tell", "flat", "Alice", (HELLO,))
+    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": Speak})
+    result = run_tree(tree).worst
+    heard = dataclasses.replace(result, said=tuple(dataclasses.replace(each, asked=asked) for each in result.said))
+    verdict = verdict_of(tree, heard, lambda given: Verdict(None, "", 0, 0))
+    assert verdict.success is not asked
+
+
+def test_one_sentence_counts_for_one_step(knowledge, registry, run_tree):
+    anything = MissionStep(block=blocks.Speak(Template("{n}")))
+    mission = Mission("tell", "flat", "Alice", (HELLO, anything), variables={"n": 1})
+    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": Speak})
+    result = run_tree(tree).worst
+    heard = dataclasses.replace(result, said=result.said[:1])
+    verdict = verdict_of(tree, heard, lambda given: Verdict(None, "", 0, 0))
+    assert (verdict.success, verdict.why) == (False, 'It said "Hello". It did not say "{n}".')

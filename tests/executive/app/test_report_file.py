@@ -1,0 +1,178 @@
+"""`report.html` of a run: its steps, what was said and answered, and that it stays small."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from executive.app import requests
+from executive.app.artifacts import MOST_BYTES, Artifacts
+from executive.app.durable import mission_events
+from executive.app.mission_run import run_request
+from executive.app.report import ReportedAnswer, ReportedObject, RunReport
+from executive.app.report_file import step_rows
+from executive.app.requests import prepare, prepared_for
+from executive.mission.request import Request
+from executive.record.event_log import EventLog
+from executive.run.findings import Said
+from executive.run.runner import RunEntry
+from executive.tree.node_view import NodeView
+from executive.tree.snapshot import NodeState
+from plant.spot.capabilities import spot_capabilities
+from skills.api import Cause
+from skills.robot import Pose2D
+from skills.testing.clock import VirtualClock
+from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.robot import ScriptedRobot
+from tests.executive.app.scripted_backend import ScriptedBackend
+
+TALK = """
+name: talk <b>
+steps:
+  - {skill: speak, with: {text: "Hello & <i>welcome</i>"}}
+  - {skill: navigate, with: {x: 0.5, y: 0.0}}
+  - {skill: speak, with: {text: "Here I am"}}
+"""
+
+
+@pytest.fixture
+def talk(tmp_path, monkeypatch):
+    monkeypatch.setattr(requests, "load_parser", lambda: None)
+    path = tmp_path / "talk.yaml"
+    path.write_text(TALK)
+    return prepare(Request(file=path, out=tmp_path / "out", seed=4, record=False))
+
+
+def test_what_was_said_is_in_report_and_page(talk):
+    heard = []
+    listener = lambda topic, t, message: heard.append(message["text"]) if topic == "speech" else None  # noqa: E731
+    report = run_request(talk, ScriptedBackend(), listener=listener).report
+    assert [one.text for one in report.said] == heard == ["Hello & <i>welcome</i>", "Here I am"]
+    page = (talk.request.out / "report.html").read_text(encoding="utf-8")
+    assert "Hello &amp; &lt;i&gt;welcome&lt;/i&gt;" in page
+    assert "<i>" not in page
+    assert page.count("said &quot;") >= 2
+    assert "The map, with the path of the robot" in page
+
+
+def test_the_report_is_the_same_after_json():
+    report = RunReport("success", None, "m", None, ("Take",), "flat", 1, 1.0, 1.0, 1.0, 20, "log")
+    answers = (
+        ReportedAnswer("q", "in the shed", "Robin: in the shed", 2.5, "hall", 0),
+        ReportedAnswer("q", 3, "s", 4.0),
+    )
+    seen = (ReportedObject("coke", "table", "kitchen", (1.0, 2.0, 0.8), 3.0),)
+    told = RunReport(**{**vars(report), "answers": answers, "said": (Said(1.0, "Hello"),), "seen_objects": seen})
+    values = json.loads(json.dumps(told.to_json()))
+    assert RunReport.from_json(values) == told
+    first = {"question": "q", "answer": "in the shed", "sentence": "Robin: in the shed", "t_s": 2.5}
+    assert values["answers"][0] == {**first, "place": "hall", "picture": 0}
+    assert values["said"] == [{"t_s": 1.0, "text": "Hello", "asked": False}]
+
+
+def test_pictures_of_many_answers_are_kept_up_to_a_limit():
+    artifacts = Artifacts(lambda topic, message: None)
+    noise = np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8)
+    for number in range(90):
+        artifacts("detections", {"detections": [], "image": noise})
+        artifacts("answer", {"node": "alice/q", "t": float(number), "question": "q", "answer": False, "message": "m"})
+    assert 1 < len(artifacts.pictures) < 90
+    assert sum(map(len, artifacts.pictures)) <= MOST_BYTES
+    assert artifacts.numbers["alice/q", 0.0] == 0
+
+
+def test_an_answer_for_which_nobody_looked_has_no_picture():
+    log = []
+    artifacts = Artifacts(lambda topic, message: log.append(message))
+    artifacts("detections", {"detections": [], "image": np.zeros((48, 64, 3), np.uint8)})
+    artifacts("answer", {"node": "alice/q", "t": 1.0, "question": "q", "answer": False, "message": "m"})
+    artifacts("answer", {"node": "alice/ask", "t": 2.0, "question": "q", "answer": "yes", "message": "m"})
+    assert ["image" in message for message in log[1:]] == [True, False]
+    assert list(artifacts.numbers) == [("alice/q", 1.0)]
+
+
+def node(path, kind, name, *children, status=Status.SUCCESS, cause=None, message=""):
+    return NodeView(path, kind, name, NodeState(status, cause, message), children=children)
+
+
+def test_steps_are_the_parts_of_the_mission_below_what_they_belong_to():
+    first, second = node("a/m/1/1", "sequence", "go to the hall"), node("a/m/1/2", "answer", "is there a hammer?")
+    tidied = node("a/m/1/2/tidy", "afterwards", "stow in the end", second, node("a/m/1/2/stow", "skill", "stow"))
+    used = node("a/m/1", "skip", "skip it", node("a/m/1/s", "sequence", "visit hall", first, tidied))
+    last = node("a/m/2", "sequence", "go to the start", message="there")
+    mission = node("a/m", "sequence", "patrol", node("a/m/r", "remember", "start"), used, last)
+    rows = list(step_rows(mission, frozenset({"a/m/1/1", "a/m/1/2", "a/m/2"}), {"a/m/2": (3.0, 4.0)}))
+    assert [(row.depth, row.name) for row in rows] == [
+        (0, "visit hall"),
+        (1, "go to the hall"),
+        (1, "is there a hammer?"),
+        (0, "go to the start"),
+    ]
+    assert (rows[-1].span_s, rows[-1].message, rows[-1].word) == ((3.0, 4.0), "there", "success")
+
+
+def test_a_step_that_was_skipped_or_failed_says_so():
+    failed = node("a/m/1/x", "sequence", "go", status=Status.FAILURE, cause=Cause.PLANNING, message="no way")
+    skipped = node("a/m/1", "skip", "skip it", failed, message="skipped: no way")
+    mission = node("a/m", "sequence", "m", skipped, failed, status=Status.FAILURE)
+    rows = list(step_rows(mission, frozenset({"a/m/1/x"}), {}))
+    assert [(row.word, row.message) for row in rows] == [
+        ("skipped", "skipped: no way"),
+        ("failure (PLANNING)", "no way"),
+    ]
+
+
+def write_log(path, commands, topic, message):
+    log = EventLog(path, VirtualClock())
+    log("run", {"world": "flat", "seed": 1, "commands": commands, "versions": {}})
+    log(topic, message)
+    log.close()
+
+
+def test_the_logs_of_all_starts_of_a_mission_are_told_together(tmp_path):
+    for name, commands in (("log", ["a"]), ("log-2", ["another"]), ("log-3", ["a"])):
+        write_log(tmp_path / f"{name}.mcap", commands, name, {"t": 1.0})
+    (tmp_path / "log-4.mcap").write_text("no log")
+    write_log(tmp_path / "log-5.mcap", ["a"], "log-5", {"t": 1.0})
+    topics = [event.topic for event in mission_events(tmp_path / "log-5.mcap") if event.topic != "run"]
+    assert topics == ["log", "log-3", "log-5"]
+    assert [event.topic for event in mission_events(tmp_path / "log.mcap")] == ["run", "log"]
+
+
+def test_pictures_of_answers_from_before_a_restart_are_found_in_the_log(tmp_path):
+    picture = np.full((48, 64, 3), 90, np.uint8)
+    told = {"node": "alice/q", "t": 4.0, "question": "q", "answer": False, "message": "m"}
+    write_log(tmp_path / "log.mcap", ["a"], "answer", {**told, "image": picture})
+    artifacts = Artifacts(lambda topic, message: None)
+    for _ in range(2):
+        artifacts.recall(mission_events(tmp_path / "log.mcap"))
+    assert artifacts.numbers == {("alice/q", 4.0): 0}
+    assert len(artifacts.pictures) == 1
+
+
+class TwoRobots(ScriptedBackend):
+    """Two scripted robots, 3 m apart."""
+
+    def entry(self, tree, durable):
+        robot = ScriptedRobot(self.clock, name=tree.robot_name, capabilities=spot_capabilities())
+        place = Pose2D(0.0, 3.0 if tree.robot_name == "Bob" else 0.0, 0.0)
+        return RunEntry(tree, robot, KnownPlace(place), BlockCostmap())
+
+
+def test_a_run_with_two_robots_leaves_the_tree_and_the_steps_of_each(talk):
+    def named(name):
+        mission = replace(talk.mission, robot_name=name)
+        return replace(prepared_for(talk.request, mission, talk.world, talk.knowledge), kind="spot", robots=robots)
+
+    robots = dict.fromkeys(("Alice", "Bob"), SimpleNamespace(kind="spot"))
+    run_request(replace(named("Alice"), others=(named("Bob"),)), TwoRobots())
+    out = talk.request.out
+    assert sorted(path.name for path in out.glob("*.svg")) == ["tree_alice.svg", "tree_bob.svg"]
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert (page.count('class="part"'), page.count("<svg")) == (2, 2)
+    assert ("Alice (spot)" in page, "Bob (spot)" in page) == (True, True)
+    told = [event.data["robots"] for event in mission_events(out / "log.mcap") if event.topic == "run"]
+    assert told == [{"Alice": "spot", "Bob": "spot"}] * 2

@@ -1,0 +1,78 @@
+"""Scenarios in a request and its world: what the seed draws, where the doors are, what clashes."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from executive.app.scenarios import doorway, with_happenings, with_scenario
+from executive.app.worlds import knowledge_of, open_world
+from executive.mission.request import Request
+from executive.mission.scenario import Scenario
+from skills.estimate.grid_map import load_grid_map
+from skills.files.errors import InputError
+
+WORLD = open_world("flat")
+KNOWLEDGE = knowledge_of(WORLD)
+EVENTS = """\
+events:
+  - {door: [kitchen, living room], closes: 5}
+  - {person: Robin, at: 2, to: hall}
+  - {object: beer, at: 3, to: kitchen table}
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "scenario.yaml"
+    path.write_text(EVENTS, encoding="utf-8")
+    return path
+
+
+def understood(**asked):
+    return with_scenario(Request("go", **asked), WORLD, KNOWLEDGE)
+
+
+def test_random_faults_are_drawn_from_the_seed_and_only_once():
+    asked = understood(scenario=Scenario(("arm refuses",), random=2), seed=4)
+    again = understood(scenario=Scenario(("arm refuses",), random=2), seed=4)
+    other = understood(scenario=Scenario(("arm refuses",), random=2), seed=5)
+    assert asked == again
+    assert len(asked.scenario.faults) == 3
+    assert asked.scenario.faults != other.scenario.faults
+    assert with_scenario(asked, WORLD, KNOWLEDGE) == asked
+
+
+def test_a_fault_of_a_camera_that_spot_does_not_have_is_refused():
+    with pytest.raises(InputError, match="no camera 'hnad'; did you mean 'hand'"):
+        understood(scenario=Scenario(("camera.hnad: dropout",)))
+
+
+def test_events_happen_in_the_world(file):
+    scenario = understood(scenario_files=(file,)).scenario
+    world = with_happenings(WORLD, scenario)
+    assert [(door.name, door.closes) for door in world.doors] == [("door between kitchen and living room", 5.0)]
+    assert [(move.name, move.to) for move in world.moves] == [("beer", "kitchen table")]
+    (robin,) = (rule for rule in world.seed_rules.people if rule.name == "Robin")
+    assert (robin.ranges is not None, robin.route.start) == (True, 2.0)
+
+
+def test_two_scenarios_that_move_the_same_are_refused(file, tmp_path):
+    other = tmp_path / "other.yaml"
+    other.write_text("events:\n  - {person: Robin, at: 9, to: office}\n", encoding="utf-8")
+    with pytest.raises(InputError, match="another scenario has an event of Robin"):
+        understood(scenario_files=(file, other))
+
+
+@pytest.mark.parametrize("door", KNOWLEDGE.doors, ids=lambda door: "-".join(door.between))
+def test_a_door_is_as_wide_as_its_opening_and_slides_along_the_wall(door):
+    grid, along_y = load_grid_map(WORLD.surveyed.scan_map_path), door.at[0] == 7.45
+    x, y = door.at
+    found = doorway(grid, (x, y + 0.1) if along_y else (x + 0.1, y))
+    assert found["width"] == pytest.approx(door.width, abs=0.07)
+    assert found["at"] == pytest.approx(door.at, abs=0.05)
+    assert abs((math.cos if along_y else math.sin)(found["yaw"])) < 0.01
+
+
+def test_a_request_with_a_scenario_is_another_one_than_without():
+    assert replace(Request("go"), scenario=Scenario(("arm refuses",))) != Request("go")

@@ -1,0 +1,198 @@
+"""What several robots are asked for becomes a mission for each."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from executive.app.requests import prepare
+from executive.app.worlds import open_world
+from executive.cli.wake_check import refuse_unaddressed
+from executive.mission.request import Request, Start
+from executive.words.robots import RobotSetup
+from skills.files.errors import InputError
+from skills.robot import Pose2D
+
+TWO = {"alice": RobotSetup("spot"), "bob": RobotSetup("spot")}
+
+# Sentence, and the commands of each robot.
+MEANT = [
+    ("Hey Bob, go to the kitchen", {"Bob": ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"]}),
+    (
+        "Alice, go to the kitchen, and Bob, go to the office",
+        {
+            "Alice": ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"],
+            "Bob": ["Take [Nothing] to [office] and do [Nothing] to [Nothing]"],
+        },
+    ),
+    (
+        "Hey everyone, go to the kitchen",
+        {
+            "Alice": ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"],
+            "Bob": ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"],
+        },
+    ),
+]
+
+
+def asked(sentence, robots=TWO):
+    return prepare(Request(sentence, robots=robots), ask=None)
+
+
+@pytest.mark.parametrize(("sentence", "expected"), MEANT)
+def test_each_robot_that_is_meant_gets_its_part(sentence, expected):
+    prepared = asked(sentence)
+    assert {each.mission.robot_name: [*map(str, each.tree.commands)] for each in prepared.all} == expected
+
+
+def test_all_robots_of_the_run_are_known_also_one_with_nothing_to_do():
+    assert list(asked("Hey Bob, go to the kitchen").robots) == ["Alice", "Bob"]
+
+
+def test_path_ids_carry_the_robots_name():
+    trees = [each.tree for each in asked("Alice, go to the kitchen, and Bob, go to the office").all]
+    ids = {node.path_id.partition("/")[0] for tree in trees for node in tree.root.walk()}
+    assert ids == {"alice", "bob"}
+
+
+def test_what_is_for_nobody_goes_to_the_robot_that_is_there_first():
+    near_the_office = {**TWO, "bob": RobotSetup("spot", start=asked_pose())}
+    assert asked("go to the office", near_the_office).mission.robot_name == "Bob"
+
+
+def asked_pose():
+    prepared = asked("Hey Bob, go to the office")
+    pose = prepared.knowledge.place_pose("office")
+    return Pose2D(pose.x, pose.y, pose.yaw)
+
+
+def test_one_who_needs_what_another_brings_begins_when_that_one_is_done():
+    prepared = asked("Alice, put the coke on the kitchen table, then let Bob bring it to Robin")
+    waits = {each.mission.robot_name: each.after for each in prepared.all}
+    assert waits == {"Alice": (), "Bob": ("Alice",)}
+
+
+def test_a_mission_file_goes_to_the_robot_that_is_done_first(tmp_path):
+    file = tmp_path / "go.yaml"
+    file.write_text("name: go\nsteps:\n  - to: office\n", encoding="utf-8")
+    robots = {**TWO, "bob": RobotSetup("fetch", start=asked_pose())}
+    prepared = prepare(Request(file=file, robots=robots), ask=None)
+    assert (prepared.mission.robot_name, prepared.kind) == ("Bob", "fetch")
+
+
+def test_a_sentence_to_a_robot_that_is_not_there_is_refused():
+    with pytest.raises(InputError, match="Carl"):
+        asked("Hey Carl, go to the kitchen")
+
+
+PARTS = """name: two
+robots:
+  alice: spot
+  bob: fetch
+parts:
+  bob:
+    after: alice
+    steps: [{to: office}]
+  alice:
+    steps: [{to: kitchen}]
+"""
+
+
+@pytest.fixture
+def asked_file(tmp_path):
+    def of(text, **request):
+        (tmp_path / "two.yaml").write_text(text, encoding="utf-8")
+        return prepare(Request(file=tmp_path / "two.yaml", **request), ask=None)
+
+    return of
+
+
+def test_a_file_with_parts_has_a_mission_for_each_robot_in_the_order_of_the_robots(asked_file):
+    every = asked_file(PARTS).all
+    goals = {each.mission.robot_name: [command.goal for command in each.tree.commands] for each in every}
+    assert list(goals.items()) == [("Alice", ["kitchen"]), ("Bob", ["office"])]
+    assert [(each.kind, each.after) for each in every] == [("spot", ()), ("fetch", ("Alice",))]
+
+
+def test_the_option_replaces_the_robots_of_a_file(asked_file):
+    every = asked_file(PARTS, robots=TWO).all
+    assert [each.kind for each in every] == ["spot", "spot"]
+
+
+def test_a_file_with_robots_and_steps_goes_to_the_robot_that_it_names(asked_file):
+    prepared = asked_file("name: go\nrobots: {alice: spot, bob: spot}\nrobot: bob\nsteps: [{to: kitchen}]\n")
+    assert (prepared.mission.robot_name, list(prepared.robots)) == ("Bob", ["Alice", "Bob"])
+
+
+@pytest.fixture
+def world_of_two(tmp_path):
+    """A world that names two robots; what is written into its knowledge before is changed."""
+
+    def of(said="", instead=""):
+        world = tmp_path / "world"
+        shutil.copytree(open_world("flat").folder, world)
+        known = world / "knowledge.yaml"
+        text = known.read_text(encoding="utf-8").replace(said, instead)
+        known.write_text(f"robots: {{eve: spot, bob: fetch}}\n{text}", encoding="utf-8")
+        return str(world)
+
+    return of
+
+
+def test_a_world_may_name_its_robots(world_of_two):
+    prepared = prepare(Request("Hey Bob, go to the kitchen", world=world_of_two()), ask=None)
+    assert (prepared.mission.robot_name, prepared.kind, list(prepared.robots)) == ("Bob", "fetch", ["Eve", "Bob"])
+
+
+def test_a_world_may_ask_that_one_of_its_robots_is_called(world_of_two):
+    world = world_of_two("robot: {name: Alice}", "robot: {name: Alice, require_wake: true}")
+    refuse_unaddressed(["--say", "Hey Bob, go to the kitchen", "--world", world])
+    assert prepare(Request("Hey Bob, go to the kitchen", world=world), ask=None).mission.robot_name == "Bob"
+    with pytest.raises(InputError, match='begin with "Hey Eve" or "Hey Bob"'):
+        prepare(Request("go to the kitchen", world=world), ask=None)
+
+
+def test_any_of_the_robots_of_the_option_may_be_called():
+    refuse_unaddressed(["--wake", "--say", "Hey Bob, go to the kitchen", "--robots", "alice=spot,bob=spot"])
+
+
+# What is changed in the file with parts; the line, and what is told.
+REFUSED = [
+    ("bob:\n    after", "carl:\n    after", 6, "'carl' is no robot of this run"),
+    ("after: alice", "after: carl", 7, "'carl' has no part to wait for"),
+    ("after: alice", "after: bob", 7, "Bob would wait for itself"),
+    ("alice:\n    steps", "alice:\n    after: bob\n    steps", 10, "Alice and Bob would wait for each other"),
+    ("bob: fetch", "bob: {kind: fetch, at: [9.5, 4.05, 0]}", 4, "the starts of Bob and Alice overlap"),
+    ("bob: fetch", "bob: {kind: fetch, dock: moon}", 4, "the dock of bob, 'moon', is no place"),
+    ("to: kitchen", "to: kichen", 10, "did you mean 'kitchen'?"),
+]
+
+
+@pytest.mark.parametrize(("said", "instead", "line", "words"), REFUSED)
+def test_what_is_wrong_with_the_robots_of_a_file_is_told_with_its_line(asked_file, said, instead, line, words):
+    assert said in PARTS
+    with pytest.raises(InputError) as error:
+        asked_file(PARTS.replace(said, instead))
+    assert (error.value.line, words in str(error.value)) == (line, True), str(error.value)
+
+
+def test_all_parts_that_are_wrong_are_told_at_once(asked_file):
+    with pytest.raises(InputError) as error:
+        asked_file(PARTS.replace("kitchen", "kichen").replace("office", "ofice"))
+    assert [each.line for each in (error.value, *error.value.others)] == [10, 8]
+
+
+def test_parts_without_robots_are_refused(asked_file):
+    with pytest.raises(InputError, match="parts are for several robots"):
+        asked_file(PARTS.replace("robots:\n  alice: spot\n  bob: fetch\n", ""))
+
+
+@pytest.mark.parametrize("own", [{"start": Start(Pose2D(2.0, 4.5, 0.0))}, {"stack": Path("stack.yaml")}])
+def test_a_start_or_stack_for_one_robot_is_refused(own):
+    with pytest.raises(InputError, match="are for a run with one robot"):
+        prepare(Request("Hey Bob, go to the kitchen", robots=TWO, **own), ask=None)
+
+
+def test_the_parts_of_different_files_have_different_prints(asked_file):
+    texts = (PARTS, PARTS.replace("[{to: office}]", "[{to: office}, {dock: }]"))
+    assert len({asked_file(text).request.fingerprint for text in texts}) == 2

@@ -35,11 +35,11 @@ HOMES = (
 )
 """The homes of executive, the lowest first."""
 TRAINING = (
-    "plant.dataset",
+    "errand_train.dataset",
     "plant.models.builder",
     "plant.worlds.builder",
-    "skills.perception.training",
-    "executive.speech.training",
+    "errand_train.detector",
+    "errand_train.speech",
 )
 """What makes pictures, models, worlds and networks; nothing at run time imports it."""
 TRAINS = (
@@ -183,15 +183,15 @@ def test_nothing_at_run_time_imports_what_makes_pictures_or_trains() -> None:
 @pytest.mark.parametrize(
     ("path", "source", "expected"),
     [
-        ("plant/simulation.py", "from plant.dataset import coco", ["plant.dataset.coco"]),
+        ("plant/simulation.py", "from errand_train.dataset import coco", ["errand_train.dataset.coco"]),
         (
             "skills/detect/skill.py",
-            "def f():\n    import skills.perception.training.learner",
-            ["skills.perception.training.learner"],
+            "def f():\n    import errand_train.detector.learner",
+            ["errand_train.detector.learner"],
         ),
-        ("executive/app/assembly.py", "import plant.models.builder.mesh", ["plant.models.builder.mesh"]),
-        ("executive/cli/train_command.py", "import skills.perception.training.train", []),
-        ("plant/dataset/render.py", "from plant.models.builder import gltf", []),
+        ("executive/cli/assembly.py", "import plant.models.builder.mesh", ["plant.models.builder.mesh"]),
+        ("errand_train/commands/train.py", "import errand_train.detector.train", []),
+        ("errand_train/dataset/render.py", "from plant.models.builder import gltf", []),
     ],
 )
 def test_the_check_finds_imports_of_training(path: str, source: str, expected: list[str]) -> None:

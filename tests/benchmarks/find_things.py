@@ -20,19 +20,19 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from errand_train.dataset.compose import Placed, Scene, compose
+from errand_train.dataset.lighting import random_lighting
+from errand_train.dataset.objects import CLASSES, DISTRACTORS, ObjectModel, instance, numbers
+from errand_train.dataset.render import is_validation
+from errand_train.dataset.resting import choose, resting_poses
+from errand_train.dataset.room import Support
+from errand_train.dataset.views import View, camera_specs
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
 from executive.app.assembly import shared_detector
 from executive.app.worlds import knowledge_of, open_world
 from executive.testing.bench import SkillBench
-from plant.dataset.compose import Placed, Scene, compose
-from plant.dataset.lighting import random_lighting
-from plant.dataset.objects import CLASSES, DISTRACTORS, ObjectModel, instance, numbers
-from plant.dataset.render import is_validation
-from plant.dataset.resting import choose, resting_poses
-from plant.dataset.room import Support
-from plant.dataset.views import View, camera_specs
 from plant.diagram import LooseModel, build_diagram
 from plant.engine import Engine
 from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise

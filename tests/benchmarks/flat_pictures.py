@@ -21,18 +21,13 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
-from pydrake.geometry import QueryObject
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
-
-from executive.app.worlds import knowledge_of, open_world
-from plant.dataset.coco import document
-from plant.dataset.compose import ONLY_DISTRACTORS_EVERY, Placed
-from plant.dataset.objects import DISTRACTORS, ObjectModel
-from plant.dataset.render import label_view
-from plant.dataset.resting import choose, resting_poses
-from plant.dataset.silhouette import project
-from plant.dataset.views import (
+from errand_train.dataset.coco import document
+from errand_train.dataset.compose import ONLY_DISTRACTORS_EVERY, Placed
+from errand_train.dataset.objects import DISTRACTORS, ObjectModel
+from errand_train.dataset.render import label_view
+from errand_train.dataset.resting import choose, resting_poses
+from errand_train.dataset.silhouette import project
+from errand_train.dataset.views import (
     BODY_SHARE,
     STANDING_HEIGHT_M,
     View,
@@ -42,6 +37,11 @@ from plant.dataset.views import (
     off_centre,
     roll_deg,
 )
+from numpy.typing import NDArray
+from pydrake.geometry import QueryObject
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from executive.app.worlds import knowledge_of, open_world
 from plant.diagram import LooseModel, WorldDiagram, build_diagram
 from plant.pictures import look_at
 from plant.scene import RENDERER

@@ -36,13 +36,14 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numpy as np
+from errand_train.commands.worst_sheet import Shown, contact_sheet
+from errand_train.detector.scoring import Judged
 from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 
 from executive.app.assembly import run_entry, simulate
 from executive.app.starts import alone
 from executive.app.worlds import knowledge_of
-from executive.cli.worst_sheet import Shown, contact_sheet
 from executive.run.journal import TickNote
 from executive.run.outcome import Outcome, RobotResult
 from executive.run.runner import RunSettings, run
@@ -59,7 +60,6 @@ from plant.worlds.world import SurfaceTop, World
 from skills.api import Job, Worker
 from skills.files.errors import InputError
 from skills.perception.class_forms import THING
-from skills.perception.training.scoring import Judged
 from skills.robot import FloatArray, Picture
 from tests.benchmarks.manipulation_room import SECOND, SURFACES, TAKEN, room
 from tests.benchmarks.shapes import written_shape

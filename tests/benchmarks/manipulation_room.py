@@ -8,11 +8,11 @@ from typing import Any, Final
 
 import numpy as np
 import yaml
+from errand_train.worlds.__main__ import build
+from errand_train.worlds.plan import Plan
 
 from plant.models.imported import read_imported
 from plant.scenery import OWN_PACKAGE
-from plant.worlds.builder.__main__ import build
-from plant.worlds.builder.plan import Plan
 from plant.worlds.world import World, load_world
 
 SURFACES: Final = ("table", "shelf", "floor")

@@ -64,7 +64,7 @@ WORK: Final = (
     "executive.app.assembly.simulate",
     "executive.cli.main.sweep",
     "executive.app.evaluate.worker_pool.Pool.opened",
-    "plant.dataset.shards.render",
+    "errand_train.dataset.shards.render",
     "plant.worlds.builder.own.world_from_grid",
     "plant.worlds.builder.own.world_from_cylinders",
 )

@@ -11,11 +11,11 @@ from executive.cli.entry import loaded
 
 MISSIONS = Path(__file__).parents[3] / "missions"
 TRAINING = (
-    "plant.dataset",
+    "errand_train.dataset",
     "plant.models.builder",
     "plant.worlds.builder",
-    "skills.perception.training",
-    "executive.speech.training",
+    "errand_train.detector",
+    "errand_train.speech",
 )
 HEAVY = {"pydrake", "spacy", "onnxruntime", "cv2", "numba", "scipy"}
 

@@ -59,7 +59,7 @@ def test_it_is_the_same_when_it_is_read_again(tmp_path):
 def test_one_that_does_not_fit_is_refused_and_changes_nothing(weights, name, low_rank):
     with pytest.raises(InputError, match=name) as refused:
         Adapter({"c/weight": _low_rank(5, 6), name: low_rank}).add_to(weights)
-    assert "python -m executive.speech.training" in refused.value.hint
+    assert "python -m errand_train.speech" in refused.value.hint
     np.testing.assert_array_equal(weights["c/weight"], CONVOLUTION)
 
 
@@ -72,7 +72,7 @@ def test_a_damaged_file_is_told_with_the_hint(tmp_path, how):
     Adapter({"a/weight": _low_rank(6, 4)}).save(tmp_path / "a.npz", base=BASE)
     with pytest.raises(InputError, match="damaged") as refused:
         read_adapter(_damaged((tmp_path / "a.npz").read_bytes())[how], base=BASE)
-    assert "python -m executive.speech.training" in refused.value.hint
+    assert "python -m errand_train.speech" in refused.value.hint
 
 
 def test_one_of_other_weights_is_refused(tmp_path):
@@ -92,4 +92,4 @@ def test_a_missing_one_is_told_with_the_hint(monkeypatch):
     monkeypatch.setattr(adapter, "_FILE", "nowhere.npz")
     with pytest.raises(InputError, match="missing") as refused:
         packaged_adapter(base=BASE_SHA256)
-    assert "python -m executive.speech.training" in refused.value.hint
+    assert "python -m errand_train.speech" in refused.value.hint

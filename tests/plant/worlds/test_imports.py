@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from errand_train.models.outlines import triangles_of
 
 from plant.models.builder.importing import Wanted, import_object
-from plant.models.builder.outlines import triangles_of
 from plant.simulation import Simulation
 from plant.worlds.placement import place_objects
 from plant.worlds.world import WORLDS_FOLDER, ObjectRule, load_world

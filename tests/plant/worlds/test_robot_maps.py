@@ -5,10 +5,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from errand_train.worlds.plan import PLANS
 
 from executive.app.worlds import knowledge_of
 from plant.spot.capabilities import spot_capabilities
-from plant.worlds.builder.plan import PLANS
 from plant.worlds.placement import place_people
 from plant.worlds.world import World, load_world
 from skills.estimate.costmap import LayeredCostmap

@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 import pytest
 import yaml
+from errand_train.worlds.__main__ import build
+from errand_train.worlds.plan import PLANS, load_plan
 from pydrake.geometry import QueryObject
 from pydrake.multibody.parsing import LoadModelDirectives, Parser, ProcessModelDirectives
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
@@ -17,8 +19,6 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from executive.tree.compiling.doors import view_of
 from executive.words.knowledge import load_knowledge
-from plant.worlds.builder.__main__ import build
-from plant.worlds.builder.plan import PLANS, load_plan
 from plant.worlds.placement import place_objects, place_people
 from plant.worlds.world import PACKAGE_NAME, World, add_package, known_worlds, load_world
 

@@ -1,0 +1,48 @@
+from pathlib import Path
+
+import pytest
+from errand_train.commands import learning
+from typer.testing import CliRunner, Result
+
+from executive.cli.entry import app
+
+
+@pytest.fixture(params=["train", "refine"])
+def command(request: pytest.FixtureRequest) -> str:
+    """Each of the commands that train a network."""
+    return str(request.param)
+
+
+def run(*words: str) -> Result:
+    return CliRunner().invoke(app, ["dataset", *words])
+
+
+def test_without_torch_the_extra_is_named(
+    command: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(learning.importlib.util, "find_spec", lambda _name: None)
+    result = run(command, "--data", str(data), "--out", str(tmp_path / "out"))
+    assert result.exit_code == 2
+    assert "torch and onnx" in result.stderr
+    assert "pip install '.[train]'" in result.stderr
+
+
+def test_a_folder_that_is_no_data_set_is_named(command: str, tmp_path: Path) -> None:
+    result = run(command, "--data", str(tmp_path), "--out", str(tmp_path / "out"))
+    assert result.exit_code == 2
+    assert "train.json" in result.stderr
+    assert "errand dataset render" in result.stderr
+
+
+def test_minutes_and_epochs_together_are_refused(command: str, data: Path, tmp_path: Path) -> None:
+    result = run(command, "--data", str(data), "--out", str(tmp_path / "out"), "--minutes", "1", "--epochs", "1")
+    assert result.exit_code == 2
+    assert "--minutes and --epochs" in result.stderr
+
+
+def test_a_training_that_is_there_already_is_not_overwritten(command: str, data: Path, tmp_path: Path) -> None:
+    (tmp_path / "checkpoint.pt").write_bytes(b"kept")
+    result = run(command, "--data", str(data), "--out", str(tmp_path))
+    assert result.exit_code == 2
+    assert "--resume" in result.stderr
+    assert (tmp_path / "checkpoint.pt").read_bytes() == b"kept"

@@ -1,0 +1,182 @@
+"""The parts of the classifier network's training; skipped without torch."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_detector import CLASSES, picture_of, write_pair
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("onnx")
+
+from errand_train.detector.classifier_network import USED, ClassifierNetwork  # noqa: E402
+from errand_train.detector.crop_batches import CropBatch  # noqa: E402
+from errand_train.detector.export import export, fused  # noqa: E402
+from errand_train.detector.labels import TrainingDataError  # noqa: E402
+from errand_train.detector.learner import CropLearner  # noqa: E402
+from errand_train.detector.proposal_table import refined_in  # noqa: E402
+from errand_train.detector.quantisation import quantised  # noqa: E402
+
+from skills.perception.detector.cascade_files import CLASSIFIER, load_model  # noqa: E402
+from skills.perception.detector.network_file import load_network  # noqa: E402
+from skills.perception.detector.proposals import CROP_PX  # noqa: E402
+from skills.perception.detector.scales import Scales, halved  # noqa: E402
+
+onnx = pytest.importorskip("onnx")
+CPU, NAMES = torch.device("cpu"), ("beer", "coke", "cube")
+Given = tuple["torch.Tensor", "torch.Tensor", "torch.Tensor"]
+
+
+def new_learner(seed: int) -> CropLearner:
+    return CropLearner.new(len(NAMES), seed, CPU, classifier=True)
+
+
+def given(count: int) -> Given:
+    """Crops, boxes in them and logits."""
+    torch.manual_seed(1)
+    boxes = torch.tensor([[22.0, 40.0, 106.0, 88.0]]).repeat(count, 1)
+    return torch.rand(count, 3, CROP_PX, CROP_PX), boxes, torch.randn(count, len(NAMES))
+
+
+def batch_of(count: int) -> CropBatch:
+    crops, boxes, logits = given(count)
+    return CropBatch(crops, boxes, logits, boxes + 4.0, torch.arange(count) % (len(NAMES) + 1) - 1)
+
+
+def trained(seed: int = 1) -> ClassifierNetwork:
+    """A network that says something of its own."""
+    torch.manual_seed(seed)
+    network = ClassifierNetwork(len(NAMES))
+    network.backbone.begin_with_imagenet()
+    with torch.no_grad():
+        for layer in (network.scores, network.sides):
+            layer.weight.normal_(0.0, 0.1)
+        network.place.weight.normal_(0.0, 0.1)
+        network.train()
+        for _ in range(30):
+            network(*given(6))
+    return network.eval()
+
+
+def test_a_fresh_network_says_what_the_refinement_network_said() -> None:
+    network, (crops, boxes, logits) = ClassifierNetwork(len(NAMES)).eval(), given(2)
+    with torch.no_grad():
+        found, found_boxes = network(crops, boxes, logits)
+    assert torch.allclose(found, logits)
+    assert torch.allclose(found_boxes, boxes)
+
+
+def test_it_begins_with_imagenets_weights_and_learns_all_but_the_early_layers() -> None:
+    learner = new_learner(1)
+    learner.begin(Path("none"), [])
+    learner.keep_early()
+    before = {name: value.clone() for name, value in learner.network.state_dict().items()}
+    assert float(before["backbone.stem.0.0.weight"].abs().max()) > 0.5
+    for _ in range(2):  # what it adds is nothing at first, and so are the first gradients of what is before
+        learner.step(batch_of(4), 1e-3)
+    after = learner.network.state_dict()
+    still = {name for name in before if name.startswith(("backbone.stem.", "backbone.stage8."))}
+    assert all(torch.equal(before[name], after[name]) for name in still)
+    trained = {name for name in before if name.startswith(("backbone.stage16.", "backbone.stage32."))}
+    trained = {name for name in trained if name.endswith(".0.weight")}
+    assert len(trained) == 3 * 11
+    assert not any(torch.equal(before[name], after[name]) for name in trained)
+
+
+def test_crops_are_learnt_by_heart() -> None:
+    learner, batch = new_learner(1), batch_of(8)
+    learner.begin(Path("none"), [])
+    learner.keep_early()
+    found = [learner.step(batch, 2e-3)[0] for k in range(30)]
+    assert np.mean(found[-5:]) < 0.6 * np.mean(found[:3])
+
+
+def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_it(tmp_path: Path) -> None:
+    network, file, (crops, boxes, logits) = trained(), tmp_path / "t.onnx", given(3)
+    shift = (0.5, 0.0, -0.5)
+    export(
+        network,
+        file,
+        class_names=NAMES,
+        facts={"score_offsets": str(list(shift))},
+        score_offsets=shift,
+    )
+    as_bytes = (crops * 255).round()
+    told = {
+        "chips": as_bytes.permute(0, 2, 3, 1).numpy().astype(np.uint8),
+        "regions": boxes.numpy(),
+        "logits": logits.numpy(),
+    }
+    found, scores = load_network(file, CLASSIFIER).session.run(["boxes", "scores"], told)
+    in_use = fused(network)
+    in_use.stop_learning()
+    with torch.no_grad():
+        expected, expected_boxes = in_use(as_bytes / 255, boxes, logits)
+    assert np.abs(found - expected_boxes.numpy()).max() < 0.05
+    assert np.abs(scores - (expected + torch.tensor(shift)).sigmoid().numpy()).max() < 5e-3
+    learner = new_learner(2)
+    learner.start_from(file, [batch_of(4)])
+    with torch.no_grad():
+        again, boxes_again = learner.network.eval()(as_bytes / 255, boxes, logits)
+        before, boxes_before = network(as_bytes / 255, boxes, logits)
+    assert torch.allclose(again, before, atol=5e-2)
+    assert torch.allclose(boxes_again, boxes_before, atol=0.2)
+
+
+def test_in_use_it_adds_a_part_of_what_it_adds_while_learning() -> None:
+    network, (crops, boxes, logits) = trained(), given(3)
+    with torch.no_grad():
+        learning, learning_boxes = network(crops, boxes, logits)
+        network.stop_learning()
+        used, used_boxes = network(crops, boxes, logits)
+    assert not torch.allclose(learning, logits, atol=0.1)
+    assert torch.allclose(used, logits.lerp(learning, USED), atol=1e-5)
+    assert torch.allclose(used_boxes, boxes.lerp(learning_boxes, USED), atol=0.3)
+
+
+def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_path: Path) -> None:
+    file = tmp_path / "t.onnx"
+    export(trained(), file, class_names=NAMES, facts={})
+    model = onnx.load(file)
+    assert "Pad" not in {node.op_type for node in model.graph.node}
+    crops, boxes, logits = given(8)
+    told = {
+        "chips": (crops * 255).permute(0, 2, 3, 1).numpy().astype(np.uint8),
+        "regions": boxes.numpy(),
+        "logits": logits.numpy(),
+    }
+    made = quantised(model, [told])
+    kinds = {one.data_type for one in made.graph.initializer if one.name.endswith("weight_quantized")}
+    assert kinds == {onnx.TensorProto.INT8}
+    # 16 blocks of 3 convolutions, of which the first has 2; neither the first of all, nor this block, nor the last two
+    assert sum(one.name.endswith("weight_quantized") for one in made.graph.initializer) == 45
+
+
+def test_normalisation_becomes_part_of_the_layers() -> None:
+    network, (crops, boxes, logits) = trained(), given(2)
+    with torch.no_grad():
+        for mine, theirs in zip(fused(network)(crops, boxes, logits), network(crops, boxes, logits), strict=True):
+            assert torch.allclose(mine, theirs, atol=1e-2)
+
+
+# first: a box at (100, 100, 200, 200); the second makes it a tenth smaller, and sees the red there as a beer
+def test_what_is_learnt_from_is_where_the_refinement_network_sees_something(tmp_path: Path) -> None:
+    picture = picture_of(("hammer", 0.2, (100, 100, 200, 200)))
+    picture[50:250, 50:250, 0] = 255
+    look = partial(refined_in, load_model(write_pair(tmp_path / "m.onnx")))
+    found = look(Scales(picture, halved(picture)))
+    assert found.boxes.round().tolist() == [[105.0, 105.0, 195.0, 195.0]]
+    assert found.logits.argmax(axis=1).tolist() == [CLASSES.index("beer")]
+
+
+def test_without_a_refinement_network_there_is_nothing_to_learn_from(tmp_path: Path) -> None:
+    pair = load_model(write_pair(tmp_path / "m.onnx"), networks=1)
+    with pytest.raises(ValueError, match="no refinement network"):
+        refined_in(pair, Scales(picture_of(), halved(picture_of())))
+
+
+def test_learning_goes_on_from_no_refinement_networks_file(tmp_path: Path) -> None:
+    write_pair(tmp_path / "m.onnx")
+    with pytest.raises(TrainingDataError, match=r"m_refinement\.onnx.*begin anew without it"):
+        new_learner(2).start_from(tmp_path / "m_refinement.onnx", [])

@@ -1,0 +1,94 @@
+"""COCO files as labels, and which labels count."""
+
+import pytest
+from errand_train.detector.scoring_labels import Label, pictures_of_coco
+
+CLASSES = ("hammer", "person")
+BOX = [1, 2, 3, 4]
+
+
+def coco(**changes):
+    document = {
+        "images": [{"id": 7, "file_name": "b.jpg", "width": 64, "height": 48}, {"id": 3, "file_name": "a.jpg"}],
+        "annotations": [
+            {"id": 1, "image_id": 7, "category_id": 90, "bbox": [10, 20, 30, 40], "visibility": 0.5, "distance_m": 2.5},
+            {"id": 2, "image_id": 7, "category_id": 4, "bbox": [1, 2, 3, 4], "iscrowd": 1},
+            {"id": 3, "image_id": 7, "category_id": 1, "bbox": [0, 0, 9, 9]},
+        ],
+        "categories": [{"id": 90, "name": "Hammer"}, {"id": 1, "name": "cat"}, {"id": 4, "name": "person"}],
+    }
+    return {**document, **changes}
+
+
+def test_categories_go_by_name_and_pictures_by_their_ids():
+    first, second = pictures_of_coco(coco(), CLASSES)
+    assert (first.file, first.labels, first.only_distractors) == ("a.jpg", (), True)
+    assert (first.size_px, second.size_px) == (None, (64, 48))
+    assert second.labels == (
+        Label("hammer", (10.0, 20.0, 40.0, 60.0), visibility=0.5, distance_m=2.5),
+        Label("person", (1.0, 2.0, 4.0, 6.0), crowd=True),
+    )
+
+
+@pytest.mark.parametrize(
+    # width, height, visibility, crowd, ignore -> counts
+    ("width", "height", "visibility", "crowd", "ignore", "counts"),
+    [
+        (24, 8, 0.4, False, False, True),
+        (8, 24, None, False, False, True),
+        (23.9, 23.9, 1.0, False, False, False),
+        (100, 7.9, 1.0, False, False, False),
+        (100, 100, 0.39, False, False, False),
+        (100, 100, 1.0, True, False, False),
+        (100, 100, 1.0, False, True, False),
+    ],
+)
+def test_what_counts(width, height, visibility, crowd, ignore, counts):
+    label = Label("hammer", (5.0, 5.0, 5.0 + width, 5.0 + height), crowd, ignore, visibility)
+    assert label.counts == counts
+
+
+@pytest.mark.parametrize(
+    # visibility, truncation -> share of the whole thing that is seen
+    ("told", "share"),
+    [
+        ({"visibility": 0.8, "truncation": 0.5}, 0.4),
+        ({"visibility": 0.8}, 0.8),
+        ({"truncation": 0.25}, 0.75),
+        ({}, None),
+    ],
+)
+def test_what_lies_beyond_the_edge_is_not_seen(told, share):
+    entry = {"id": 1, "image_id": 3, "category_id": 90, "bbox": [10, 20, 30, 40], **told}
+    first, _ = pictures_of_coco(coco(annotations=[entry]), CLASSES)
+    assert first.labels[0].visibility == (None if share is None else pytest.approx(share))
+
+
+@pytest.mark.parametrize(
+    ("changes", "place"),
+    [
+        ({"images": None}, "images"),
+        ({"annotations": [1]}, r"annotations\[0\]"),
+        ({"categories": [{"id": 1, "name": "cat"}]}, "categories: none of 'cat'"),
+        ({"categories": []}, "categories: none"),
+        ({"images": [{"file_name": "a.jpg"}]}, r"images\[0\]\.id"),
+        ({"images": [{"id": [7], "file_name": "a.jpg"}]}, r"images\[0\]\.id"),
+        ({"annotations": [{"image_id": None, "category_id": 90}]}, r"annotations\[0\]\.image_id"),
+        ({"images": [{"id": 7, "file_name": "a.jpg", "roll_deg": "over"}]}, r"images\[0\]\.roll_deg"),
+        ({"images": [{"id": 7}], "annotations": []}, r"images\[0\]\.file_name"),
+        ({"annotations": [{"image_id": 8, "category_id": 90, "bbox": BOX}]}, r"annotations\[0\]\.image_id"),
+        ({"annotations": [{"image_id": 7, "category_id": 5, "bbox": BOX}]}, r"annotations\[0\]\.category_id"),
+        ({"annotations": [{"image_id": 7, "category_id": 90}]}, r"annotations\[0\]\.bbox"),
+        ({"annotations": [{"image_id": 7, "category_id": 90, "bbox": [1, 2]}]}, r"annotations\[0\]\.bbox"),
+        ({"annotations": [{"image_id": 7, "category_id": 90, "bbox": "abcd"}]}, r"annotations\[0\]\.bbox"),
+    ],
+)
+def test_what_is_no_coco_file_is_refused_with_the_place(changes, place):
+    with pytest.raises(ValueError, match=f"^{place}"):
+        pictures_of_coco(coco(**changes), CLASSES)
+
+
+@pytest.mark.parametrize("document", [[], "coco", None, 3])
+def test_what_is_no_object_is_refused(document):
+    with pytest.raises(ValueError, match="the file"):
+        pictures_of_coco(document, CLASSES)

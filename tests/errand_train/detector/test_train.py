@@ -1,0 +1,115 @@
+"""From a folder of pictures to the ONNX file; skipped without torch."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+pytest.importorskip("onnx")
+
+from errand_train.detector.canvases import CanvasOptions
+from errand_train.detector.labels import TrainingDataError
+from errand_train.detector.loop import CHECKPOINT
+from errand_train.detector.schedule import Budget, Phase, Schedule
+from errand_train.detector.train import MODEL, Report, TrainOptions, train
+from errand_train.detector.validate import examination
+
+from skills.perception.detector.cascade_files import load_model
+
+NAMES = ("beer", "coke")
+SMALL = Schedule(warm_up_steps=2, phases=(Phase(0.0, CanvasOptions(96, 64), 2),))
+
+
+def write_split(folder: Path, split: str, count: int) -> None:
+    images, labels = [], []
+    for k in range(count):
+        name = f"{split}{k}.png"
+        picture = np.full((240, 320, 3), 60, dtype=np.uint8)
+        picture[60:160, 100:180] = (30, 200, 30 * k)
+        cv2.imwrite(str(folder / name), picture)
+        images.append({"id": k, "file_name": name, "width": 320, "height": 240})
+        labels.append({"id": k, "image_id": k, "category_id": 1 + k % 2, "bbox": [100, 60, 80, 100]})
+    categories = [{"id": k + 1, "name": name} for k, name in enumerate(NAMES)]
+    document = {"images": images, "annotations": labels, "categories": categories}
+    (folder / f"{split}.json").write_text(json.dumps(document))
+
+
+@pytest.fixture
+def options(tmp_path: Path) -> TrainOptions:
+    data = tmp_path / "data"
+    data.mkdir()
+    write_split(data, "train", 4)
+    write_split(data, "val", 2)
+    return TrainOptions(data, tmp_path / "out", Budget(pictures=8), examined=2, schedule=SMALL)
+
+
+def test_a_data_set_becomes_a_detectors_file(options: TrainOptions) -> None:
+    told = list[Report]()
+    file = train(options, told.append)
+    assert file == options.out / MODEL
+    assert load_model(file).class_names == NAMES
+    assert told[-1].progress == 1.0
+    assert told[-1].figures is not None
+    assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, "training.jsonl", "pictures"}
+
+
+def test_a_resumed_training_counts_what_it_has_seen(options: TrainOptions) -> None:
+    train(options, lambda _report: None)
+    told = list[Report]()
+    train(replace(options, resume=True, budget=Budget(pictures=12)), told.append)
+    assert told[-1].steps == 6
+
+
+def test_a_training_that_is_over_writes_its_file_anew(options: TrainOptions) -> None:
+    file = train(options, lambda _report: None)
+    content = file.read_bytes()
+    file.unlink()
+    train(replace(options, resume=True), lambda _report: None)
+    assert file.read_bytes() == content
+
+
+def test_weights_that_are_not_there_are_named(options: TrainOptions, tmp_path: Path) -> None:
+    chosen = replace(options, start=tmp_path / "none.pt")
+    with pytest.raises(TrainingDataError, match=r"none\.pt"):
+        train(chosen, lambda _report: None)
+
+
+def test_weights_of_another_training_are_taken_over(options: TrainOptions, tmp_path: Path) -> None:
+    train(options, lambda _report: None)
+    told = list[Report]()
+    train(replace(options, out=tmp_path / "next", start=options.out / CHECKPOINT), told.append)
+    assert told[-1].steps == 4
+
+
+def test_learning_goes_on_from_an_onnx_file(options: TrainOptions, tmp_path: Path) -> None:
+    start = train(options, lambda _report: None)
+    told = list[Report]()
+    chosen = replace(options, out=tmp_path / "next", start=start)
+    train(chosen, told.append)
+    assert told[-1].steps == 4
+
+
+@pytest.mark.parametrize("content", [b"", b"no network"])
+def test_an_onnx_file_that_is_damaged_is_named(options: TrainOptions, tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "old.onnx"
+    file.write_bytes(content)
+    with pytest.raises(TrainingDataError, match=r"old\.onnx"):
+        train(replace(options, start=file), lambda _report: None)
+
+
+def test_scores_are_shifted_by_pictures_that_are_not_crowded(options: TrainOptions) -> None:
+    document = json.loads((options.data / "train.json").read_text())
+    for image in document["images"][1:]:
+        image["crowded"] = True
+    (options.data / "train.json").write_text(json.dumps(document))
+    assert [one.file for one in examination(options.data, "train", NAMES).pictures] == ["train0.png"]
+
+
+def test_a_picture_that_is_damaged_is_named(options: TrainOptions) -> None:
+    (options.data / "train2.png").write_bytes(b"no picture")
+    with pytest.raises(TrainingDataError, match=r"train2\.png"):
+        train(options, lambda _report: None)

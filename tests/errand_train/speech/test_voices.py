@@ -1,0 +1,44 @@
+"""The voices that speak training sentences."""
+
+import random
+
+import pytest
+from errand_train.speech import voices
+from errand_train.speech.voices import drawn_speaker, speakers, speech
+
+from executive.speech.sound import RATE_HZ
+from skills.files.errors import InputError
+
+HELD_OUT = ("scotland", "rp", "+f3", "awb", "slt", "ked")
+
+
+def test_without_any_the_hint_is_told(monkeypatch):
+    monkeypatch.setattr(voices.shutil, "which", lambda name: None)
+    with pytest.raises(InputError, match="no synthetic voice") as refused:
+        speakers()
+    assert "apt-get install" in refused.value.hint
+
+
+def test_voices_that_figures_are_taken_with_are_not_among_them():
+    for speaker in voices._SPEAKERS:
+        for seed in range(200):
+            spoken = " ".join(speaker.arguments(random.Random(seed)))
+            assert not any(name in spoken.replace("{wav}", "") for name in HELD_OUT), spoken
+
+
+def test_each_that_is_installed_speaks():
+    try:
+        found = speakers()
+    except InputError:
+        pytest.skip("no synthetic voice is installed")
+    for speaker in found:
+        assert 0.3 * RATE_HZ < len(speech(speaker, "Bring the cup.", random.Random(1))) < 5 * RATE_HZ
+
+
+def test_those_left_out_are_never_drawn():
+    try:
+        found = speakers(left_out=("espeak",))
+    except InputError:
+        pytest.skip("no synthetic voice is installed")
+    draw = random.Random(1)
+    assert "espeak" not in {drawn_speaker(found, draw).name for _ in range(100)}

@@ -1,0 +1,117 @@
+"""`errand dataset`: pictures from the plant to learn and to judge a detector by."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from errand_train.commands.refine import refine_command
+from errand_train.commands.score import score_command
+from errand_train.commands.train import train_command
+from errand_train.dataset.errors import DatasetError
+from executive.app.evaluate.worker_pool import Pool
+from executive.app.evaluate.workers import Workers
+from executive.cli.number_options import quantity_option
+from executive.cli.output import console_for, print_json, refusals, show_table
+from skills.files.errors import InputError
+from skills.quantities import Count, Quantity, Seed
+
+if TYPE_CHECKING:
+    from errand_train.dataset.shards import Summary
+
+__all__ = ["dataset"]
+
+dataset = typer.Typer(
+    name="dataset", help="Pictures with labels, made in the plant.", no_args_is_help=True, rich_markup_mode=None
+)
+
+
+@dataset.callback()
+def _group() -> None:
+    """Pictures with labels, made in the plant."""
+
+
+dataset.command(name="score")(score_command)
+dataset.command(name="train")(train_command)
+dataset.command(name="refine")(refine_command)
+
+
+@dataset.command(name="render")
+def render_command(
+    out: Annotated[Path, typer.Option(help="Folder for the data set; one begun before is gone on with.")],
+    images: Annotated[int, quantity_option(Pictures, help="How many pictures.")],
+    seed: Annotated[int, quantity_option(Seed, help="The same seed gives the same pictures.")] = 1,
+    others: Annotated[
+        Path | None, typer.Option(help="Folder of object models of no class, for the rooms to train on.")
+    ] = None,
+    jobs: Annotated[int | None, quantity_option(Count, help="How many processes; all cores unless said.")] = None,
+    workers: Annotated[int | None, quantity_option(Count, help="A local Dask cluster of so many workers.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="tcp://HOST:PORT", help="The scheduler of a Dask cluster.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
+) -> None:
+    """Render pictures of things in random rooms, with boxes and masks as COCO files."""
+    console = console_for(as_json)
+    began = time.monotonic()
+    with refusals():
+        pool = Pool(jobs or os.cpu_count() or 1, workers, scheduler)
+        summary = _rendered(out, images, seed, others, pool, console)
+    _show(console, out, summary, time.monotonic() - began)
+    if as_json:
+        print_json({"out": str(out), **asdict(summary)})
+
+
+Pictures = Annotated[int, Quantity(ge=1, le=10_000_000)]
+
+
+def _rendered(out: Path, images: int, seed: int, others: Path | None, pool: Pool, console: Console) -> Summary:
+    from errand_train.dataset.shards import render
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("scenes", total=None)
+
+        def show(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        try:
+            with pool.opened() as workers:
+                given_out = partial(_given_out, workers)
+                return render(out, images=images, seed=seed, progress=show, give_out=given_out, others=others)
+        except DatasetError as error:
+            raise InputError(error.message, hint=error.hint) from error
+
+
+def _given_out(
+    workers: Workers, function: Callable[[int], Mapping[str, bytes]], numbers: list[int]
+) -> Iterator[tuple[int, Mapping[str, bytes] | None]]:
+    """As `errand_train.dataset.shards.GiveOut` says."""
+    for finished in workers.give_out(function, numbers):
+        yield finished.item, finished.result
+
+
+def _show(console: Console, out: Path, summary: Summary, seconds: float) -> None:
+    names = next(iter(summary.labels.values()))
+    rows = [(name, *(str(found[name]) for found in summary.labels.values())) for name in names]
+    rows.append(("pictures", *map(str, summary.images.values())))
+    show_table(console, ("class", *summary.images), rows)
+    console.print(
+        f"{out}: {sum(summary.images.values())} pictures, {summary.empty_images} of them with nothing to find, "
+        f"{summary.ignored} labels to ignore; {seconds:.0f} s"
+    )

@@ -1,0 +1,95 @@
+"""What the commands that train a network have in common: checks of what they are given, and a bar of progress."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from errand_train.detector.labels import TrainingDataError, read_split
+from errand_train.detector.schedule import Budget, Report
+from executive.cli.output import print_json
+from skills.files.errors import InputError
+
+__all__ = ["budget_of", "check_folders", "check_libraries", "check_time", "print_trained", "trained"]
+
+NEEDED: Final = ("torch", "onnx", "pycocotools")
+RENDER: Final = "make one: errand dataset render --out DIR --images 8000"
+
+
+def check_folders(data: Path, out: Path, resume: bool) -> None:
+    """Raises InputError."""
+    for name in ("train.json", "val.json"):
+        if not (data / name).is_file():
+            raise InputError(f"{data / name}: there is no such file of a data set", hint=RENDER)
+    if (out / "checkpoint.pt").exists() and not resume:
+        raise InputError(f"{out}: holds a training already", hint="go on with it by --resume, or name another --out")
+
+
+def check_time(minutes: float | None, epochs: int | None) -> None:
+    """Raises InputError."""
+    if minutes is not None and epochs is not None:
+        raise InputError("--minutes and --epochs are both given", hint="give one of them")
+
+
+def check_libraries(needed: Sequence[str] = NEEDED, work: str = "training") -> None:
+    """Raises InputError."""
+    missing = [name for name in needed if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InputError(f"{work} needs {' and '.join(missing)}", hint="pip install '.[train]'")
+
+
+def budget_of(data: Path, minutes: float | None, epochs: int | None, *, unless_said_minutes: float) -> Budget:
+    """How long to train. Raises InputError."""
+    if epochs is None:
+        return Budget(seconds=60.0 * (unless_said_minutes if minutes is None else minutes))
+    try:
+        return Budget(pictures=epochs * len(read_split(data, "train")))
+    except TrainingDataError as error:
+        raise InputError(error.message, hint=error.hint) from error
+
+
+def trained(
+    work: Callable[[Callable[[Report], None]], Path], out: Path, console: Console
+) -> tuple[Path, dict[str, float]]:
+    """The ONNX file that some work makes, and its last figures, with a bar of progress. Raises InputError."""
+    figures = dict[str, float]()
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
+        task = bar.add_task("training", total=1.0)
+
+        def show(report: Report) -> None:
+            new_percent = int(100 * report.progress) > int(100 * bar.tasks[task].completed)
+            bar.update(task, completed=report.progress, description=_told(report))
+            if new_percent and not console.is_terminal:
+                console.print(f"{report.progress:4.0%}  step {report.steps}, {_told(report)}")
+            if report.figures is not None:
+                figures.update(report.figures)
+                console.print(f"{report.progress:4.0%}  {_line(report.figures)}")
+
+        try:
+            return work(show), figures
+        except TrainingDataError as error:
+            raise InputError(error.message, hint=error.hint) from error
+        except OSError as error:
+            raise InputError(f"{out}: cannot be written ({error})", hint="name another folder, or make room") from error
+
+
+def print_trained(console: Console, model: Path, figures: dict[str, float], *, as_json: bool) -> None:
+    """Say which file was written, and how good it is."""
+    console.print(f"{model}: {_line(figures)}")
+    if as_json:
+        print_json({"model": str(model), "figures": figures})
+
+
+def _told(report: Report) -> str:
+    scores, boxes = report.losses
+    return f"training, {report.pictures_per_s:.0f}/s, losses {scores:.2f} {boxes:.2f}"
+
+
+def _line(figures: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.3f}" for name, value in figures.items())

@@ -1,0 +1,82 @@
+"""`errand dataset refine`: a refinement or classifier network is trained to judge what those before it find."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+from rich.console import Console
+
+from errand_train.commands.learning import budget_of, check_folders, check_libraries, check_time, print_trained, trained
+from errand_train.detector.schedule import REFINEMENT_RATE, RefineOptions, Schedule
+from executive.cli.number_options import LearningRate, Minutes, quantity_option
+from executive.cli.output import console_for, refusals
+from skills.files.errors import InputError
+from skills.perception.detector.cascade_files import MODEL_FILE
+from skills.quantities import Count, Seed
+
+__all__ = ["refine_command"]
+
+UNLESS_SAID_MINUTES: Final = 90.0
+
+
+def refine_command(
+    data: Annotated[Path, typer.Option(help="Folder of a data set that `errand dataset render` made.")],
+    out: Annotated[Path, typer.Option(help="Folder for checkpoints, figures and the ONNX files.")],
+    model: Annotated[
+        Path | None, typer.Option(help="The proposal network's file; else the one of Errand.", show_default=False)
+    ] = None,
+    classifier: Annotated[
+        bool,
+        typer.Option("--classifier", help="The classifier network, which judges what the refinement network sees."),
+    ] = False,
+    minutes: Annotated[
+        float | None,
+        quantity_option(Minutes, help="How long to train; an hour and a half unless said.", show_default=False),
+    ] = None,
+    epochs: Annotated[int | None, quantity_option(Count, help="Instead: how many crops for each picture.")] = None,
+    seed: Annotated[int, quantity_option(Seed, help="Of the first weights and of all random draws.")] = 1,
+    rate: Annotated[float, quantity_option(LearningRate, help="The highest learning rate.")] = REFINEMENT_RATE,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
+    start: Annotated[
+        Path | None,
+        typer.Option(help="A checkpoint or an ONNX file of the same network whose weights are taken over."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
+) -> None:
+    """Train the refinement network, which sees each proposal anew, or the classifier network; export it."""
+    console = console_for(as_json)
+    with refusals():
+        check_folders(data, out, resume)
+        check_time(minutes, epochs)
+        check_libraries()
+        options = RefineOptions(
+            data,
+            out,
+            budget_of(data, minutes, epochs, unless_said_minutes=UNLESS_SAID_MINUTES),
+            model=_first(model),
+            classifier=classifier,
+            seed=seed,
+            resume=resume,
+            start=start,
+            schedule=Schedule(rate),
+        )
+        file, figures = _refined(options, console)
+    print_trained(console, file, figures, as_json=as_json)
+
+
+def _first(model: Path | None) -> Path:
+    """Raises InputError."""
+    file = model or MODEL_FILE
+    if not file.is_file():
+        raise InputError("there is no such file", hint="name a detector's ONNX file with --model", file=file)
+    return file
+
+
+def _refined(options: RefineOptions, console: Console) -> tuple[Path, dict[str, float]]:
+    """The ONNX file and its figures. Raises InputError."""
+    from errand_train.detector.refine import refine
+
+    return trained(partial(refine, options), options.out, console)

@@ -1,0 +1,188 @@
+"""`errand dataset score`: how good the detector is on labelled pictures."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from errand_train.commands.learning import check_libraries
+from errand_train.commands.score_report import scores_json, show_scores
+from errand_train.commands.worst_sheet import Shown, contact_sheet
+from errand_train.detector.scoring import BODY, BODY_CLASSES, by_camera, judged, picture_errors, score
+from errand_train.detector.scoring_labels import LabelledPicture, pictures_of_coco
+from executive.app.detector_choice import detector_of
+from executive.app.picture_files import read_picture, write_picture
+from executive.cli.number_options import quantity_option
+from executive.cli.output import console_for, print_json, refusals
+from skills.detection import Detection
+from skills.files.errors import InputError
+from skills.files.outside import read_text
+from skills.perception.detector.augmentation import AugmentedDetector
+from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector
+from skills.perception.detector.upright import turned, turned_back
+from skills.quantities import Count
+from skills.robot import Picture
+
+__all__ = ["score_command"]
+
+LEAST_SCORE: Final = 0.01
+TIMED_PICTURES: Final = 200
+TOGETHER: Final = 8
+WORST: Final = 20
+MOST_BYTES: Final = 2_000_000_000
+
+Found = tuple[Detection, ...]
+
+
+@dataclass(frozen=True)
+class _Work:
+    """Labelled pictures, where they are, and the detector that is judged."""
+
+    pictures: tuple[LabelledPicture, ...]
+    files: tuple[Path, ...]
+    detector: OnnxDetector
+    views: bool
+
+
+def score_command(
+    data: Annotated[Path, typer.Option(help="A COCO file; its pictures' names count from its folder.")],
+    model: Annotated[Path | None, typer.Option(help="Another detector's file; else the one of Errand.")] = None,
+    pictures: Annotated[Path | None, typer.Option(help="Another folder from which the names count.")] = None,
+    limit: Annotated[int | None, quantity_option(Count, help="Only so many pictures, the first.")] = None,
+    worst: Annotated[int | None, quantity_option(Count, help="How many of the worst pictures to name.")] = None,
+    sheet: Annotated[Path | None, typer.Option(help="Draw the worst pictures, 20 unless said, into this PNG.")] = None,
+    views: Annotated[
+        bool, typer.Option("--views", help="With test-time augmentation, as the detect skill uses it.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
+) -> None:
+    """Judge the detector by labelled pictures: average precision as COCO has it, precision, recall, speed."""
+    console = console_for(as_json)
+    with refusals():
+        check_libraries(("pycocotools",), "scoring")
+        drawing = _png(sheet)
+        detector = detector_of(model, DetectorOptions(threshold=LEAST_SCORE))
+        work = _work(data, pictures or data.parent, limit, detector, views)
+        found = _all_found(work, console)
+        names = work.detector.class_names
+        scores = {"all": score(work.pictures, found, names)}
+        for camera, (shown, seen) in by_camera(work.pictures, found).items():
+            scores[camera] = score(shown, seen, BODY_CLASSES if camera == BODY else names)
+        speed = _pictures_per_second(work)
+        order = _worst_first(work, found)[: worst or (WORST if drawing else 0)]
+        if drawing is not None:
+            write_picture(drawing, contact_sheet([_shown(work, found, k) for k in order]))
+    named = [{"file": work.pictures[k].file, "error": round(_error(work, found, k), 3)} for k in order]
+    if as_json:
+        print_json({"data": str(data), **scores_json(scores, speed), **({"worst": named} if named else {})})
+    else:
+        show_scores(console, scores, speed)
+        for one in named:
+            console.print(f"{one['error']:7.3f}  {one['file']}", markup=False)
+
+
+def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, views: bool) -> _Work:
+    """Read the labels, and see that all pictures are there. Raises InputError."""
+    try:
+        labelled = pictures_of_coco(_document(data), detector.class_names)[:limit]
+    except ValueError as error:
+        raise InputError(str(error), hint="name a COCO file with --data", file=data) from error
+    files = tuple(folder / picture.file for picture in labelled)
+    missing = [file for file in files if not file.is_file()]
+    if missing:
+        what = f"{len(missing)} of {len(files)} pictures are not there"
+        raise InputError(what, hint="name the folder from which their names count with --pictures", file=missing[0])
+    if not files:
+        raise InputError("it names no pictures", hint="name a COCO file with pictures with --data", file=data)
+    return _Work(labelled, files, detector, views)
+
+
+def _document(data: Path) -> Any:
+    """The JSON value of a file. Raises InputError, or ValueError for what is no JSON."""
+    try:
+        return json.loads(read_text(data, most_bytes=MOST_BYTES, hint="name a COCO file with --data"))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise ValueError(f"it is no JSON ({error})") from error
+
+
+def _all_found(work: _Work, console: Console) -> list[Found]:
+    """What is found in each picture, also what is hardly sure."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    found = list[Found]()
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("pictures", total=len(work.files))
+        for group in _groups(len(work.files)):
+            found += _found(work, group)
+            bar.update(task, completed=len(found))
+    return found
+
+
+def _found(work: _Work, group: range) -> list[Found]:
+    """What is in some pictures. Those that stand on their heads are turned first, as on the robot."""
+    taken, labelled = [_read(work, k) for k in group], [work.pictures[k] for k in group]
+    upright = [turned(picture) if one.on_its_head else picture for picture, one in zip(taken, labelled, strict=True)]
+    seen = zip(_looked(work.detector, upright, work.views), taken, labelled, strict=True)
+    return [turned_back(found, *picture.shape[1::-1]) if one.on_its_head else found for found, picture, one in seen]
+
+
+def _looked(detector: OnnxDetector, pictures: Sequence[Picture], views: bool) -> list[Found]:
+    """What is in some pictures."""
+    if not views:
+        return detector.detect(pictures)
+    return [AugmentedDetector(detector).detect_in_views(picture) for picture in pictures]
+
+
+def _groups(count: int) -> list[range]:
+    """The numbers of pictures that are looked at together."""
+    return [range(k, min(k + TOGETHER, count)) for k in range(0, count, TOGETHER)]
+
+
+def _read(work: _Work, k: int) -> Picture:
+    """A picture of the size that its labels are for. Raises InputError."""
+    picture, expected = read_picture(work.files[k]), work.pictures[k].size_px
+    size = picture.shape[1], picture.shape[0]
+    if expected is not None and expected != size:
+        what = f"it has {size[0]} x {size[1]} pixels, and its labels are for {expected[0]} x {expected[1]}"
+        raise InputError(what, hint="label it as it is, or put back the picture that was labelled", file=work.files[k])
+    return picture
+
+
+def _pictures_per_second(work: _Work) -> float:
+    """From pictures in memory to their final boxes at the usual threshold: one over the median of the times."""
+    detector = OnnxDetector(work.detector.model)
+    times_s = list[float]()
+    for group in _groups(min(len(work.files), TIMED_PICTURES)):
+        pictures = [_read(work, k) for k in group]
+        begun = time.perf_counter()
+        _looked(detector, pictures, work.views)
+        times_s.append((time.perf_counter() - begun) / len(pictures))
+    return 1.0 / statistics.median(times_s)
+
+
+def _worst_first(work: _Work, found: Sequence[Found]) -> list[int]:
+    return sorted(range(len(work.files)), key=lambda k: -_error(work, found, k))
+
+
+def _error(work: _Work, found: Sequence[Found], k: int) -> float:
+    return picture_errors(work.pictures[k], found[k], work.detector.class_names)
+
+
+def _shown(work: _Work, found: Sequence[Found], k: int) -> Shown:
+    judgement = judged(work.pictures[k], found[k], work.detector.class_names)
+    return Shown(work.pictures[k].file, _read(work, k), judgement)
+
+
+def _png(sheet: Path | None) -> Path | None:
+    """Raises InputError for a name that does not end in .png."""
+    if sheet is not None and sheet.suffix.lower() != ".png":
+        raise InputError("the sheet is a PNG", hint=f"call it {sheet.with_suffix('.png').name}", file=sheet)
+    return sheet

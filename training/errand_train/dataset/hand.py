@@ -1,0 +1,46 @@
+"""The robot's hand as its own camera sees it: simple jaws by the robot's own figures, with or without an object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydrake.math import RollPitchYaw
+
+from errand_train.models.surfaces import add_rounded_box
+from plant.models.builder.mesh import Material, Mesh
+from plant.models.spot.description import spot_facts
+
+_PALM, _FINGER = "arm_wr1", "arm_f1x"
+
+
+def hand_mesh(opening_rad: float) -> Mesh:
+    """Palm, fixed jaw and finger in the frame of the hand's link, the finger opened by an angle."""
+    facts = spot_facts()
+    links = {link["link"]: link for link in facts["arm"]}
+    yellow, black = (tuple(facts["colours"][name][:3]) for name in ("yellow", "black"))
+    mesh = Mesh({"yellow": Material(yellow), "black": Material(black), "pad": Material((0.16, 0.16, 0.17))})
+    palm, *jaw = links[_PALM]["collision"]
+    del palm  # The camera looks out of it.
+    for shape in jaw:
+        _add_box(mesh, "black", shape)
+    finger = Mesh(mesh.materials)
+    for shape in links[_FINGER]["collision"]:
+        _add_box(finger, "black", shape)
+    for link, part in ((_PALM, mesh), (_FINGER, finger)):
+        pads = links[link]["pads"]
+        for x, z in pads["xz"]:
+            for y in pads["y"]:
+                part.add_box("pad", (x - 0.006, y - 0.006, z - 0.006), (x + 0.006, y + 0.006, z + 0.006))
+    c, s = np.cos(-opening_rad), np.sin(-opening_rad)
+    mesh.add_mesh(finger, [[c, 0, s], [0, 1, 0], [-s, 0, c]], links[_FINGER]["offset"])
+    return mesh
+
+
+def _add_box(mesh: Mesh, material: str, shape: Mapping[str, Any]) -> None:
+    half = np.array(shape["box"]) / 2
+    part = Mesh(mesh.materials)
+    add_rounded_box(part, material, -half, half, float(half.min()) * 0.5)
+    turn = RollPitchYaw(shape.get("rpy", [0, 0, 0])).ToRotationMatrix().matrix()
+    mesh.add_mesh(part, turn, shape["xyz"])

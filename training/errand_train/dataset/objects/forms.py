@@ -1,0 +1,52 @@
+"""Writes the shipped forms of the classes, made by their recipes: `python -m errand_train.dataset.objects.forms`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from errand_train.dataset.objects import make
+from errand_train.models.__main__ import write_model
+from errand_train.models.appearance import Appearance
+from plant.models.builder.sdf import Model
+from plant.models.catalogue import MODELS_FOLDER
+
+FORMS: Final[Mapping[tuple[str, str], int]] = MappingProxyType(
+    {
+        ("coke", "cola_can"): 6,
+        ("coke", "glass_bottle"): 9,
+        ("beer", "green_bottle"): 11,
+        ("beer", "stubby_bottle"): 18,
+        ("hammer", "red_claw"): 11,
+        ("hammer", "ball_peen"): 13,
+        ("cube", "wooden"): 4,
+        ("cube", "green"): 6,
+        ("extinguisher", "powder"): 8,
+        ("extinguisher", "carbon_dioxide"): 13,
+        ("extinguisher", "water"): 6,
+        ("screwdriver", "yellow"): 0,
+        ("screwdriver", "red"): 14,
+        ("screwdriver", "green"): 21,
+        ("wrench", "open_ended"): 3,
+        ("wrench", "pipe"): 0,
+        ("wrench", "adjustable"): 17,
+        ("cylinder", "orange"): 3,
+        ("cylinder", "green"): 11,
+        ("cylinder", "striped"): 5,
+    }
+)
+"""By class and name of the form: the number of the instance that it is."""
+
+
+def write_forms(folder: Path) -> None:
+    """Write each form into `CLASS/FORM` below a folder. The same sources give the same bytes."""
+    for (category, form), number in FORMS.items():
+        made, kind, _ = make(category, number)
+        model = Model(category, f"{category}.obj", made.collisions, made.mass, comment=f"{kind} {category}")
+        write_model(folder / category / form, model, Appearance(made.mesh, made.pictures))
+
+
+if __name__ == "__main__":
+    write_forms(MODELS_FOLDER)

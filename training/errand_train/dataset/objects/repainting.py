@@ -1,0 +1,40 @@
+"""Finished models in plain colours, without their pictures: the form alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from errand_train.dataset.objects.draft import Finished, pick, varied
+from errand_train.dataset.objects.lettering import COLOURS, GREYS
+from plant.models.builder.mesh import Material, Mesh
+
+__all__ = ["in_one_colour", "plainly_painted"]
+
+
+def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: float = 0.5) -> Finished:
+    """The same object with every picture on it replaced by its mean colour (so often), or by any plain one."""
+    own = rng.random() < own_colours
+    painted: dict[str, Material] = {}
+    for name, material in made.mesh.materials.items():
+        picture = made.pictures.get(material.texture or "")
+        mean = None if picture is None else np.asarray(picture, dtype=float).reshape(-1, 3).mean(axis=0) / 255.0
+        colour = np.array(COLOURS[str(rng.choice(list(COLOURS)))]) if mean is None or not own else mean
+        keep = picture is None and (own or rng.random() < 0.5)
+        painted[name] = material if keep else Material(varied(rng, colour), None, None, material.shine, 0.0)
+    mesh = Mesh(painted)
+    mesh.add_mesh(made.mesh)
+    return replace(made, mesh=mesh, pictures={})
+
+
+def in_one_colour(made: Finished, rng: np.random.Generator) -> tuple[Finished, str]:
+    """The same object in a single plain colour, as it comes from a drawing; what one would call that."""
+    word = str(rng.choice(list(COLOURS)))
+    colour = COLOURS[word]
+    if rng.random() < 0.6:
+        word, colour = "grey", pick(rng, *GREYS)
+    paint = Material(varied(rng, colour, 0.04), None, None, float(rng.uniform(0.0, 0.6)), 0.0)
+    mesh = Mesh(dict.fromkeys(made.mesh.materials, paint))
+    mesh.add_mesh(made.mesh)
+    return replace(made, mesh=mesh, pictures={}), word

@@ -1,0 +1,113 @@
+"""Crops about regions, turned, mirrored, shifted and with other light, as batches to train on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from errand_train.detector.photometry import as_seen_otherwise
+from errand_train.detector.placing import turning
+from errand_train.detector.proposal_table import ProposalTable
+from errand_train.detector.schedule import shuffled
+from errand_train.detector.store import PictureStore
+from skills.perception.detector.proposals import CROP_PX, crop_map, mapped
+
+Floats = NDArray[np.float32]
+Picture = NDArray[np.uint8]
+_ON_THINGS: Final = 0.5
+_CHANGED: Final = 0.7
+_RIGHT_ANGLE: Final = np.pi / 2
+_TURNED: Final = 0.2
+_SCALES: Final = (0.85, 1.18)
+_SHIFT_PX: Final = 6.0
+_BOX_SPREAD: Final = 0.04
+
+
+@dataclass(frozen=True)
+class CropBatch:
+    """Crops (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them, logits (N, K) of them, and what is right.
+
+    `wanted` (N, 4) are boxes, `classes` (N,) numbers or -1 for nothing.
+    """
+
+    crops: Tensor
+    boxes: Tensor
+    logits: Tensor
+    wanted: Tensor
+    classes: Tensor
+
+    @property
+    def inputs(self) -> tuple[Tensor, ...]:
+        """What the network takes."""
+        return (self.crops, self.boxes, self.logits)
+
+
+@dataclass(frozen=True)
+class CropFeed:
+    """An endless sequence of crops, the same for the same seed. Half of them are about objects."""
+
+    table: ProposalTable
+    store: PictureStore
+    seed: int
+
+    def batch(self, taken: int, count: int) -> CropBatch:
+        """The next batch when so many crops are `taken`."""
+        rows = self._rows(taken, count)
+        made = [self._crop(int(row), np.random.default_rng([self.seed, taken + k])) for k, row in enumerate(rows)]
+        pictures = torch.from_numpy(np.stack([picture for picture, _ in made])).permute(0, 3, 1, 2)
+        boxes = torch.from_numpy(np.stack([both for _, both in made]))
+        return CropBatch(
+            pictures.float().mul_(1.0 / 255.0).contiguous(memory_format=torch.channels_last),
+            boxes[:, 0],
+            torch.from_numpy(self.table.logits[rows]),
+            boxes[:, 1],
+            torch.from_numpy(self.table.classes[rows]),
+        )
+
+    def _rows(self, first: int, count: int) -> NDArray[np.int64]:
+        """Rows of the table: those on objects and the others by turns."""
+        objects, others = np.flatnonzero(self.table.classes >= 0), np.flatnonzero(self.table.classes < 0)
+        many = round(count * _ON_THINGS)
+        number = first // count
+        return np.concatenate(
+            [
+                objects[shuffled(self.seed, number * many, many, len(objects))],
+                others[shuffled(self.seed + 1, number * (count - many), count - many, len(others))],
+            ]
+        )
+
+    def _crop(self, row: int, random: np.random.Generator) -> tuple[Picture, Floats]:
+        """A crop, and (2, 4) the region's box and the object's in it."""
+        table = self.table
+        affine, region = changed_map(table.boxes[row], random)
+        crop = self.store.scales(int(table.pictures[row])).cut(affine.astype(np.float64), (CROP_PX, CROP_PX))
+        if random.random() < _CHANGED:
+            crop = as_seen_otherwise(crop, random)
+        return crop, mapped(np.stack([region, table.wanted[row]]), affine)
+
+
+def changed_map(box: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
+    """The map (2, 3) to the crop of a box (4,) that fits a little otherwise, changed; and that box."""
+    region = _spread(box, random)
+    return _changed(crop_map(region), region, random), region
+
+
+def _spread(box: Floats, random: np.random.Generator) -> Floats:
+    """A box (4,) that fits a little otherwise."""
+    size = np.tile(box[2:] - box[:2], 2)
+    return (box + np.clip(random.normal(0.0, _BOX_SPREAD, 4), -0.1, 0.1) * size).astype(np.float32)
+
+
+def _changed(affine: Floats, box: Floats, random: np.random.Generator) -> Floats:
+    """A crop's map, larger or smaller, shifted, perhaps mirrored and turned by right angles."""
+    scale = float(affine[0, 0]) * float(np.exp(random.uniform(*np.log(_SCALES))))
+    angle = float(random.integers(1, 4)) * _RIGHT_ANGLE if random.random() < _TURNED else 0.0
+    to = CROP_PX / 2 + random.uniform(-_SHIFT_PX, _SHIFT_PX, 2)
+    flipped = bool(random.random() < 0.5)
+    focus = ((box[:2] + box[2:]) / 2).astype(np.float32)
+    return turning(focus, to.astype(np.float32), angle_rad=angle, scale=scale, flipped=flipped)

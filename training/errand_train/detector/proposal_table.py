@@ -1,0 +1,117 @@
+"""What a network proposes in the training pictures, and what is really there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pycocotools import mask as coco_mask
+
+from errand_train.detector.labels import Labels
+from skills.perception.detector.cascade_files import DetectorModel
+from skills.perception.detector.crops import refined
+from skills.perception.detector.proposals import ProposalOptions, Proposals, proposals_of
+from skills.perception.detector.scales import Scales
+
+NEAR: Final = 0.3
+_WITHIN_IGNORED: Final = 0.6
+_LOOKED_AT: Final = ProposalOptions(least_score=0.01, most=20)
+_SEEN: Final = ProposalOptions(least_score=0.015, same=0.9, most=20)
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class ProposalTable:
+    """R regions: picture's number (R,), box (R, 4) in the letterbox, logits (R, K), and the object there.
+
+    `classes` (R,) are those of the objects with which regions share NEAR or more, or -1; `wanted` (R, 4) are their
+    boxes, and the region's own where there is no object.
+    """
+
+    pictures: NDArray[np.int64]
+    boxes: Floats
+    logits: Floats
+    wanted: Floats
+    classes: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.pictures)
+
+    def save(self, file: Path) -> None:
+        """Write it; whole or not at all."""
+        fresh = file.with_name(f".{file.name}.new.npz")
+        np.savez(fresh, **vars(self))
+        fresh.replace(file)
+
+    @staticmethod
+    def read(file: Path) -> ProposalTable:
+        """Read what was written."""
+        with np.load(file) as kept:
+            return ProposalTable(**{name: kept[name] for name in ProposalTable.__dataclass_fields__})
+
+
+def proposed(model: DetectorModel, scales: Scales) -> tuple[Floats, Floats]:
+    """Boxes (A, 4) and scores (A, K) of the proposal network in a picture's letterbox."""
+    boxes, scores = model.proposal.session.run(["boxes", "scores"], {"images": scales.full[None]})
+    return boxes[0], scores[0]
+
+
+def refined_by(model: DetectorModel, scales: Scales) -> tuple[Floats, Floats]:
+    """Boxes (R, 4) and scores (R, K) of the refinement network, as in use. Raises ValueError without one."""
+    if model.refinement is None:
+        raise ValueError("there is no refinement network")
+    return refined(model.refinement.session, scales, *proposed(model, scales), ProposalOptions())
+
+
+def proposals_in(model: DetectorModel, scales: Scales) -> Proposals:
+    """The places that the proposal network finds."""
+    return proposals_of(*proposed(model, scales), _LOOKED_AT)
+
+
+def refined_in(model: DetectorModel, scales: Scales) -> Proposals:
+    """What the refinement network makes of them. Raises ValueError where there is none."""
+    return proposals_of(*refined_by(model, scales), _SEEN)
+
+
+def table_of(look: Callable[[Scales], Proposals], pictures: Iterable[tuple[Scales, Labels]]) -> ProposalTable:
+    """The regions that a network finds in all pictures. Those on what is to be ignored are left out."""
+    tables = [_rows(look(scales), number, labels) for number, (scales, labels) in enumerate(pictures)]
+    names = ProposalTable.__dataclass_fields__
+    return ProposalTable(**{name: np.concatenate([vars(table)[name] for table in tables]) for name in names})
+
+
+def _rows(regions: Proposals, number: int, labels: Labels) -> ProposalTable:
+    """The regions of one picture."""
+    objects = label_boxes(labels)
+    shared, inside = (_overlaps(regions.boxes, objects, crowd=crowd) for crowd in (False, True))
+    left_out = ((shared >= NEAR) | (inside >= _WITHIN_IGNORED)) & labels.ignored[None, :]
+    counting = np.where(labels.ignored[None, :], 0.0, shared)
+    best = counting.max(axis=1, initial=0.0)
+    near = best >= NEAR
+    kept = near | ~left_out.any(axis=1)
+    wanted, classes = regions.boxes.copy(), np.full(len(regions), -1)
+    if near.any():
+        chosen = counting.argmax(axis=1)[near]
+        wanted[near], classes[near] = objects[chosen], labels.classes[chosen]
+    return ProposalTable(
+        np.full(int(kept.sum()), number), regions.boxes[kept], regions.logits[kept], wanted[kept], classes[kept]
+    )
+
+
+def _overlaps(boxes: Floats, objects: Floats, *, crowd: bool) -> NDArray[np.float64]:
+    """Shared area / area of both (N, M), or of the box alone for a `crowd`."""
+    if not len(boxes) or not len(objects):
+        return np.zeros((len(boxes), len(objects)))
+    first, second = (np.hstack([one[:, :2], one[:, 2:] - one[:, :2]]).astype(np.float64) for one in (boxes, objects))
+    return np.asarray(coco_mask.iou(first, second, [int(crowd)] * len(objects)))
+
+
+def label_boxes(labels: Labels) -> Floats:
+    """The boxes (N, 4) of labels' outlines."""
+    boxes = [np.concatenate([outline.min(axis=0), outline.max(axis=0)]) for outline in labels.outlines]
+    return np.array(boxes, dtype=np.float32).reshape(-1, 4)

@@ -1,0 +1,227 @@
+"""How good a detector is: figures of labels and detections.
+
+Average precision as COCO computes it, precision and recall at a score, false detections in pictures that hold nothing,
+and recall by size, distance and visibility.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from errand_train.detector.matching import Evaluation, evaluated
+from errand_train.detector.scoring_labels import Label, LabelledPicture, long_side_px
+from skills.detection import Detection
+
+SURE_SCORE: Final = 0.5
+HAND: Final = "hand"
+BODY: Final = "body"
+BODY_CLASSES: Final = ("person",)
+"""What the body cameras are looked through for."""
+SIZE_EDGES_PX: Final = (0.0, 12.0, 24.0, 48.0, 96.0, 192.0, np.inf)
+DISTANCE_EDGES_M: Final = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, np.inf)
+VISIBILITY_EDGES: Final = (0.0, 0.25, 0.4, 0.6, 0.8, 0.95, np.inf)
+
+Found = tuple[Detection, ...]
+
+
+@dataclass(frozen=True)
+class ClassScore:
+    """Figures of one class; None where nothing counts, or precision where nothing was found."""
+
+    name: str
+    labels: int
+    ap50: float | None
+    ap50_95: float | None
+    precision: float | None
+    recall: float | None
+
+
+@dataclass(frozen=True)
+class Bin:
+    """How many labels lie between two limits (low <= value < high), and the share of them that is found."""
+
+    low: float
+    high: float
+    labels: int
+    recall: float | None
+
+
+@dataclass(frozen=True)
+class Score:
+    """All figures. Precision and recall are of all classes' detections together, at SURE_SCORE and overlap 0.5.
+
+    Only labels of at least 24 x 8 pixels of which 40 % are seen count; the rest is passed over, as are detections
+    below that size that are on nothing. Bins are of all labels that the file does not mark to be ignored: by size and
+    by distance those of which 40 % are seen, by visibility those that are large enough.
+    """
+
+    pictures: int
+    map50: float | None
+    map50_95: float | None
+    precision: float | None
+    recall: float | None
+    classes: tuple[ClassScore, ...]
+    distractor_pictures: int
+    false_per_100_distractor_pictures: float | None
+    by_size_px: tuple[Bin, ...]
+    by_distance_m: tuple[Bin, ...]
+    by_visibility: tuple[Bin, ...]
+
+
+def score(pictures: Sequence[LabelledPicture], found: Sequence[Found], class_names: Sequence[str]) -> Score:
+    """Judge what was found in each picture. Raises ValueError when there are not as many of one as of the other."""
+    if len(pictures) != len(found):
+        raise ValueError(f"there are {len(pictures)} pictures, and detections for {len(found)}")
+    evaluation = evaluated(pictures, found, class_names)
+    counts = {name: _counts(evaluation, name) for name in class_names}
+    classes = tuple(_class_score(evaluation, name, counts[name]) for name in class_names)
+    together = sum(counts.values(), start=_Counts(0, 0, 0))
+    empty = [one for picture, one in zip(pictures, found, strict=True) if picture.only_distractors]
+    false = sum(detection.score >= SURE_SCORE for one in empty for detection in one)
+    labels = _labels_found(pictures, found, class_names)
+    return Score(
+        pictures=len(pictures),
+        map50=_mean([one.ap50 for one in classes]),
+        map50_95=_mean([one.ap50_95 for one in classes]),
+        precision=together.precision,
+        recall=together.recall,
+        classes=classes,
+        distractor_pictures=len(empty),
+        false_per_100_distractor_pictures=100.0 * false / len(empty) if empty else None,
+        by_size_px=_bins(labels, SIZE_EDGES_PX, lambda one: long_side_px(one.box) if one.seen_enough else None),
+        by_distance_m=_bins(labels, DISTANCE_EDGES_M, lambda one: one.distance_m if one.seen_enough else None),
+        by_visibility=_bins(labels, VISIBILITY_EDGES, lambda one: one.visibility if one.large_enough else None),
+    )
+
+
+def by_camera(
+    pictures: Sequence[LabelledPicture], found: Sequence[Found]
+) -> dict[str, tuple[list[LabelledPicture], list[Found]]]:
+    """Pictures and detections as the robot uses them: all classes on the hand camera, people on the body cameras.
+
+    Without an entry for a camera of which no picture tells.
+    """
+    of: dict[str, tuple[list[LabelledPicture], list[Found]]] = {}
+    for picture, ones in zip(pictures, found, strict=True):
+        if picture.camera is None:
+            continue
+        kind = HAND if picture.camera == HAND else BODY
+        if kind == BODY:
+            picture = replace(picture, labels=tuple(one for one in picture.labels if one.class_name in BODY_CLASSES))
+            ones = tuple(one for one in ones if one.class_name in BODY_CLASSES)
+        kept = of.setdefault(kind, ([], []))
+        kept[0].append(picture)
+        kept[1].append(ones)
+    return of
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What is right and wrong in a picture of the detections from SURE_SCORE on, and which labels are missed.
+
+    What is passed over is in neither.
+    """
+
+    right: tuple[Detection, ...]
+    wrong: tuple[Detection, ...]
+    missed: tuple[Label, ...]
+
+
+def judged(picture: LabelledPicture, found: Found, class_names: Sequence[str]) -> Judged:
+    """Sort a picture's detections and labels."""
+    sure = tuple(one for one in found if one.score >= SURE_SCORE)
+    evaluation = evaluated([picture], [sure], class_names)
+    matches = [one for name in class_names for one in evaluation.matches(name)]
+    on = {one.label for one in matches}
+    missed = [label for k, label in enumerate(evaluation.labels) if label.counts and k not in on]
+    return Judged(
+        right=tuple(one.detection for one in matches if one.label is not None and not one.passed),
+        wrong=tuple(one.detection for one in matches if one.label is None and not one.passed),
+        missed=tuple(missed),
+    )
+
+
+def picture_errors(picture: LabelledPicture, found: Found, class_names: Sequence[str]) -> float:
+    """How wrong a detector is in one picture: scores of what is not there, and 1 - score for what was to be found.
+
+    A label on which there is nothing adds 1.
+    """
+    evaluation = evaluated([picture], [found], class_names)
+    matches = [one for name in class_names for one in evaluation.matches(name) if not one.passed]
+    right = sum(one.detection.score for one in matches if one.label is not None)
+    wrong = sum(one.detection.score for one in matches if one.label is None)
+    return wrong + sum(label.counts for label in evaluation.labels) - right
+
+
+@dataclass(frozen=True)
+class _Counts:
+    """Right and wrong detections from SURE_SCORE on, and how many labels count."""
+
+    right: int
+    wrong: int
+    labels: int
+
+    @property
+    def precision(self) -> float | None:
+        return self.right / (self.right + self.wrong) if self.right + self.wrong else None
+
+    @property
+    def recall(self) -> float | None:
+        return self.right / self.labels if self.labels else None
+
+    def __add__(self, other: _Counts) -> _Counts:
+        return _Counts(self.right + other.right, self.wrong + other.wrong, self.labels + other.labels)
+
+
+def _counts(evaluation: Evaluation, name: str) -> _Counts:
+    sure = [one for one in evaluation.matches(name) if one.detection.score >= SURE_SCORE and not one.passed]
+    right = sum(one.label is not None for one in sure)
+    labels = sum(label.counts for label in evaluation.labels if label.class_name == name)
+    return _Counts(right, len(sure) - right, labels)
+
+
+def _class_score(evaluation: Evaluation, name: str, counts: _Counts) -> ClassScore:
+    precisions = evaluation.average_precision(name)
+    return ClassScore(
+        name=name,
+        labels=counts.labels,
+        ap50=None if precisions is None else float(precisions[0]),
+        ap50_95=None if precisions is None else float(np.mean(precisions)),
+        precision=counts.precision,
+        recall=counts.recall,
+    )
+
+
+def _labels_found(
+    pictures: Sequence[LabelledPicture], found: Sequence[Found], class_names: Sequence[str]
+) -> list[tuple[Label, bool]]:
+    """Every label that the file asks for, of any size and visibility, and whether it is found at SURE_SCORE."""
+    sure = [tuple(one for one in ones if one.score >= SURE_SCORE) for ones in found]
+    evaluation = evaluated(pictures, sure, class_names, lambda label: label.judged)
+    on = {one.label for name in class_names for one in evaluation.matches(name)}
+    return [(label, k in on) for k, label in enumerate(evaluation.labels) if label.judged]
+
+
+def _bins(
+    labels: Sequence[tuple[Label, bool]], edges: Sequence[float], value_of: Callable[[Label], float | None]
+) -> tuple[Bin, ...]:
+    """Recall between each two limits; labels without a value are left out, and so are bins when none has one."""
+    known = [(value, hit) for label, hit in labels if (value := value_of(label)) is not None]
+    if not known:
+        return ()
+    values, hits = (np.array(column, dtype=np.float64) for column in zip(*known, strict=True))
+    return tuple(
+        Bin(low, high, int(np.sum(inside)), float(np.mean(hits[inside])) if inside.any() else None)
+        for low, high in pairwise(edges)
+        for inside in [(values >= low) & (values < high)]
+    )
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None

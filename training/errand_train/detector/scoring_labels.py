@@ -1,0 +1,118 @@
+"""What pictures are known to hold, as a detector is judged by it, and which of it counts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from errand_train.detector.coco import CocoLabel, coco_file
+from skills.perception.detector.upright import LEAST_ROLL_DEG
+
+LEAST_LONG_PX: Final = 24.0
+LEAST_SHORT_PX: Final = 8.0
+LEAST_VISIBILITY: Final = 0.4
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Label:
+    """An object in a picture: its class, and its box (u0, v0, u1, v1) in pixels.
+
+    `crowd` marks a region in which any number of detections of the class is passed over, `ignore` an object that need
+    not be found and may be. `visibility` is the share of the whole object that is seen (what lies beyond the picture's
+    edge is not), `distance_m` how far it is, where known.
+    """
+
+    class_name: str
+    box: Box
+    crowd: bool = False
+    ignore: bool = False
+    visibility: float | None = None
+    distance_m: float | None = None
+
+    @property
+    def judged(self) -> bool:
+        """Whether the file asks for it at all."""
+        return not (self.crowd or self.ignore)
+
+    @property
+    def large_enough(self) -> bool:
+        """Whether its box is at least 24 pixels long and 8 wide."""
+        return large_enough(self.box)
+
+    @property
+    def seen_enough(self) -> bool:
+        """Whether at least 40 % of it are seen; taken for granted where unknown."""
+        return self.visibility is None or self.visibility >= LEAST_VISIBILITY
+
+    @property
+    def counts(self) -> bool:
+        """Whether it counts in the main figures."""
+        return self.judged and self.large_enough and self.seen_enough
+
+
+@dataclass(frozen=True)
+class LabelledPicture:
+    """A picture's file, as named by its data set, all that is known to be in it, and its width and height if known.
+
+    `camera` is the name of its camera, and `on_its_head` whether that hung upside down, where the data set tells.
+    `crowded` ones are of scenes with more objects than usual.
+    """
+
+    file: str
+    labels: tuple[Label, ...] = ()
+    size_px: tuple[int, int] | None = None
+    on_its_head: bool = False
+    camera: str | None = None
+    crowded: bool = False
+
+    @property
+    def only_distractors(self) -> bool:
+        """Whether it holds nothing of any class, not even something to ignore."""
+        return not self.labels
+
+
+def long_side_px(box: Box) -> float:
+    """The longer side of a box (u0, v0, u1, v1)."""
+    return max(box[2] - box[0], box[3] - box[1])
+
+
+def large_enough(box: Box) -> bool:
+    """Whether a box is of a size that counts."""
+    return long_side_px(box) >= LEAST_LONG_PX and min(box[2] - box[0], box[3] - box[1]) >= LEAST_SHORT_PX
+
+
+def pictures_of_coco(document: object, class_names: Sequence[str]) -> tuple[LabelledPicture, ...]:
+    """The pictures of a COCO file in the order of their ids, with the labels of the named classes.
+
+    Categories go by their names, in any case of letters; their ids may be any. Labels of other categories are left
+    out. Raises ValueError, naming the entry.
+    """
+    coco = coco_file(document)
+    ours = {name.casefold(): name for name in class_names}
+    names = {one.id: ours.get(one.name.strip().casefold()) for one in coco.categories}
+    if not any(names.values()):
+        told = ", ".join(one.name for one in coco.categories)
+        raise ValueError(f"categories: none of '{told}' is a class that is known ({', '.join(class_names)})")
+    for k, label in enumerate(coco.annotations):
+        if label.category_id not in names:
+            raise ValueError(f"annotations[{k}].category_id: there is no category {label.category_id!r}")
+    pictures = sorted(coco.by_picture(), key=lambda pair: (isinstance(pair[0].id, str), pair[0].id))
+    return tuple(
+        LabelledPicture(
+            file=image.file_name,
+            labels=tuple(_label(one, name) for one in labels if (name := names[one.category_id]) is not None),
+            size_px=image.size_px,
+            on_its_head=abs(image.roll_deg) > LEAST_ROLL_DEG,
+            camera=image.camera,
+            crowded=image.crowded,
+        )
+        for image, labels in pictures
+    )
+
+
+def _label(one: CocoLabel, name: str) -> Label:
+    x, y, width, height = one.bbox
+    return Label(name, (x, y, x + width, y + height), one.iscrowd, one.ignore, one.seen, one.distance_m)

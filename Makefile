@@ -1,7 +1,7 @@
-# make env    the virtual environment .venv with all but the training extra
+# make env    the virtual environment .venv with all but what only training needs
 # make demo   one mission, end to end; look into out/ (sets up what missions need, and no more)
-# make test   a test of everything, and one mission of each kind; those of training when the extra `train` is there
-# make train  adds the extra `train`: torch, to train the detector and the speech adapter
+# make test   a test of everything, and one mission of each kind; those that train networks only after `make train`
+# make train  adds the distribution errand-train (`errand dataset`) and torch, to train the detector and the speech adapter
 # make check  lint, format and strict types
 # make bench  benchmarks, as ratios
 # make nightly  further missions, tutorials, seeds and worlds, and the smallest case of each measure
@@ -43,8 +43,8 @@ $(VENV)/.run: pyproject.toml constraints.txt | debian
 
 train: $(VENV)/.train
 
-$(VENV)/.train: $(VENV)/.ready
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[train]'
+$(VENV)/.train: training/pyproject.toml $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[speech]' --editable training
 	@touch $@
 
 debian:
@@ -91,4 +91,4 @@ $(VENV)/.docs: $(VENV)/.ready
 	@touch $@
 
 clean:
-	rm -rf $(VENV) out build dist *.egg-info
+	rm -rf $(VENV) out build dist *.egg-info training/build training/*.egg-info

@@ -1,8 +1,8 @@
 """The import rule: executive -> skills; plant -> executive.words, skills.robot, skills.files; skills imports neither.
 
-Only executive.app and executive.cli import all, and nothing imports executive.cli. The homes of executive import each
-other one way, from the last of `HOMES` to the first, the words nothing but a few plain modules of skills. No files
-import each other in a circle.
+Only executive.app and executive.cli import all three. Nothing imports executive.cli, nor training, which imports all.
+The homes of executive import each other one way, from the last of `HOMES` to the first, the words nothing but a few
+plain modules of skills. No files import each other in a circle.
 """
 
 import ast
@@ -34,26 +34,11 @@ HOMES = (
     ("executive.cli",),
 )
 """The homes of executive, the lowest first."""
-TRAINING = (
-    "errand_train.dataset",
-    "plant.models.builder",
-    "plant.worlds.builder",
-    "errand_train.detector",
-    "errand_train.speech",
-)
-"""What makes pictures, models, worlds and networks; nothing at run time imports it."""
-TRAINS = (
-    "dataset_command",
-    "learning",
-    "object_command",
-    "refine_command",
-    "score_command",
-    "score_report",
-    "train_command",
-    "world_command",
-    "worst_sheet",
-)
-"""The modules of executive.cli that serve it."""
+BUILDERS = ("plant.models.builder", "plant.worlds.builder")
+"""What makes models and worlds; at run time only the commands import it that make them."""
+USES_BUILDERS = (*BUILDERS, "executive.cli.object_command", "executive.cli.world_command")
+FOR_COMMANDS = ("executive.cli.number_options", "executive.cli.output")
+"""What a command of any distribution may use of the command line."""
 
 
 def modules(package: str) -> list[Path]:
@@ -164,38 +149,49 @@ def test_the_check_finds_imports_upward(path: str, source: str, expected: list[s
     assert upward(ROOT / path, source) == expected
 
 
-def training_imports(path: Path, source: str) -> list[str]:
-    """What a module that is needed at run time imports of the packages for training."""
+def builder_imports(path: Path, source: str) -> list[str]:
+    """What a module that is needed at run time imports of the builders."""
     own = ".".join(path.relative_to(ROOT).with_suffix("").parts)
-    if within(own, *TRAINING, *(f"executive.cli.{name}" for name in TRAINS)):
-        return []
-    serving = tuple(f"executive.cli.{name}" for name in TRAINS)
-    at_run_time = (*TRAINING, *serving) if not within(own, "executive.cli") else TRAINING
-    return [name for name in imported(source) if within(name, *at_run_time)]
+    return [] if within(own, *USES_BUILDERS) else [name for name in imported(source) if within(name, *BUILDERS)]
 
 
-def test_nothing_at_run_time_imports_what_makes_pictures_or_trains() -> None:
+def test_only_the_commands_that_make_models_and_worlds_import_the_builders() -> None:
     paths = [path for package in OURS for path in modules(package)]
-    found = {str(path.relative_to(ROOT)): training_imports(path, path.read_text()) for path in paths}
+    found = {str(path.relative_to(ROOT)): builder_imports(path, path.read_text()) for path in paths}
     assert {path: names for path, names in found.items() if names} == {}
 
 
 @pytest.mark.parametrize(
     ("path", "source", "expected"),
     [
-        ("plant/simulation.py", "from errand_train.dataset import coco", ["errand_train.dataset.coco"]),
-        (
-            "skills/detect/skill.py",
-            "def f():\n    import errand_train.detector.learner",
-            ["errand_train.detector.learner"],
-        ),
         ("executive/cli/assembly.py", "import plant.models.builder.mesh", ["plant.models.builder.mesh"]),
-        ("errand_train/commands/train.py", "import errand_train.detector.train", []),
-        ("errand_train/dataset/render.py", "from plant.models.builder import gltf", []),
+        ("executive/cli/object_command.py", "def f():\n    import plant.models.builder.importing", []),
+        ("plant/worlds/builder/own.py", "from plant.models.builder import mesh", []),
     ],
 )
-def test_the_check_finds_imports_of_training(path: str, source: str, expected: list[str]) -> None:
-    assert training_imports(ROOT / path, source) == expected
+def test_the_check_finds_imports_of_builders(path: str, source: str, expected: list[str]) -> None:
+    assert builder_imports(ROOT / path, source) == expected
+
+
+def test_nothing_imports_training() -> None:
+    paths = [path for package in (*OURS, "missions") for path in modules(package)]
+    assert [str(path.relative_to(ROOT)) for path in paths if "errand_train" in imported_roots(path.read_text())] == []
+
+
+def test_training_uses_of_the_command_line_only_what_plug_ins_use() -> None:
+    paths = modules("training")
+    found = {str(path.relative_to(ROOT)): list(imported(path.read_text())) for path in paths}
+    of_cli = {path: [n for n in names if within(n, "executive.cli")] for path, names in found.items()}
+    assert paths
+    assert {path: names for path, names in of_cli.items() if not all(within(n, *FOR_COMMANDS) for n in names)} == {}
+
+
+def imported_roots(source: str) -> set[str]:
+    """The first names of all modules that a source imports."""
+    nodes = list(ast.walk(ast.parse(source)))
+    plain = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    named = {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    return {name.split(".")[0] for name in plain | named}
 
 
 CIRCLES_LEFT = (

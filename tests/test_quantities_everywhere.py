@@ -15,16 +15,11 @@ from skills.quantities import quantity_of
 ROOT = Path(__file__).resolve().parent.parent
 OURS_ALONE = (
     "executive/tree/estimate.py",
-    "errand_train/dataset/objects/finishes.py",
-    "errand_train/dataset/objects/recipes.py",
     "plant/models/catalogue.py",
     "plant/sensors/camera_spec.py",
-    "errand_train/worlds/materials.py",
-    "errand_train/worlds/plan.py",
     "skills/mapping/map_folder.py",
     "skills/perception/attributes.py",
     "skills/perception/class_forms.py",
-    "errand_train/detector/coco.py",
 )
 """Modules whose models describe files that come with the project, that Errand writes, or that other programs write."""
 

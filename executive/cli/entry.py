@@ -14,16 +14,18 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
+from types import FunctionType
 from typing import Any, Final, NoReturn
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
+from executive.cli.plugin_commands import help_lines, plugin_command
 from executive.cli.run_options import StartCommand
 from skills.files.errors import MOST_LETTERS, InputError, one_line
 
-__all__ = ["app", "command_line", "loaded", "main"]
+__all__ = ["app", "as_command", "command_line", "loaded", "main"]
 
 _COLLECTED_AFTER: Final = (30_000, 20, 50)
 """So many new objects, collections of young ones, and of middle-aged ones: imports make many objects that all stay."""
@@ -63,7 +65,6 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "report": _Command("report_command", "report", "Report the results of an evaluation: rates, causes, failures."),
     "teleop": _Command("teleop_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
-    "dataset": _Command("dataset_command", "dataset", "Labelled pictures rendered in the plant; scores, training."),
     "stack": _Command("stack_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
     "map": _Command("map_command", "map_group", "Maps that the robot makes itself, by exploring or along a route."),
     "world": _Command("world_command", "world", "Worlds made of any map, and how a world looks."),
@@ -74,15 +75,21 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     ),
     "new-skill": _Command("new_skill_command", "new_skill", "Write an installable package with a skill and tests."),
 }
-"""The commands by name, in the order of the help."""
+"""The commands of Errand by name, in the order of the help; those of plug-ins follow them."""
 
 
 def loaded(name: str) -> Any:
     """The command of a name, its module imported. Raises KeyError."""
     entry = COMMANDS[name]
-    found = getattr(import_module(f"executive.cli.{entry.module}"), entry.attribute)
+    return as_command(name, getattr(import_module(f"executive.cli.{entry.module}"), entry.attribute))
+
+
+def as_command(name: str, found: Any) -> Any:
+    """The command that a `typer.Typer` or a function with typer's options makes. Raises TypeError for anything else."""
     if isinstance(found, typer.Typer):
         return get_command(found)
+    if not isinstance(found, FunctionType):
+        raise TypeError("it is neither a typer.Typer nor a function")
     alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     alone.command(name=name, cls=StartCommand)(found)
     return get_command(alone)
@@ -96,16 +103,30 @@ class _LazyGroup(TyperGroup):
         for name, entry in COMMANDS.items():
             self.add_command(TyperCommand(name, help=entry.help))
 
+    def list_commands(self, ctx: Any) -> list[str]:
+        """All names, those of plug-ins last."""
+        for name, line in help_lines(COMMANDS).items():
+            if name not in self.commands:
+                self.add_command(TyperCommand(name, help=line))
+        return super().list_commands(ctx)
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first argument names, imported."""
         if args and args[0] in COMMANDS:
             self.add_command(loaded(args[0]), args[0])
+        elif args and (found := plugin_command(args[0], as_command)) is not None:
+            self.add_command(found, args[0])
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
-        """As typer's; a message that repeats an endless or unprintable word is shown short and escaped."""
+        """As typer's. An InputError ends it with one line; a message that repeats an endless word is shown short."""
         try:
             return super().invoke(ctx)
+        except InputError:
+            from executive.cli.output import refusals
+
+            with refusals():
+                raise
         except typer.BadParameter as error:
             line = one_line(error.message)
             error.message = line if len(line) <= MOST_LETTERS else f"{line[:MOST_LETTERS]}..."

@@ -12,6 +12,8 @@ from typing import Annotated, Final
 
 import typer
 
+from executive.cli import plugin_commands
+from executive.cli.entry import COMMANDS, as_command
 from executive.cli.number_options import quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.store import trigger_source
@@ -67,7 +69,7 @@ def plugins(
 
 def groups() -> Sequence[str]:
     """The entry-point groups that errand reads."""
-    return (registry.GROUP, *SLOTS.values(), kinds.GROUP, trigger_source.GROUP)
+    return (registry.GROUP, *SLOTS.values(), kinds.GROUP, trigger_source.GROUP, plugin_commands.GROUP)
 
 
 def _of_others() -> Sequence[EntryPoint]:
@@ -85,6 +87,8 @@ def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
     clash = next((each for each in _of_name(entry) if _key(each) != _key(entry)), None)
     if clash is not None:
         return Plugin(*_facts(plugin), f"{distribution_of(clash)} registers the same name")
+    if entry.group == plugin_commands.GROUP and entry.name in COMMANDS:
+        return Plugin(*_facts(plugin), "a command of Errand has this name")
     command = [sys.executable, "-m", "executive.cli", "plugins", "--load", _key(entry), "--limit", str(limit_s)]
     try:
         ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=limit_s + _MORE_S)
@@ -111,7 +115,8 @@ def _load(key: str, limit_s: float) -> None:
         raise InputError(f"there is no plug-in {key}")
     if entry.group == registry.GROUP:
         registry.skills_of([entry], limit_s=limit_s)
+    is_command = entry.group == plugin_commands.GROUP
     try:
-        run_plugin(entry, entry.load, limit_s=limit_s)
+        run_plugin(entry, lambda: as_command(entry.name, entry.load()) if is_command else entry.load(), limit_s=limit_s)
     except PluginDefect as defect:
         raise InputError(f"cannot load {entry.value} ({defect})") from defect

@@ -27,7 +27,7 @@ Matrix = npt.NDArray[np.float16]
 
 _UP, _DOWN, _BASE = ".up", ".down", "base"
 _FILE: Final = "noise_adapter.npz"
-_HINT: Final = f"make a new one: python -m executive.speech.training --out executive/speech/{_FILE}"
+_HINT: Final = f"make a new one: python -m errand_train.speech --out executive/speech/{_FILE}"
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RotationMatrix
+
 from errand_train.dataset.compose import Placed, Scene, compose
 from errand_train.dataset.lighting import random_lighting
 from errand_train.dataset.objects import CLASSES, DISTRACTORS, ObjectModel, instance, numbers
@@ -27,9 +30,6 @@ from errand_train.dataset.render import is_validation
 from errand_train.dataset.resting import choose, resting_poses
 from errand_train.dataset.room import Support
 from errand_train.dataset.views import View, camera_specs
-from numpy.typing import NDArray
-from pydrake.math import RigidTransform, RotationMatrix
-
 from executive.app.assembly import shared_detector
 from executive.app.worlds import knowledge_of, open_world
 from executive.testing.bench import SkillBench

@@ -21,6 +21,10 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import QueryObject
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
 from errand_train.dataset.coco import document
 from errand_train.dataset.compose import ONLY_DISTRACTORS_EVERY, Placed
 from errand_train.dataset.objects import DISTRACTORS, ObjectModel
@@ -37,10 +41,6 @@ from errand_train.dataset.views import (
     off_centre,
     roll_deg,
 )
-from numpy.typing import NDArray
-from pydrake.geometry import QueryObject
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
-
 from executive.app.worlds import knowledge_of, open_world
 from plant.diagram import LooseModel, WorldDiagram, build_diagram
 from plant.pictures import look_at

@@ -14,11 +14,11 @@ from pathlib import Path, PurePosixPath
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
+
 from errand_train.dataset.objects import CLASSES
 from errand_train.dataset.objects.draft import Draft
 from errand_train.dataset.objects.model import ObjectModel, read_model, write_model
-from numpy.typing import NDArray
-
 from plant.models.catalogue import load_catalogue
 
 FloatArray = NDArray[np.float64]

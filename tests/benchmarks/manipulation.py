@@ -36,11 +36,11 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numpy as np
-from errand_train.commands.worst_sheet import Shown, contact_sheet
-from errand_train.detector.scoring import Judged
 from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 
+from errand_train.commands.worst_sheet import Shown, contact_sheet
+from errand_train.detector.scoring import Judged
 from executive.app.assembly import run_entry, simulate
 from executive.app.starts import alone
 from executive.app.worlds import knowledge_of

@@ -8,9 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 import yaml
+
 from errand_train.worlds.__main__ import build
 from errand_train.worlds.plan import Plan
-
 from plant.models.imported import read_imported
 from plant.scenery import OWN_PACKAGE
 from plant.worlds.world import World, load_world

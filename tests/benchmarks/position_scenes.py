@@ -17,6 +17,11 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import Value
+from pydrake.geometry import FramePoseVector, QueryObject
+from pydrake.math import RigidTransform, RotationMatrix
+
 from errand_train.dataset.coco import box_of
 from errand_train.dataset.compose import Placed, Scene, compose
 from errand_train.dataset.degrade import exposed
@@ -24,11 +29,6 @@ from errand_train.dataset.lighting import random_lighting
 from errand_train.dataset.render import Stage, is_validation
 from errand_train.dataset.silhouette import silhouette
 from errand_train.dataset.views import View, camera_specs, view_of
-from numpy.typing import NDArray
-from pydrake.common.value import Value
-from pydrake.geometry import FramePoseVector, QueryObject
-from pydrake.math import RigidTransform, RotationMatrix
-
 from plant.models.catalogue import load_catalogue
 from plant.sensors.camera_noise import DepthDegrader, DepthNoise
 from plant.sensors.camera_spec import depth_render_camera

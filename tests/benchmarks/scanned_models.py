@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from errand_train.dataset.objects.draft import Draft
-from errand_train.dataset.objects.model import ObjectModel
 from numpy.typing import NDArray
 
+from errand_train.dataset.objects.draft import Draft
+from errand_train.dataset.objects.model import ObjectModel
 from plant.models.builder.mesh import Colour
 from tests.benchmarks.foreign_models import OTHERS, kept_model
 

@@ -14,7 +14,7 @@ from documents import DOCS, ROOT, commands, links, unknown_command
 
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 _TEST = re.compile(r"`(tests/[\w/.]+\.py)(?:::(\w+))?`")
-_FILE = re.compile(r"`((?:executive|skills|plant|missions|docs)/[\w/.]+\.(?:py|yaml|json|md))`")
+_FILE = re.compile(r"`((?:executive|skills|plant|training|missions|docs)/[\w/.]+\.(?:py|yaml|json|md))`")
 _ERRAND = re.compile(r"`(errand [^`]+)`")
 
 

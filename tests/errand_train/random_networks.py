@@ -9,6 +9,7 @@ if TYPE_CHECKING:
 def random_network(seed: int, classes: int) -> "DetectorNetwork":
     """One whose normalisation has statistics unlike the first ones, and whose scores are not all alike. Needs torch."""
     import torch
+
     from errand_train.detector.network import DetectorNetwork
 
     torch.manual_seed(seed)

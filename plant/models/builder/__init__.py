@@ -1,1 +1,1 @@
-"""Builds the object models of `plant/models`: `python -m plant.models.builder`."""
+"""Meshes, shapes and SDF files of models; makes a model of a mesh of any program (`importing`)."""

@@ -1,1 +1,1 @@
-"""Builds the worlds' shells, furniture and maps: `python -m plant.worlds.builder`."""
+"""Makes the folder of a world from a map or from cylinders."""

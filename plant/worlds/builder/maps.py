@@ -1,22 +1,16 @@
-"""Surveyed grids from the collision shapes, in the `map_server` form (PGM + YAML)."""
+"""Grids in the form of `map_server`: PGM and YAML."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.models.builder.shapes import Box, Cylinder, Shape
-from skills.robot import FloatArray
-
 Bools = NDArray[np.bool_]
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
 BANDS_M = {"scan": (0.70, 1.30), "low_scan": (0.27, 0.31), "keepout": (0.05, 1.00)}
 """The heights that each grid speaks of."""
-DRAWN = frozenset({"low_scan"})
-"""Grids that are drawn for the robots, too, where they have mapped the others themselves."""
 
 
 @dataclass(frozen=True)
@@ -26,67 +20,6 @@ class Grid:
     cells: NDArray[np.uint8]
     origin_m: tuple[float, float]
     resolution_m: float
-
-
-@dataclass(frozen=True)
-class Placement:
-    """A shape whose model stands at (x, y) on the floor, turned by yaw (rad)."""
-
-    shape: Shape
-    x: float
-    y: float
-    yaw_rad: float
-
-
-def rasterise(
-    shapes: Iterable[Placement],
-    band_m: tuple[float, float],
-    outline_m: tuple[float, float],
-    resolution_m: float = 0.025,
-    margin_m: float = 0.5,
-) -> Grid:
-    """Cells whose centre lies in a shape that reaches into the height band are occupied; outside the walls unknown."""
-    size = [round((length + 2 * margin_m) / resolution_m) for length in outline_m]
-    x = (np.arange(size[0]) + 0.5) * resolution_m - margin_m
-    y = (np.arange(size[1]) + 0.5) * resolution_m - margin_m
-    points = np.stack(np.meshgrid(x, y), axis=-1)
-    inside = np.all((points > 0) & (points < outline_m), axis=-1)
-    cells = np.where(inside, FREE, UNKNOWN).astype(np.uint8)
-    for placed in shapes:
-        if _reaches(placed.shape, band_m):
-            cells[covers(placed, points)] = OCCUPIED
-    return Grid(cells, (-margin_m, -margin_m), resolution_m)
-
-
-def _half_height(shape: Shape) -> float:
-    if isinstance(shape, Box):
-        return shape.size[2] / 2
-    if isinstance(shape, Cylinder):
-        return shape.length / 2
-    raise TypeError(f"furniture is made of boxes and cylinders, not of {type(shape).__name__}")
-
-
-def _reaches(shape: Shape, band_m: tuple[float, float]) -> bool:
-    if shape.rpy[:2] != (0.0, 0.0):
-        raise ValueError(f"{shape} does not stand upright")
-    half = _half_height(shape)
-    return shape.p[2] + half > band_m[0] and shape.p[2] - half < band_m[1]
-
-
-def covers(placed: Placement, points: FloatArray) -> Bools:
-    """Which of the (..., 2) points lie inside the shape as seen from above."""
-    offset = points - np.array([placed.x, placed.y])
-    in_model = _turn(offset, -placed.yaw_rad) - np.array(placed.shape.p[:2])
-    local = _turn(in_model, -placed.shape.rpy[2])
-    if isinstance(placed.shape, Box):
-        return np.asarray(np.all(np.abs(local) <= np.array(placed.shape.size[:2]) / 2 + 1e-9, axis=-1))
-    assert isinstance(placed.shape, Cylinder)
-    return np.asarray(np.sum(local**2, axis=-1) <= placed.shape.radius**2)
-
-
-def _turn(points: FloatArray, yaw_rad: float) -> FloatArray:
-    c, s = np.cos(yaw_rad), np.sin(yaw_rad)
-    return np.asarray(points @ np.array([[c, s], [-s, c]]))
 
 
 def pgm_bytes(grid: Grid) -> bytes:

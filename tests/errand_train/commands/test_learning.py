@@ -1,9 +1,9 @@
 from pathlib import Path
 
 import pytest
-from errand_train.commands import learning
 from typer.testing import CliRunner, Result
 
+from errand_train import libraries
 from executive.cli.entry import app
 
 
@@ -20,11 +20,11 @@ def run(*words: str) -> Result:
 def test_without_torch_the_extra_is_named(
     command: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(learning.importlib.util, "find_spec", lambda _name: None)
+    monkeypatch.setattr(libraries.importlib.util, "find_spec", lambda _name: None)
     result = run(command, "--data", str(data), "--out", str(tmp_path / "out"))
     assert result.exit_code == 2
     assert "torch and onnx" in result.stderr
-    assert "pip install '.[train]'" in result.stderr
+    assert "make train" in result.stderr
 
 
 def test_a_folder_that_is_no_data_set_is_named(command: str, tmp_path: Path) -> None:

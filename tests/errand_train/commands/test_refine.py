@@ -1,9 +1,9 @@
 from pathlib import Path
 
 import pytest
-from errand_train.commands import learning
 from typer.testing import CliRunner, Result
 
+from errand_train import libraries
 from executive.cli.entry import app
 
 
@@ -14,7 +14,7 @@ def run(*words: str) -> Result:
 def test_a_proposal_network_that_is_not_there_is_named(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(learning.importlib.util, "find_spec", lambda _name: object())
+    monkeypatch.setattr(libraries.importlib.util, "find_spec", lambda _name: object())
     missing = tmp_path / "missing.onnx"
     result = run("--data", str(data), "--out", str(tmp_path / "out"), "--model", str(missing))
     assert result.exit_code == 2

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from errand_train.dataset.coco import annotation, box_of, categories, counts, document, lost_in_the_dark, run_lengths
-from errand_train.dataset.silhouette import Silhouette
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from pycocotools import mask as coco_mask
 
+from errand_train.dataset.coco import annotation, box_of, categories, counts, document, lost_in_the_dark, run_lengths
+from errand_train.dataset.silhouette import Silhouette
 from skills.perception.class_forms import class_forms
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
+
 from errand_train.dataset.compose import Placed, Scene
 from errand_train.dataset.lighting import Lighting
 from errand_train.dataset.objects import ObjectModel, instance
@@ -13,8 +15,6 @@ from errand_train.dataset.render import Stage, label_view
 from errand_train.dataset.room import Room
 from errand_train.dataset.silhouette import silhouette
 from errand_train.dataset.views import View, roll_deg
-from pydrake.math import RigidTransform
-
 from plant.models.builder.mesh import Material, Mesh
 from plant.pictures import look_at
 from plant.worlds.lights import render_parameters

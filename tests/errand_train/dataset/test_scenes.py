@@ -8,14 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from errand_train.dataset.compose import Placed, compose
-from errand_train.dataset.degrade import Degradation, degraded
-from errand_train.dataset.objects import instance
-from errand_train.dataset.render import is_validation
-from errand_train.dataset.resting import choose, resting_poses
-from errand_train.dataset.room import random_room
-from errand_train.dataset.textures import ROLES, numbers, texture
-from errand_train.dataset.views import any_view, camera_specs
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
@@ -24,6 +16,14 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from scipy.spatial import ConvexHull
 
+from errand_train.dataset.compose import Placed, compose
+from errand_train.dataset.degrade import Degradation, degraded
+from errand_train.dataset.objects import instance
+from errand_train.dataset.render import is_validation
+from errand_train.dataset.resting import choose, resting_poses
+from errand_train.dataset.room import random_room
+from errand_train.dataset.textures import ROLES, numbers, texture
+from errand_train.dataset.views import any_view, camera_specs
 from plant.worlds.placement import polygon_distance
 
 

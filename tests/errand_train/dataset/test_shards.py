@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from errand_train.dataset import shards
 from errand_train.dataset.errors import DatasetError
 from errand_train.dataset.objects import ObjectModel

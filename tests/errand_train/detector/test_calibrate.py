@@ -2,9 +2,9 @@ import math
 
 import numpy as np
 import pytest
+
 from errand_train.detector.calibrate import best_threshold, score_offsets
 from errand_train.detector.scoring_labels import Label, LabelledPicture
-
 from skills.detection import Detection
 
 BOX = (10.0, 10.0, 60.0, 60.0)

@@ -3,10 +3,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from errand_train.detector.canvases import Canvas, CanvasMaker, CanvasOptions
 from errand_train.detector.labels import Labels, TrainingPicture
 from errand_train.detector.store import PictureStore
-
 from skills.perception.detector.letterbox import HEIGHT_PX, PADDING, WIDTH_PX
 
 SEEDS = range(12)

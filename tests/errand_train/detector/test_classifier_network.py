@@ -17,7 +17,6 @@ from errand_train.detector.labels import TrainingDataError  # noqa: E402
 from errand_train.detector.learner import CropLearner  # noqa: E402
 from errand_train.detector.proposal_table import refined_in  # noqa: E402
 from errand_train.detector.quantisation import quantised  # noqa: E402
-
 from skills.perception.detector.cascade_files import CLASSIFIER, load_model  # noqa: E402
 from skills.perception.detector.network_file import load_network  # noqa: E402
 from skills.perception.detector.proposals import CROP_PX  # noqa: E402

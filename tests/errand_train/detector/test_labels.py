@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from errand_train.detector.coco import CocoLabel
 from errand_train.detector.labels import TrainingDataError, category_names, outline_of, read_split
 

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from errand_train.detector.photometry import as_seen_otherwise
 
 SHAPE = (60, 80, 3)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from errand_train.detector.labels import Labels
 from errand_train.detector.placing import Cell, joined, placed, turning
 

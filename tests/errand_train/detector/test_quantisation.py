@@ -11,12 +11,12 @@ from tiny_detector import CLASSES, classifier_bytes, refinement_bytes, write_mod
 
 onnx = pytest.importorskip("onnx")
 
-from errand_train.detector.labels import TrainingDataError  # noqa: E402
-from errand_train.detector.onnx_files import trained_weights  # noqa: E402
-from errand_train.detector.quantisation import main, quantised, quantised_detector  # noqa: E402
 from onnx import TensorProto, helper, numpy_helper  # noqa: E402
 from onnxruntime import InferenceSession  # noqa: E402
 
+from errand_train.detector.labels import TrainingDataError  # noqa: E402
+from errand_train.detector.onnx_files import trained_weights  # noqa: E402
+from errand_train.detector.quantisation import main, quantised, quantised_detector  # noqa: E402
 from skills.perception.detector.cascade_files import classifier_file, load_model, refinement_file  # noqa: E402
 
 

@@ -22,7 +22,6 @@ from errand_train.detector.network import Residual  # noqa: E402
 from errand_train.detector.proposal_table import ProposalTable, proposals_in, table_of  # noqa: E402
 from errand_train.detector.refinement_network import RefinementNetwork, surest_about  # noqa: E402
 from errand_train.detector.store import PictureStore  # noqa: E402
-
 from skills.perception.detector.cascade_files import load_model, refinement_file  # noqa: E402
 from skills.perception.detector.proposals import CROP_PX  # noqa: E402
 from skills.perception.detector.scales import Scales, halved  # noqa: E402

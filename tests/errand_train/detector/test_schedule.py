@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from errand_train.detector.schedule import Budget, Schedule, shuffled
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+
 from errand_train.detector.scoring import by_camera, judged, picture_errors, score
 from errand_train.detector.scoring_labels import Label, LabelledPicture
-
 from skills.detection import Detection
 
 

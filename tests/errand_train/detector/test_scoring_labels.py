@@ -1,6 +1,7 @@
 """COCO files as labels, and which labels count."""
 
 import pytest
+
 from errand_train.detector.scoring_labels import Label, pictures_of_coco
 
 CLASSES = ("hammer", "person")

@@ -3,6 +3,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+
 from errand_train.detector.labels import Labels, TrainingDataError, TrainingPicture
 from errand_train.detector.store import open_store
 

@@ -6,10 +6,10 @@ import json
 
 import numpy as np
 import pytest
+
 from errand_train.models.gltf import gltf_text
 from errand_train.models.outlines import area, inset, triangles_of
 from errand_train.models.surfaces import add_ellipsoid, add_extruded, add_ring, add_rounded_box, add_tube
-
 from plant.models.builder.inertia import solid_mass
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.shapes import together

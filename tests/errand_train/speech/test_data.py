@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from made_speech import tone
+
 from errand_train.speech import data
 from errand_train.speech.data import spoken_sentences
 from errand_train.speech.voices import Speaker
-from made_speech import tone
-
 from skills.files.errors import InputError
 
 

@@ -4,6 +4,7 @@ import random
 import re
 
 import pytest
+
 from errand_train.speech.grammar import Grammar, load_grammar
 
 WORDS = {

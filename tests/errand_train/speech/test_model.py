@@ -8,9 +8,9 @@ import pytest
 torch = pytest.importorskip("torch")
 faster_whisper = pytest.importorskip("faster_whisper")
 
-from errand_train.speech.model import AdaptedWhisper  # noqa: E402
 from made_speech import tone  # noqa: E402
 
+from errand_train.speech.model import AdaptedWhisper  # noqa: E402
 from executive.speech.model_file import read_model_file  # noqa: E402
 from executive.speech.whisper import base_weights  # noqa: E402
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from errand_train.speech.noises import Conditions, heard_in
 from made_speech import tone
 
+from errand_train.speech.noises import Conditions, heard_in
 from executive.speech.sound import RATE_HZ
 
 SPEECH = tone(1.5, height=0.5)

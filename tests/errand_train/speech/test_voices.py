@@ -3,9 +3,9 @@
 import random
 
 import pytest
+
 from errand_train.speech import voices
 from errand_train.speech.voices import drawn_speaker, speakers, speech
-
 from executive.speech.sound import RATE_HZ
 from skills.files.errors import InputError
 

@@ -136,5 +136,5 @@ def test_neither_the_plant_nor_the_language_is_loaded_for_it(model, tmp_path):
 
 def test_all_other_commands_are_there_too(tmp_path):
     run = subprocess.run([sys.executable, "-m", "executive.cli", "--help"], capture_output=True, text=True, check=True)
-    for name in ("detect", "dataset", "parse", "run"):
+    for name in ("detect", "parse", "run"):
         assert f" {name} " in run.stdout

@@ -11,6 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from errand_train.commands.dataset import dataset
 from executive.cli.entry import COMMANDS, app
 from executive.cli.number_options import NumberReader
 from skills.quantities import bounds
@@ -18,8 +19,8 @@ from skills.quantities import bounds
 
 def functions(name: str) -> Iterator[Any]:
     """The functions of a command, or of all commands of a group."""
-    entry = COMMANDS[name]
-    found = getattr(import_module(f"executive.cli.{entry.module}"), entry.attribute)
+    entry = COMMANDS.get(name)
+    found = dataset if entry is None else getattr(import_module(f"executive.cli.{entry.module}"), entry.attribute)
     if isinstance(found, typer.Typer):
         groups = [found, *(group.typer_instance for group in found.registered_groups)]
         yield from (each.callback for group in groups if group is not None for each in group.registered_commands)
@@ -36,7 +37,7 @@ def numbers(function: Any) -> Iterator[tuple[str, tuple[Any, ...]]]:
             yield name, getattr(hint, "__metadata__", ())
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [*COMMANDS, "dataset"])
 def test_every_number_of_the_command_line_has_a_quantity_with_a_range(command: str) -> None:
     for function in functions(command):
         for name, marks in numbers(function):

@@ -39,12 +39,9 @@ def errand(tmp_path):
 
 def test_each_plug_in_is_listed_with_what_is_wrong_with_it(errand):
     ended = errand("plugins", "--limit", "2", "--json")
-    told = json.loads(ended.stdout.splitlines()[-1])["plugins"]
-    assert [(each["name"], each["distribution"]) for each in told] == [
-        ("exits", "wavers"),
-        ("hangs", "wavers"),
-        ("bell", "wavers"),
-    ]
+    listed = json.loads(ended.stdout.splitlines()[-1])["plugins"]
+    told = [each for each in listed if each["distribution"] == "wavers"]
+    assert [each["name"] for each in told] == ["exits", "hangs", "bell"]
     assert "cannot load wavers_exits:Wave (SystemExit: 0)" in told[0]["broken"]
     assert "is not loaded within 2 s" in told[1]["broken"]
     assert (told[2]["broken"], ended.returncode) == (None, 1)

@@ -6,9 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from errand_train.dataset.objects.forms import FORMS, write_forms
-from errand_train.models import objects
-from errand_train.models.__main__ import build
 from pydrake.geometry import Box, Role
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
@@ -16,6 +13,9 @@ from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, Multibod
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from errand_train.dataset.objects.forms import FORMS, write_forms
+from errand_train.models import objects
+from errand_train.models.__main__ import build
 from plant.models.builder.shapes import Cylinder, together
 from plant.models.catalogue import MODELS_FOLDER, ModelForm, load_catalogue
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from errand_train.models.outlines import triangles_of
 
+from errand_train.models.outlines import triangles_of
 from plant.models.builder.importing import Wanted, import_object
 from plant.simulation import Simulation
 from plant.worlds.placement import place_objects

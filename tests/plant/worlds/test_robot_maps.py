@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from errand_train.worlds.plan import PLANS
 
+from errand_train.worlds.plan import PLANS
 from executive.app.worlds import knowledge_of
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.placement import place_people

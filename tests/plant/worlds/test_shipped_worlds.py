@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 import pytest
 import yaml
-from errand_train.worlds.__main__ import build
-from errand_train.worlds.plan import PLANS, load_plan
 from pydrake.geometry import QueryObject
 from pydrake.multibody.parsing import LoadModelDirectives, Parser, ProcessModelDirectives
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
+from errand_train.worlds.__main__ import build
+from errand_train.worlds.plan import PLANS, load_plan
 from executive.tree.compiling.doors import view_of
 from executive.words.knowledge import load_knowledge
 from plant.worlds.placement import place_objects, place_people

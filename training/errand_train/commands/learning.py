@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -15,9 +14,9 @@ from errand_train.detector.schedule import Budget, Report
 from executive.cli.output import print_json
 from skills.files.errors import InputError
 
-__all__ = ["budget_of", "check_folders", "check_libraries", "check_time", "print_trained", "trained"]
+__all__ = ["LIBRARIES", "budget_of", "check_folders", "check_time", "print_trained", "trained"]
 
-NEEDED: Final = ("torch", "onnx", "pycocotools")
+LIBRARIES: Final = ("torch", "onnx", "pycocotools")
 RENDER: Final = "make one: errand dataset render --out DIR --images 8000"
 
 
@@ -34,13 +33,6 @@ def check_time(minutes: float | None, epochs: int | None) -> None:
     """Raises InputError."""
     if minutes is not None and epochs is not None:
         raise InputError("--minutes and --epochs are both given", hint="give one of them")
-
-
-def check_libraries(needed: Sequence[str] = NEEDED, work: str = "training") -> None:
-    """Raises InputError."""
-    missing = [name for name in needed if importlib.util.find_spec(name) is None]
-    if missing:
-        raise InputError(f"{work} needs {' and '.join(missing)}", hint="pip install '.[train]'")
 
 
 def budget_of(data: Path, minutes: float | None, epochs: int | None, *, unless_said_minutes: float) -> Budget:

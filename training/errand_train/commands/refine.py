@@ -9,8 +9,9 @@ from typing import Annotated, Final
 import typer
 from rich.console import Console
 
-from errand_train.commands.learning import budget_of, check_folders, check_libraries, check_time, print_trained, trained
+from errand_train.commands.learning import LIBRARIES, budget_of, check_folders, check_time, print_trained, trained
 from errand_train.detector.schedule import REFINEMENT_RATE, RefineOptions, Schedule
+from errand_train.libraries import check_libraries
 from executive.cli.number_options import LearningRate, Minutes, quantity_option
 from executive.cli.output import console_for, refusals
 from skills.files.errors import InputError
@@ -51,7 +52,7 @@ def refine_command(
     with refusals():
         check_folders(data, out, resume)
         check_time(minutes, epochs)
-        check_libraries()
+        check_libraries(LIBRARIES)
         options = RefineOptions(
             data,
             out,

@@ -14,11 +14,11 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from errand_train.commands.learning import check_libraries
 from errand_train.commands.score_report import scores_json, show_scores
 from errand_train.commands.worst_sheet import Shown, contact_sheet
 from errand_train.detector.scoring import BODY, BODY_CLASSES, by_camera, judged, picture_errors, score
 from errand_train.detector.scoring_labels import LabelledPicture, pictures_of_coco
+from errand_train.libraries import check_libraries
 from executive.app.detector_choice import detector_of
 from executive.app.picture_files import read_picture, write_picture
 from executive.cli.number_options import quantity_option

@@ -9,8 +9,9 @@ from typing import Annotated, Final
 import typer
 from rich.console import Console
 
-from errand_train.commands.learning import budget_of, check_folders, check_libraries, check_time, print_trained, trained
+from errand_train.commands.learning import LIBRARIES, budget_of, check_folders, check_time, print_trained, trained
 from errand_train.detector.schedule import HIGHEST_RATE, REFINING_RATE, Schedule, TrainOptions
+from errand_train.libraries import check_libraries
 from executive.cli.number_options import LearningRate, Minutes, quantity_option
 from executive.cli.output import console_for, refusals
 from skills.quantities import Count, Seed
@@ -48,7 +49,7 @@ def train_command(
     with refusals():
         check_folders(data, out, resume)
         check_time(minutes, epochs)
-        check_libraries()
+        check_libraries(LIBRARIES)
         options = TrainOptions(
             data,
             out,

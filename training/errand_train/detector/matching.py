@@ -67,7 +67,7 @@ def evaluated(
     counts: Callable[[Label], bool] = lambda label: label.counts,
 ) -> Evaluation:
     """Evaluate what was found in each picture. Labels that do not count are passed over."""
-    from pycocotools.cocoeval import COCOeval  # of the extra `train`, which a command that scores asks for
+    from pycocotools.cocoeval import COCOeval  # takes long to import
 
     labels = [(k, one) for k, picture in enumerate(pictures) for one in picture.labels if one.class_name in class_names]
     detections = [(k, one) for k, ones in enumerate(found) for one in ones if one.class_name in class_names]

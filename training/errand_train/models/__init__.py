@@ -1,0 +1,1 @@
+"""Makes the object models that come with Errand: `python -m errand_train.models`."""

@@ -1,4 +1,4 @@
-"""Writes the object models: `python -m plant.models.builder`."""
+"""Writes the object models that come with Errand: `python -m errand_train.models`."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from errand_train.models.person import person, person_appearance
 from errand_train.models.tray import tray, tray_appearance
 from plant.models.builder.mesh import mtl_text, obj_text, palette_picture, plain_colours, write_text
 from plant.models.builder.sdf import Model, model_sdf
+from plant.models.catalogue import MODELS_FOLDER
 from plant.pictures import save_png
 
 
@@ -45,4 +46,4 @@ def write_model(folder: Path, model: Model, appearance: Appearance) -> None:
 
 
 if __name__ == "__main__":
-    build(Path(__file__).resolve().parents[1])
+    build(MODELS_FOLDER)

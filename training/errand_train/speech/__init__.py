@@ -1,1 +1,1 @@
-"""Training of the adapter with which the recogniser hears in noise; needs the extra `train`."""
+"""Trains the adapter with which the recogniser hears in noise."""

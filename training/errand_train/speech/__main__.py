@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from errand_train.speech.extra import needs_torch
+from errand_train.libraries import check_libraries
 from skills.files.errors import InputError
 
 _BAD_INPUT = 2
@@ -16,7 +16,7 @@ def main() -> int:
     """Train as the arguments say; 2 when something is missing."""
     args = _arguments()
     try:
-        needs_torch()
+        check_libraries(("torch",))
         from errand_train.speech.course import Course, train
         from errand_train.speech.learning import Lessons
 

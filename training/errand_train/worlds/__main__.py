@@ -1,4 +1,4 @@
-"""Writes the generated files of the worlds: `python -m plant.worlds.builder [NAME ...]`."""
+"""Writes the generated files of the worlds: `python -m errand_train.worlds [NAME ...]`."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from errand_train.worlds.furniture import Piece
+from errand_train.worlds.grids import DRAWN, Placement, rasterise
 from errand_train.worlds.materials import materials, pictures
 from errand_train.worlds.plan import PLANS, Placed, Plan, load_plan
 from errand_train.worlds.shell import shell_collisions, shell_mesh
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, write_text
 from plant.models.builder.sdf import Model, model_sdf
 from plant.pictures import save_png
-from plant.worlds.builder.maps import BANDS_M, DRAWN, Placement, pgm_bytes, rasterise, yaml_text
+from plant.worlds.builder.maps import BANDS_M, pgm_bytes, yaml_text
 from plant.worlds.world import PACKAGE_NAME, ROBOTS, TRUTH, WORLDS_FOLDER
 
 
@@ -61,7 +62,7 @@ def _write_model(folder: Path, model: Model, mesh: Mesh) -> None:
 def _directives(package: str, pieces: Mapping[str, Placed]) -> str:
     folder = f"package://{package}/furniture"
     welds = [_weld(folder, "shell", 0.0, 0.0, 0.0), *(_weld(folder, k, *p.at, p.yaw_rad) for k, p in pieces.items())]
-    return "# Made by `python -m plant.worlds.builder`, don't edit.\ndirectives:\n" + "".join(welds)
+    return "# Made by `python -m errand_train.worlds`, don't edit.\ndirectives:\n" + "".join(welds)
 
 
 def _weld(folder: str, name: str, x: float, y: float, yaw_rad: float) -> str:

@@ -6,6 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+
 from errand_train.dataset.objects import (
     CLASSES,
     DISTRACTORS,
@@ -18,11 +23,6 @@ from errand_train.dataset.objects import (
 )
 from errand_train.dataset.objects.draft import Draft, Finished
 from errand_train.dataset.objects.recipes import Part, Recipe, build
-from pydantic import ValidationError
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder
-
 from plant.models.catalogue import load_catalogue
 
 SMALL = tuple(name for name in CLASSES if name != "person")

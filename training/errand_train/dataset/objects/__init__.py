@@ -18,7 +18,7 @@ from errand_train.dataset.objects.model import ObjectModel, Surface, held_out, r
 from errand_train.dataset.objects.recipes import build, load_recipes
 from errand_train.dataset.objects.repainting import in_one_colour, plainly_painted
 from plant.models.cache import kept_folder, user_cache
-from plant.models.catalogue import load_catalogue
+from plant.models.catalogue import MODELS_FOLDER, load_catalogue
 
 __all__ = [
     "CLASSES",
@@ -55,10 +55,10 @@ DISTRACTORS: tuple[str, ...] = tuple(sorted(load_recipes("distractors")))
 @cache
 def sources_digest() -> str:
     """Ten hexadecimal digits that change whenever a source of the models does."""
-    plant, digest = Path(__file__).resolve().parents[2], hashlib.sha256()
-    found = [path for folder in ("dataset/objects", "models/builder") for path in (plant / folder).rglob("*")]
-    for path in sorted(path for path in found if path.suffix in (".py", ".yaml")):
-        digest.update(path.relative_to(plant).as_posix().encode() + b"\0" + path.read_bytes())
+    objects, digest = Path(__file__).resolve().parent, hashlib.sha256()
+    for folder in (objects, objects.parents[1] / "models", MODELS_FOLDER / "builder"):
+        for path in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".yaml")):
+            digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:10]
 
 

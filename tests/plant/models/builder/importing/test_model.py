@@ -9,9 +9,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from errand_train.models.outlines import triangles_of
 from scipy.spatial import ConvexHull
 
+from errand_train.models.outlines import triangles_of
 from plant.models.builder.importing import ObjectImportError, ObjectsExtraMissingError, Wanted, import_object
 from plant.models.imported import ImportedObject, read_imported
 

@@ -1,0 +1,125 @@
+"""Commands of other distributions: listed, run, and refused in one line where they cannot be used."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from executive.cli.entry import app
+
+ROOT = Path(__file__).parents[3]
+MODULE = """
+import typer
+from skills.files.errors import InputError
+
+def count(ports: int = 3):
+    if ports < 0:
+        raise InputError("no ship has fewer than 0 ports", hint="give --ports 1")
+    print("ports:", ports)
+
+fleet = typer.Typer()
+
+@fleet.command()
+def sail():
+    print("sailing")
+
+@fleet.command()
+def moor():
+    print("moored")
+"""
+
+
+@pytest.fixture
+def install(tmp_path):
+    """Makes distributions that register commands, as an installer would leave them."""
+
+    def installed(name, commands, summary="Commands for ships."):
+        info = tmp_path / f"{name}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\nSummary: {summary}\n")
+        (info / "entry_points.txt").write_text("\n".join(["[errand.commands]", *commands, ""]))
+
+    (tmp_path / "ships.py").write_text(MODULE)
+    return installed
+
+
+@pytest.fixture
+def errand(tmp_path):
+    where = os.pathsep.join([str(tmp_path), str(ROOT)])
+
+    def run(*words):
+        command = [sys.executable, "-m", "executive.cli", *words]
+        return subprocess.run(command, env={**os.environ, "PYTHONPATH": where}, capture_output=True, text=True)
+
+    return run
+
+
+def test_the_help_lists_a_command_of_another_distribution_and_imports_none_of_it(install, errand):
+    install("ships", ["ports = no_such_module:count"])
+    ended = errand("--help")
+    assert ended.returncode == 0
+    line = next(line for line in ended.stdout.splitlines() if line.split()[:1] == ["ports"])
+    assert "Commands for ships." in line
+
+
+def test_a_function_becomes_a_command_with_its_options(install, errand):
+    install("ships", ["ports = ships:count"])
+    assert errand("ports", "--ports", "5").stdout == "ports: 5\n"
+
+
+def test_a_typer_app_becomes_a_group_of_commands(install, errand):
+    install("ships", ["ships = ships:fleet"])
+    assert errand("ships", "sail").stdout == "sailing\n"
+
+
+def test_a_command_refuses_bad_input_in_one_line_by_raising_an_input_error(install, errand):
+    install("ships", ["ports = ships:count"])
+    ended = errand("ports", "--ports", "-1")
+    assert (ended.returncode, ended.stderr) == (2, "errand: no ship has fewer than 0 ports; give --ports 1\n")
+
+
+@pytest.mark.parametrize(
+    ("value", "why"),
+    [
+        ("no_such_module:count", "ModuleNotFoundError: No module named 'no_such_module'"),
+        ("ships:MODULE", "AttributeError"),
+        ("ships:typer", "it is neither a typer.Typer nor a function"),
+    ],
+)
+def test_a_broken_command_is_refused_in_one_line_that_names_its_distribution(install, errand, value, why):
+    install("ships", [f"ports = {value}"])
+    ended = errand("ports")
+    assert (ended.returncode, len(ended.stderr.splitlines())) == (2, 1)
+    assert f"cannot load command 'ports' ({value}) of ships: " in ended.stderr
+    assert why in ended.stderr
+
+
+def test_a_command_that_two_distributions_register_is_refused(install, errand):
+    install("ships", ["ports = ships:count"])
+    install("docks", ["ports = ships:fleet"])
+    ended = errand("ports")
+    assert ended.returncode == 2
+    assert ended.stderr == "errand: docks and ships both have a command 'ports'; uninstall one of them\n"
+
+
+def test_a_command_of_errand_is_not_replaced_by_one_of_its_name(install, errand):
+    install("ships", ["missions = ships:count"])
+    assert "fetch_drink" in errand("missions").stdout
+    ended = errand("plugins")
+    assert ended.returncode == 1
+    assert "a command of Errand has this name" in ended.stdout
+
+
+def test_without_errand_train_its_command_says_how_to_install_it(monkeypatch):
+    monkeypatch.setattr("skills.files.plugins.installed_plugins", lambda _group: ())
+    ended = CliRunner().invoke(app, ["dataset", "render"])
+    what = "'dataset' is a command of errand-train, which is not installed; run `make train` in a clone of Errand"
+    assert (ended.exit_code, ended.stderr) == (2, f"errand: {what}\n")
+
+
+def test_errand_train_registers_the_commands_for_data_sets():
+    ended = CliRunner().invoke(app, ["--help"])
+    assert any(line.split()[:1] == ["dataset"] for line in ended.stdout.splitlines())

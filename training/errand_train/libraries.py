@@ -1,0 +1,17 @@
+"""Libraries that only training needs; `make train` installs them."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Sequence
+
+from skills.files.errors import InputError
+
+__all__ = ["check_libraries"]
+
+
+def check_libraries(needed: Sequence[str], work: str = "training") -> None:
+    """Raises InputError for libraries that are not installed; `work` says what needs them."""
+    missing = [name for name in needed if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InputError(f"{work} needs {' and '.join(missing)}", hint="run `make train` in a clone of Errand")

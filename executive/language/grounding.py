@@ -17,7 +17,7 @@ from executive.language.phrases import Phrase
 from executive.language.questions import ClarifyingQuestion, RefusalError, Slot, perhaps, which
 from executive.language.relations import check_relation
 from executive.language.roles import HERE, Location
-from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
+from executive.language.spelling import WordFacts, look_alikes, synonyms_of, words_for
 from executive.language.tokens import Token
 from executive.words.command import Command, Task, Thing
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge

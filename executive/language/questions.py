@@ -160,11 +160,11 @@ def _nearly(question: ClarifyingQuestion, said: str) -> list[str]:
     """Candidates that the answer is a slip for, or sounds like."""
     from rapidfuzz.distance import OSA
 
-    from executive.language.sounds import nearest_by_sound
+    from executive.language.spelling import nearest_by_sound
 
     slips = [c for c in question.candidates if len(said) > 2 and OSA.distance(said, c.lower()) <= len(c) // 4]
     match = nearest_by_sound(said, question.candidates)
-    return slips or ([match.name] if match is not None and match.distance <= ALIKE_SOUND else [])
+    return slips or ([match.phrase] if match is not None and match.distance <= ALIKE_SOUND else [])
 
 
 def _definite(value: str) -> str:

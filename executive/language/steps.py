@@ -25,7 +25,7 @@ from executive.language.reading import split_items
 from executive.language.reference import Memory, ResolvedAction, resolve
 from executive.language.relations import check_ways_and_speaker
 from executive.language.rephrasing import rephrased
-from executive.language.similar import WordFacts
+from executive.language.spelling import WordFacts
 from executive.language.tokens import Token
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge

@@ -12,7 +12,7 @@ from executive.language.normalise import clean, placeholder
 from executive.language.parser import DependencyParser
 from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, with_answer
 from executive.language.reference import Memory
-from executive.language.similar import Corrected, WordFacts, correct_spelling
+from executive.language.spelling import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
 from executive.language.structure.mention import mentions_structure
 from executive.language.wake import strip_wake

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from executive.language.lexicon import lexicon
-from executive.language.sounds import sound_distance
+from executive.language.spelling import sound_distance
 
 __all__ = ["Address", "WakeResult", "addressed_to", "heard_wake", "strip_wake"]
 

@@ -14,10 +14,9 @@ from executive.language.questions import RefusalError
 from executive.language.robots import Part, understand_for_robots
 from executive.language.robots.cutting import cut_by_robot
 from executive.language.roles import HERE
-from executive.language.sounds import sound_distance
+from executive.language.spelling import SoundAlikes, sound_distance
 from executive.language.understand import Status, Understanding, understand
 from executive.language.wake import SAME_NAME, Address, addressed_to, heard_wake
-from executive.speech.alikes import SoundAlikes
 from executive.speech.sound_correction import Reading
 from executive.speech.vocabulary import Vocabulary
 from executive.words.command import Command, is_attribute

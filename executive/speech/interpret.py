@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
-from executive.speech.alikes import SoundAlikes
+from executive.language.spelling import SoundAlikes
 from executive.speech.recogniser import Recognition, Transcript
 from executive.speech.sound_correction import Candidate, Reading, corrections
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from executive.language.robots import Part
+from executive.language.spelling import SoundAlikes
 from executive.language.understand import Status
 from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Utterance
-from executive.speech.alikes import SoundAlikes
 from executive.speech.calling import opening_as_heard
 from executive.speech.hearing import Meant, Reader
 from executive.speech.interpret import interpret

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Final, Generic, TypeVar
 
-from executive.speech.alikes import Alike, SoundAlikes
+from executive.language.spelling import Alike, SoundAlikes
 from executive.words.command import is_attribute
 
 __all__ = ["Candidate", "Reading", "corrections"]

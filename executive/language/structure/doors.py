@@ -6,7 +6,7 @@ import re
 from typing import Final
 
 from executive.language.questions import RefusalError, RefusalKind, Slot, which
-from executive.language.similar import synonyms_of
+from executive.language.spelling import synonyms_of
 from executive.words.condition import Condition, DoorOpen, Not
 from executive.words.knowledge import Knowledge
 from skills.files.errors import listing

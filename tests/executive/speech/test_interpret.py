@@ -3,7 +3,7 @@
 import pytest
 from made_speech import ScriptedRecognition
 
-from executive.speech.alikes import SoundAlikes
+from executive.language.spelling import SoundAlikes
 from executive.speech.interpret import interpret, smoothed
 from executive.speech.recogniser import Transcript
 from executive.speech.sound_correction import Reading

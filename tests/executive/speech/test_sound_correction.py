@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.speech.alikes import SoundAlikes
+from executive.language.spelling import SoundAlikes
 from executive.speech.sound_correction import Candidate, Reading, corrections
 
 NAMES = ("wrench", "bench", "desk", "kitchen", "beer", "coke")

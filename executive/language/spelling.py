@@ -1,0 +1,426 @@
+"""How words are spelled and how they sound: which known name a word stands for, is a slip for, or is misheard for.
+
+Text and speech use the same tables and the same distance. A word becomes a row of sounds by rules from letters to
+sounds (`letter_sounds.yaml`; Elovitz, Johnson, McHugh and Shore, "Letter-to-sound rules for automatic translation of
+English text to phonetics", 1976, have the form of the rules, and far more of them). Two rows are compared by an edit
+distance whose substitutions cost the less the more alike two sounds are.
+
+The sounds: p b t d k g f v s z h m n l r w y as in print, T (thin), S (ship), C (chip), J (jam), N (sing); the vowels
+i (bit, beat), e (bet, bait), a (bat), V (but), o (pot, boat), u (boot), @ (the), and A (buy), W (now), Y (boy).
+
+Of spelling only what is certain is taken: a general synonym (`synonyms.yaml`) of one known name, and a word that is no
+English at all and is spelled nearly like one known name. All else becomes a question or a refusal.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from types import MappingProxyType
+from typing import Final, Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+from rapidfuzz.distance import OSA
+
+from executive.language.lexicon import read_table
+from executive.words.knowledge import Knowledge
+
+__all__ = [
+    "Alike",
+    "Corrected",
+    "SoundAlikes",
+    "WordFacts",
+    "correct_spelling",
+    "look_alikes",
+    "nearest_by_sound",
+    "sound_distance",
+    "sounds_of",
+    "synonyms_of",
+    "words_for",
+]
+
+Costs = npt.NDArray[np.float64]
+
+ALIKE_SOUND: Final = 0.16
+ALIKE_MEANING: Final = 0.65
+_WORD: Final = re.compile(r"[^\W\d_][\w'-]*")
+_LONGEST_NAME: Final = 4
+_FEWEST_LETTERS: Final = 4
+_MOST_LETTERS: Final = 30
+_LONG_NAME: Final = 7
+_MOST_WORDS: Final = 60
+_MOST_CANDIDATES: Final = 4
+
+
+@dataclass(frozen=True)
+class Alike:
+    """A known phrase that sounds like some words: `cost` is about 1 for each changed sound, `distance` from 0 (the
+    same) to 1 (nothing in common). `name` tells names of things and places from other words."""
+
+    phrase: str
+    cost: float
+    distance: float
+    name: bool = True
+
+
+class SoundAlikes:
+    """Finds the known phrases that sound like some words: `names` of things and places, and other words."""
+
+    def __init__(self, names: Iterable[str], others: Iterable[str] = ()) -> None:
+        kinds = {**dict.fromkeys(others, False), **dict.fromkeys(names, True)}
+        self._phrases = tuple((phrase, name) for phrase, name in kinds.items() if sounds_of(phrase))
+        self._words = frozenset(word for phrase, _ in self._phrases for word in phrase.lower().split())
+        sounds = [sounds_of(phrase) for phrase, _ in self._phrases]
+        self._letters = sorted(set("".join(sounds)))
+        code = {letter: number for number, letter in enumerate(self._letters)}
+        self._lengths = np.array([len(s) for s in sounds], int)
+        self._sounds = np.zeros((len(sounds), max(map(len, sounds), default=0)), int)
+        for row, its in enumerate(sounds):
+            self._sounds[row, : len(its)] = [code[letter] for letter in its]
+        self._drops = np.array([_drop_cost(letter) for letter in self._letters])
+        self.of = lru_cache(maxsize=4096)(self._of)
+
+    def knows(self, word: str) -> bool:
+        """Whether the word is one of the phrases or stands in one."""
+        return word.lower() in self._words
+
+    def all(self, words: str) -> tuple[Alike, ...]:
+        """All phrases that make a sound, in their order, as they sound beside `words`."""
+        heard = sounds_of(words)
+        if not self._phrases:
+            return ()
+        costs = self._costs(heard)
+        longest = np.maximum(self._lengths, len(heard))
+        distances = np.minimum(costs / longest, 1.0) if heard else np.ones(len(costs))
+        rows = zip(self._phrases, costs.tolist(), distances.tolist(), strict=True)
+        return tuple(Alike(phrase, cost, distance, name) for (phrase, name), cost, distance in rows)
+
+    def _of(self, words: str) -> tuple[Alike, ...]:
+        """The phrases that sound like `words`, the nearest first; not the very same words."""
+        heard, same = sounds_of(words), words.lower()
+        most = min(_PART_CHANGED * len(heard) + _ALWAYS_CHANGED, _MOST_COST)
+        found = [one for one in self.all(words) if heard and one.cost <= most and one.phrase.lower() != same]
+        return tuple(sorted(found, key=lambda one: one.cost)[:_MOST_ALIKES])
+
+    def _costs(self, heard: str) -> Costs:
+        """The least cost of changing some sounds into those of every phrase, column by column of the table for all."""
+        count, longest = self._sounds.shape
+        above = np.zeros((longest + 1, count))
+        above[1:] = np.cumsum(self._drops[self._sounds], axis=1).T
+        for mine in heard:
+            change = np.array([_change_cost(mine, other) for other in self._letters])
+            dropped = _drop_cost(mine)
+            row = np.empty_like(above)
+            row[0] = above[0] + dropped
+            for at in range(longest):
+                other = self._sounds[:, at]
+                kept = np.minimum(above[at] + change[other], above[at + 1] + dropped)
+                row[at + 1] = np.minimum(kept, row[at] + self._drops[other])
+            above = row
+        costs: Costs = above[self._lengths, np.arange(count)]
+        return costs
+
+
+_PART_CHANGED: Final = 0.4
+_ALWAYS_CHANGED: Final = 0.6
+_MOST_COST: Final = 3.5
+_MOST_ALIKES: Final = 8
+
+
+@lru_cache(maxsize=64)
+def _alikes(names: tuple[str, ...]) -> SoundAlikes:
+    return SoundAlikes(names)
+
+
+def nearest_by_sound(words: str, vocabulary: Iterable[str]) -> Alike | None:
+    """The name in `vocabulary` that `words` (one or several) sound most like; the first of equals.
+
+    A distance of up to about 0.2 is a likely mishearing. None when there is nothing to compare.
+    """
+    heard, names = words.lower().split(), tuple(vocabulary)
+    exact = next((name for name in names if name.lower().split() == heard), None)
+    if exact is not None:
+        return Alike(exact, 0.0, 0.0)
+    return min(_alikes(names).all(words), key=lambda one: one.distance, default=None)
+
+
+@lru_cache(maxsize=4096)
+def sound_distance(first: str, second: str) -> float:
+    """How different two words or groups of words sound, from 0 to 1; spaces between words make no sound."""
+    return next((one.distance for one in SoundAlikes((second,)).all(first)), 1.0)
+
+
+@lru_cache(maxsize=4096)
+def sounds_of(words: str) -> str:
+    """The sounds of one or several words, a character each; what is no Latin letter makes none."""
+    return "".join(_word_sounds(word) for word in _plain(words[:_MAX_LETTERS]).split())
+
+
+def _word_sounds(word: str) -> str:
+    sounds, at = "", 0
+    while at < len(word):
+        letters, sound = _rule_at(word, at)
+        sounds, at = sounds + sound, at + letters
+    return re.sub(r"(.)\1+", r"\1", sounds)
+
+
+def _plain(words: str) -> str:
+    """Lower-case letters and spaces, accents taken off."""
+    letters = unicodedata.normalize("NFKD", words.lower())
+    return re.sub(r"[^a-z ]", "", re.sub(r"[-_\s]", " ", letters))
+
+
+@dataclass(frozen=True)
+class _Rule:
+    left: re.Pattern[str]
+    letters: re.Pattern[str]
+    sounds: str
+
+
+@cache
+def _rules() -> Mapping[str, Sequence[_Rule]]:
+    """The rules by their first letter."""
+    return {letter: tuple(_rule(*row) for row in rows) for letter, rows in read_table("letter_sounds.yaml").items()}
+
+
+def _rule(left: str, letters: str, right: str, sounds: str) -> _Rule:
+    return _Rule(re.compile(rf"(?:{left})$"), re.compile(rf"(?:{letters})(?={right})"), sounds)
+
+
+def _rule_at(word: str, at: int) -> tuple[int, str]:
+    """How many letters the rule that fits takes, and their sounds."""
+    for rule in _rules()[word[at]]:
+        found = rule.letters.match(word, at)
+        if found and rule.left.search(word[:at]):
+            return max(found.end() - at, 1), rule.sounds
+    return 1, ""
+
+
+def _drop_cost(sound: str) -> float:
+    """What it costs to leave a sound out, from 0 to 1."""
+    return _WEAK.get(sound, _VOWEL_DROP if sound in _VOWELS else _CONSONANT_DROP)
+
+
+def _change_cost(a: str, b: str) -> float:
+    """What it costs to say one sound for another, from 0 to 1."""
+    if a == b:
+        return 0.0
+    if a in _VOWELS and b in _VOWELS:
+        (x, y), (other_x, other_y) = _VOWELS[a], _VOWELS[b]
+        return min(0.15 + 0.6 * float(((x - other_x) ** 2 + (y - other_y) ** 2) ** 0.5), 0.8)
+    return _ALIKE.get(frozenset((a, b)), 1.0)
+
+
+_MAX_LETTERS: Final = 200
+_VOWEL_DROP: Final = 0.5
+_CONSONANT_DROP: Final = 0.8
+_WEAK: Final = MappingProxyType({"@": 0.35, "r": 0.4, "h": 0.4, "w": 0.5, "y": 0.4})
+"""What is lost easily."""
+
+_VOWELS: Final = MappingProxyType(
+    {
+        "i": (0.0, 1.0),
+        "e": (0.0, 0.55),
+        "a": (0.15, 0.1),
+        "V": (0.6, 0.35),
+        "o": (0.9, 0.35),
+        "u": (1.0, 1.0),
+        "@": (0.5, 0.55),
+        "A": (0.35, 0.25),
+        "W": (0.6, 0.2),
+        "Y": (0.7, 0.6),
+    }
+)
+"""Where a vowel is spoken: how far back and how high, from 0 to 1."""
+
+_ALIKE: Final = MappingProxyType(
+    {
+        frozenset(pair): cost
+        for pairs, cost in (
+            (("nN", "sz"), 0.2),
+            (("pb", "td", "kg", "fv", "CJ"), 0.3),
+            (("mn", "Tf", "yi", "mN"), 0.35),
+            (("sS", "SC", "Ts", "Tt", "Td", "zS", "Tv"), 0.4),
+            (("lr", "wv", "wr", "Ct", "Jd", "bv", "wl", "JS", "Cs", "Jz"), 0.5),
+            (("fp", "pt", "tk", "bd", "dg", "pk", "bg"), 0.6),
+        )
+        for pair in pairs
+    }
+)
+"""Consonants that are taken for each other."""
+
+
+@runtime_checkable
+class WordFacts(Protocol):
+    """What is known of English words."""
+
+    def is_word(self, word: str) -> bool:
+        """Whether it is a frequent English word."""
+
+    def similarity(self, word: str, other: str) -> float:
+        """How near two words are in meaning, from -1 to 1."""
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """A sentence with known names in place of misspelled ones, and a word on each ("I take ...")."""
+
+    text: str
+    notes: tuple[str, ...] = ()
+
+
+def words_for(name: str) -> tuple[str, ...]:
+    """Other words for the same as `name`, and words for its kind."""
+    rings, kinds = _synonyms()
+    wanted = name.lower()
+    same = [word for ring in rings if wanted in ring for word in ring if word != wanted]
+    return tuple(dict.fromkeys([*same, *(kind for kind, members in kinds.items() if wanted in members)]))
+
+
+def synonyms_of(word: str, known: Mapping[str, str]) -> tuple[str, ...]:
+    """The known names that a word which is none of them stands for; `known` gives the name for each spelling."""
+    wanted = word.lower()
+    rings, kinds = _synonyms()
+    ring = (known[other] for ring in rings if wanted in ring for other in ring if other in known)
+    kind = (known[other] for member in kinds.get(wanted, ()) for other in _with_ring(member) if other in known)
+    return tuple(dict.fromkeys(ring)) or tuple(dict.fromkeys(kind))
+
+
+def look_alikes(word: str, known: Mapping[str, str], facts: WordFacts | None) -> tuple[str, ...]:
+    """The known names that an unknown word may be a slip for, or is near in meaning, the likeliest first."""
+    wanted = word.lower()
+    if len(wanted) > _MOST_LETTERS:
+        return ()
+    sounds = {one.phrase: one.distance for one in _alikes(tuple(known)).all(wanted)}
+    slips = ((_slip(wanted, spelling, sounds.get(spelling, 1.0)), name) for spelling, name in known.items())
+    near = [name for slip, name in sorted(slips) if slip < 1.0]
+    if facts is not None and not near:
+        head = wanted.split()[-1] if wanted else ""
+        scored = [(facts.similarity(head, spelling.split()[-1]), name) for spelling, name in known.items()]
+        near = [name for score, name in sorted(scored, reverse=True) if score >= ALIKE_MEANING]
+    return tuple(dict.fromkeys(near))[:_MOST_CANDIDATES]
+
+
+def correct_spelling(text: str, knowledge: Knowledge, facts: WordFacts) -> Corrected:
+    """Write known names in place of what is misspelled so that only one of them can be meant.
+
+    A word is misspelled when it is no English word; the name must be within one slip, or two for long names. Names
+    that are written together or apart ("night stand", "nightstand") are the same.
+    """
+    known = _known(knowledge)
+    words = list(_WORD.finditer(text))[:_MOST_WORDS]
+    pieces, notes, end, at = [], [], 0, 0
+    while at < len(words):
+        count, name = _corrected_at(words, at, known, facts)
+        if name is not None:
+            spoken = text[words[at].start() : words[at + count - 1].end()]
+            pieces += [text[end : words[at].start()], name]
+            notes += [] if _despaced(spoken) in (_despaced(name), _despaced(f"{name}s")) else [_note(spoken, name)]
+            end = words[at + count - 1].end()
+        at += count
+    return Corrected("".join([*pieces, text[end:]]), tuple(notes))
+
+
+def _note(spoken: str, name: str) -> str:
+    return f"I take '{spoken}' to be {name}"
+
+
+@dataclass(frozen=True)
+class _Known:
+    """The spellings that count as known, in lower case: the names, their words, the names by their letters without
+    blanks, and how each name is written.
+    """
+
+    names: frozenset[str]
+    words: frozenset[str]
+    joined: Mapping[str, str]
+    spelled: Mapping[str, str]
+
+
+def _corrected_at(words: Sequence[re.Match[str]], at: int, known: _Known, facts: WordFacts) -> tuple[int, str | None]:
+    """How many words from here on are one name, and that name where it must be written anew."""
+    rows = [[word.group().lower() for word in words[at : at + count]] for count in range(_LONGEST_NAME, 0, -1)]
+    fitting = [row for row in rows if at + len(row) <= len(words)]
+    for row in fitting:
+        spoken = " ".join(row)
+        if spoken in known.names or _singular(spoken) in known.names:
+            return len(row), None
+        if _despaced(spoken) in known.joined:
+            return len(row), known.joined[_despaced(spoken)]
+    for row in fitting:
+        name = _only_near(row, known, facts)
+        if name is not None:
+            return len(row), name
+    return 1, None
+
+
+def _only_near(row: Sequence[str], known: _Known, facts: WordFacts) -> str | None:
+    """The one known name that misspelled words can mean; None where they are English or could be several."""
+    strange = [word for word in row if word not in known.words]
+    if not strange or any(_may_be_right(word, facts) for word in strange):
+        return None
+    spoken = " ".join(row)
+    names = [name for name in known.names if name.count(" ") == len(row) - 1]
+    forms = [form for name in names for form in (name, f"{name}s")]
+    near = sorted((distance, form) for form in forms if (distance := _slips(spoken, form)) <= _slips_allowed(form))
+    unsure = len(near) > 1 and near[1][0] == near[0][0]
+    return None if unsure or not near else known.spelled.get(near[0][1], near[0][1])
+
+
+def _may_be_right(word: str, facts: WordFacts) -> bool:
+    """Whether a word that is no known name is one that was meant."""
+    return not _FEWEST_LETTERS <= len(word) <= _MOST_LETTERS or facts.is_word(word) or facts.is_word(_singular(word))
+
+
+def _slips(word: str, name: str) -> int:
+    """How many slips lie between two words: letters too few, too many, wrong, or two swapped; above 2 it says 3."""
+    return OSA.distance(word, name, score_cutoff=2)
+
+
+def _slips_allowed(name: str) -> int:
+    return 1 if len(name) < _LONG_NAME else 2
+
+
+def _slip(word: str, name: str, sound: float) -> float:
+    """How likely a word is a slip for a name: below 1 when it looks or sounds alike, the less the likelier."""
+    slips = _slips(word, name)
+    if len(word) >= _FEWEST_LETTERS - 1 and slips <= _slips_allowed(name) // 2 + (len(name) > 3):
+        return slips / len(name)
+    return sound if sound <= ALIKE_SOUND else 1.0
+
+
+def _known(knowledge: Knowledge) -> _Known:
+    own = [*knowledge.thing_names(), *knowledge.place_names(), *knowledge.people]
+    return _known_of(knowledge.spellings(own))
+
+
+@lru_cache(maxsize=16)
+def _known_of(spelled: tuple[str, ...]) -> _Known:
+    """The names of a world with their aliases, and the general synonyms of those."""
+    written = {name.lower(): name for name in spelled}
+    names = tuple(dict.fromkeys([*written, *(word for name in written for word in words_for(name))]))
+    words = frozenset(word for name in names for word in name.split())
+    return _Known(frozenset(names), words, {_despaced(name): name for name in reversed(names)}, written)
+
+
+def _singular(word: str) -> str:
+    return re.sub(r"(?<=[sxh])es$|s$", "", word)
+
+
+def _despaced(name: str) -> str:
+    return re.sub(r"[\s'-]", "", name.lower())
+
+
+def _with_ring(word: str) -> Iterator[str]:
+    yield word
+    yield from (other for ring in _synonyms()[0] if word in ring for other in ring)
+
+
+@cache
+def _synonyms() -> tuple[tuple[tuple[str, ...], ...], Mapping[str, tuple[str, ...]]]:
+    data = read_table("synonyms.yaml")
+    return tuple(map(tuple, data["same"])), {kind: tuple(members) for kind, members in data["kinds"].items()}

@@ -1,0 +1,229 @@
+"""How words are spelled and how they sound."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from executive.language.spelling import (
+    SoundAlikes,
+    correct_spelling,
+    look_alikes,
+    nearest_by_sound,
+    sound_distance,
+    sounds_of,
+    synonyms_of,
+    words_for,
+)
+
+VOCABULARY = ["coke", "cokes", "beer", "wrench", "hammer", "screwdriver", "robin", "kitchen", "kitchen counter", "sofa"]
+
+
+@pytest.mark.parametrize(
+    ("word", "sounds"),
+    [
+        ("wrench", "renC"),
+        ("ranch", "ranC"),
+        ("coax", "koks"),
+        ("cokes", "koks"),
+        ("knife", "nAf"),
+        ("phone", "fon"),
+        ("table", "tebl"),
+        ("Alice", "alis"),
+        ("slice", "slAs"),
+        ("glasses", "glasis"),
+        ("night", "nAt"),
+        ("work bench", "w@rkbenC"),
+        ("workbench", "w@rkbenC"),
+        ("crème", "krim"),
+    ],
+)
+def test_a_word_becomes_its_sounds(word, sounds):
+    assert sounds_of(word) == sounds
+
+
+@pytest.mark.parametrize(
+    ("heard", "name"),
+    [
+        ("ranch", "wrench"),
+        ("coax", "cokes"),
+        ("rubbing", "robin"),
+        ("bear", "beer"),
+        ("bier", "beer"),
+        ("hamper", "hammer"),
+        ("hummer", "hammer"),
+        ("screw driver", "screwdriver"),
+        ("kitten", "kitchen"),
+        ("chicken counter", "kitchen counter"),
+        ("sopha", "sofa"),
+    ],
+)
+def test_the_nearest_name_by_sound_is_found(heard, name):
+    match = nearest_by_sound(heard, VOCABULARY)
+    assert match.phrase == name
+
+
+@pytest.mark.parametrize("heard", ["ranch", "coax", "rubbing", "bear", "hummer", "screw driver"])
+def test_what_is_misheard_is_near(heard):
+    assert nearest_by_sound(heard, VOCABULARY).distance < 0.2
+
+
+@pytest.mark.parametrize("heard", ["umbrella", "parcel", "lamp", "vase", "violin"])
+def test_what_sounds_like_nothing_known_is_far(heard):
+    assert nearest_by_sound(heard, VOCABULARY).distance > 0.35
+
+
+@pytest.mark.parametrize("name", ["beer", "bear", "hammer", "hamper"])
+def test_a_known_word_is_itself_however_near_another_sounds(name):
+    match = nearest_by_sound(name.upper(), ["bear", "beer", "hammer", "hamper"])
+    assert (match.phrase, match.distance) == (name, 0.0)
+
+
+def test_a_spelling_of_the_very_same_sounds_is_at_no_distance():
+    assert sound_distance("coax", "cokes") == 0.0
+
+
+@pytest.mark.parametrize("silent", ["", "  ", "123", "饮料", "🙂"])
+def test_what_makes_no_sound_is_like_nothing(silent):
+    assert nearest_by_sound(silent, VOCABULARY).distance == 1.0
+
+
+def test_without_a_vocabulary_there_is_no_nearest():
+    assert nearest_by_sound("ranch", []) is None
+
+
+@given(st.text(max_size=40), st.text(max_size=40))
+def test_the_distance_is_symmetric_and_between_zero_and_one(first, second):
+    distance = sound_distance(first, second)
+    assert distance == pytest.approx(sound_distance(second, first))
+    assert 0.0 <= distance <= 1.0
+
+
+KNOWN = {"wrench": "wrench", "coke": "coke", "lemonade": "lemonade", "living room": "living room", "hammer": "hammer"}
+
+
+@pytest.mark.parametrize(
+    ("word", "names"),
+    [
+        ("spanner", ("wrench",)),
+        ("Spanner", ("wrench",)),
+        ("lounge", ("living room",)),
+        ("coca cola", ("coke",)),
+        ("soda", ("coke", "lemonade")),
+        ("unicorn", ()),
+    ],
+)
+def test_a_synonym_stands_for_the_known_names(word, names):
+    assert synonyms_of(word, KNOWN) == names
+
+
+def test_a_name_has_its_synonyms_and_the_words_for_its_kind():
+    assert {"spanner", "monkey wrench"} <= set(words_for("wrench"))
+    assert {"cola", "soda", "soft drink"} <= set(words_for("coke"))
+    assert words_for("unicorn") == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "corrected"),
+    [
+        ("bring me the wrnch", "bring me the wrench"),
+        ("fetch a screwdrver from the worshop", "fetch a screwdriver from the workshop"),
+        ("go to the kitchin", "go to the kitchen"),
+        ("go to the livng room", "go to the living room"),
+        ("bring me two hammrs", "bring me two hammers"),
+        ("bring the extingiusher to Robbin", "bring the extinguisher to Robin"),
+        ("put it on the kitchn counter", "put it on the kitchen counter"),
+        ("fetch me a spaner", "fetch me a spanner"),
+    ],
+)
+def test_a_misspelled_name_is_corrected_and_told(parser, knowledge, text, corrected):
+    answer = correct_spelling(text, knowledge, parser)
+    assert answer.text == corrected
+    assert answer.notes
+    assert all(note.startswith("I take '") for note in answer.notes)
+
+
+@pytest.mark.parametrize(
+    ("text", "corrected"),
+    [
+        ("put it on the night-stand", "put it on the night stand"),
+        ("go to the livingroom", "go to the living room"),
+        ("fetch the screw driver", "fetch the screw driver"),
+    ],
+)
+def test_names_written_together_or_apart_are_the_same_and_not_told(parser, knowledge, text, corrected):
+    answer = correct_spelling(text, knowledge, parser)
+    assert (answer.text, answer.notes) == (corrected, ())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "bring me the cake",  # an English word, however near to coke
+        "bring me the hamper",
+        "go to the ranch",
+        "bring me the bear",
+        "bring me the xyzzyqq",  # near to nothing
+        "bring me the hmr",  # too short to be sure
+        "bring the tablet to the wall",
+        "",
+    ],
+)
+def test_what_may_be_right_is_left_alone(parser, knowledge, text):
+    assert correct_spelling(text, knowledge, parser).text == text
+
+
+@pytest.mark.parametrize(("word", "names"), [("cake", ("coke",)), ("ranch", ("wrench",)), ("unicorn", ())])
+def test_what_looks_or_sounds_alike_may_be_meant(parser, word, names):
+    assert look_alikes(word, KNOWN, parser) == names
+
+
+@given(st.text(max_size=30))
+def test_any_text_is_corrected_without_an_error(parser, knowledge, text):
+    correct_spelling(text, knowledge, parser)
+
+
+NAMES = ("wrench", "beer", "coke", "cokes", "big dish", "desk", "Robin", "kitchen counter")
+OTHERS = ("would you", "could you", "to", "drive to")
+ALIKES = SoundAlikes(NAMES, OTHERS)
+
+
+#   heard, what it may have been
+@pytest.mark.parametrize(
+    ("heard", "meant"),
+    [("ranch", "wrench"), ("coats", "cokes"), ("bear", "beer"), ("rubbing", "Robin"), ("big fish", "big dish"),
+     ("nest", "desk"), ("come you", "could you"), ("when you", "would you"), ("kitchen count", "kitchen counter")],
+)  # fmt: skip
+def test_what_was_misheard_is_among_the_nearest(heard, meant):
+    assert meant in [alike.phrase for alike in ALIKES.of(heard)[:3]]
+
+
+def test_the_costs_are_those_of_the_distance_by_sound():
+    for heard in ("ranch", "big fish", "rob in"):
+        for alike in ALIKES.of(heard):
+            longer = max(len(sounds_of(heard)), len(sounds_of(alike.phrase)))
+            assert alike.cost == pytest.approx(sound_distance(heard, alike.phrase) * longer)
+
+
+def test_the_nearest_come_first():
+    costs = [alike.cost for alike in ALIKES.of("coats")]
+    assert costs == sorted(costs)
+
+
+def test_the_very_words_are_not_told():
+    assert "wrench" not in [alike.phrase for alike in ALIKES.of("Wrench")]
+
+
+def test_names_are_told_from_other_words():
+    assert {alike.phrase: alike.name for alike in ALIKES.of("come you")}["could you"] is False
+    assert ALIKES.of("ranch")[0].name
+
+
+def test_what_sounds_like_nothing_known_has_no_alikes():
+    assert ALIKES.of("electricity bill") == ()
+    assert ALIKES.of("") == ALIKES.of("123") == ()
+    assert SoundAlikes([]).of("wrench") == ()
+
+
+def test_words_of_known_phrases_are_known():
+    assert ALIKES.knows("Kitchen") and ALIKES.knows("would")
+    assert not ALIKES.knows("ranch")

@@ -12,10 +12,10 @@ from executive.app.feasibility import refuse_impossible
 from executive.app.requests import Prepared
 from executive.conversation import Conversation, Reply, ReplyKind, Speech
 from executive.conversation.parts import Waiting
+from executive.language.followups import remark_of
 from executive.language.parser import load_parser
 from executive.language.questions import RefusalError
 from executive.language.reference import Memory
-from executive.language.remarks import remark_of
 from executive.language.robots.calls import GREETING, Whom, calls_of
 from executive.language.understand import Understanding, understand
 from executive.language.wake import addressed_to

@@ -11,8 +11,7 @@ import typer
 
 from executive.app.worlds import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, print_json, refusals
-from executive.language.explain import explain
-from executive.language.explain_views import arcs_svg, explanation_lines
+from executive.language.explain import arcs_svg, explain, explanation_lines
 from executive.language.parser import load_parser
 from executive.language.understand import Status, Understanding, parse_lines
 from executive.words.steps import DEFAULT_WORLD

@@ -8,8 +8,8 @@ from typing import Final
 
 from executive.conversation.parts import OVER, Reply, Speech, answer, done, refused
 from executive.conversation.status_words import doing_in_words, place_in_words
+from executive.language.followups import Remark
 from executive.language.grounding import known_line
-from executive.language.remarks import Remark
 from executive.run.control import Control, Mode, RobotMode
 from executive.run.runner import Progress
 

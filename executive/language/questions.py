@@ -14,6 +14,7 @@ from typing import Any, Final
 from skills.files.errors import listing
 
 __all__ = [
+    "ABLE",
     "Answerer",
     "ClarifyingQuestion",
     "QuestionPolicy",
@@ -25,6 +26,7 @@ __all__ = [
     "with_answer",
 ]
 
+ABLE: Final = "I can fetch, take, put and find things, go to places, wait and charge"
 ALIKE_SOUND: Final = 0.2
 _LONG_WORD: Final = re.compile(r"(\S{40})\S{20,}")
 

@@ -8,7 +8,19 @@ from dataclasses import replace
 from functools import partial
 from typing import Final
 
+from executive.language.indirect import (
+    belongs,
+    do_we_have,
+    goes_on,
+    how_many,
+    narrated,
+    needed,
+    told,
+    what_is,
+    where_is,
+)
 from executive.language.items import (
+    LONGEST,
     Adverb,
     Being,
     Chunk,
@@ -16,17 +28,16 @@ from executive.language.items import (
     Item,
     Negation,
     Outside,
+    Row,
     Separator,
     Unknown,
     Verb,
     Whether,
+    command_position,
 )
 from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
-from executive.language.question_parsing import do_we_have, how_many, what_is, where_is
-from executive.language.row import LONGEST, Row, command_position
-from executive.language.statements import belongs, goes_on, narrated, needed, told
 from executive.language.tokens import Token
 
 __all__ = ["split_items"]

@@ -8,25 +8,21 @@ from typing import Final
 
 from executive.language.actions import Action, read_actions
 from executive.language.clauses import Clause, split_clauses, without_name
+from executive.language.cleaning import MAX_CHARACTERS, MAX_WORDS, rephrased
 from executive.language.command_frames import CommandFrame, command_frames, spoken_command
 from executive.language.disfluency import repair_disfluencies, unwanted_things
-from executive.language.feasibility import check_feasible, not_understood
-from executive.language.grounding import ABLE, check_unwanted, ground_noted
-from executive.language.harm import refuse_harm
+from executive.language.grounding import check_unwanted, ground_noted
 from executive.language.items import Item
 from executive.language.lexicon import VerbKind, lexicon
-from executive.language.names import name_table, parse_with_names
-from executive.language.normalise import MAX_CHARACTERS, MAX_WORDS
+from executive.language.limits import check_feasible, check_ways_and_speaker, not_understood, refuse_harm
 from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase, noun_phrases
-from executive.language.questions import RefusalError, RefusalKind, Slot, which
+from executive.language.questions import ABLE, RefusalError, RefusalKind, Slot, which
 from executive.language.reading import split_items
 from executive.language.reference import Memory, ResolvedAction, resolve
-from executive.language.relations import check_ways_and_speaker
-from executive.language.rephrasing import rephrased
 from executive.language.spelling import WordFacts
-from executive.language.tokens import Token
+from executive.language.tokens import Token, name_table, parse_with_names
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
 from executive.words.steps import MissionStep
@@ -97,7 +93,7 @@ def _open(trace: Trace, _: _Context) -> Trace:
 
 def _parse(trace: Trace, context: _Context) -> Trace:
     table = None if context.knowledge is None else name_table(context.knowledge)
-    return replace(trace, tokens=parse_with_names(trace.opened, context.parser, table))
+    return replace(trace, tokens=parse_with_names(trace.opened, context.parser.parse, table))
 
 
 def _read(trace: Trace, _: _Context) -> Trace:

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
-from executive.language.foreign import foreign_reason
-from executive.language.normalise import clean, placeholder
+from executive.language.cleaning import clean, foreign_reason, placeholder
 from executive.language.parser import DependencyParser
 from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, with_answer
 from executive.language.reference import Memory

@@ -7,8 +7,8 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
+from executive.language.cleaning import clean
 from executive.language.lexicon import lexicon
-from executive.language.normalise import clean
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.robots import Part, understand_for_robots

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from executive.language.normalise import clean
+from executive.language.cleaning import clean
 from executive.language.parser import DependencyParser
 from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, with_answer
 from executive.language.reference import Memory

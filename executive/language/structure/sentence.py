@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from executive.language.cleaning import smoothed
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.reference import Memory
-from executive.language.rephrasing import smoothed
 from executive.language.structure.acts import Acts
 from executive.language.structure.branches import ends_anyway
 from executive.language.structure.cutting import (

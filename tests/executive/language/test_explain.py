@@ -2,8 +2,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from executive.language.explain import explain, tree_lines
-from executive.language.explain_views import arcs_svg, explanation_lines
+from executive.language.explain import arcs_svg, explain, explanation_lines, tree_lines
 from executive.language.understand import understand
 
 SVG = "{http://www.w3.org/2000/svg}"

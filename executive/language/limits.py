@@ -1,22 +1,25 @@
-"""What lies within the robot's reach: things that a hand can hold, places in the house, and no people to be carried."""
+"""What the robot does not do: harm, ways that it cannot keep to, and what lies out of its reach."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Final
+from functools import cache
+from typing import Any, Final
 
-from executive.language.grounding import ABLE
-from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
+from executive.language.actions import Action
+from executive.language.clauses import Clause
+from executive.language.items import Chunk, Outside, Verb, spoken_words
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, read_table
 from executive.language.nouns import NounKind, noun_examples
 from executive.language.phrases import Phrase
-from executive.language.questions import RefusalError, RefusalKind
+from executive.language.questions import ABLE, RefusalError, RefusalKind
 from executive.language.reference import ResolvedAction
 from executive.language.roles import HERE, Location
 from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
 
-__all__ = ["check_feasible", "not_understood"]
+__all__ = ["check_feasible", "check_relation", "check_ways_and_speaker", "not_understood", "refuse_harm"]
 
 
 def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | None) -> None:
@@ -184,3 +187,95 @@ def _reachable(phrase: Phrase, place: Location) -> bool:
     called = place.preposition == "to" and phrase.proper and phrase.kind is NounKind.ABSTRACT
     called = called and phrase.head.lemma not in noun_examples()
     return called or (phrase.nominal and (phrase.kind is None or phrase.kind.within_reach))
+
+
+_MOVES: Final = frozenset(VerbKind) - {VerbKind.FIND, VerbKind.CHECK}
+_OVER: Final = "over"
+
+
+def refuse_harm(clauses: Sequence[Clause]) -> None:
+    """Refuse what does harm. Raises RefusalError, which names the clauses that do."""
+    harmful = [spoken_words((clause.verb, *clause.items)) for clause in clauses if clause.verb and _does_harm(clause)]
+    if harmful:
+        raise RefusalError(f"{', '.join(map(repr, harmful))} could hurt somebody or break something", harmful)
+
+
+def _does_harm(clause: Clause) -> bool:
+    words = _harmful()
+    if not isinstance(verb := clause.verb, Verb | Outside):
+        return False
+    said = (verb.text if isinstance(verb, Verb) else verb.word).lower()
+    chunks = [item for item in clause.items if isinstance(item, Chunk) and item.role is not PrepositionRole.FOR]
+    met = [chunk for chunk in chunks if _somebody(chunk.phrase)]
+    if said in words["harms"] or (met and said in words["harms_somebody"]):
+        return True
+    if said in words["throws"]:
+        return any(chunk.preposition in words["flies"] for chunk in chunks) or bool(met)
+    moves = isinstance(verb, Verb) and bool(verb.kinds & _MOVES)
+    over = _OVER if said.endswith(f" {_OVER}") else ""
+    return moves and any((chunk.preposition or over) in words["upon"] for chunk in met)
+
+
+def _somebody(phrase: Phrase) -> bool:
+    """Whether it is somebody, or a part of them."""
+    bare = len(phrase.content) == 1
+    living = phrase.person or phrase.speaker or phrase.stands_for_somebody or (bare and phrase.kind is NounKind.PERSON)
+    owned = not bare or any(token.tag in ("PRP$", "POS") for token in phrase.tokens)
+    return living or (owned and phrase.head.lemma in _harmful()["body"])
+
+
+@cache
+def _harmful() -> Mapping[str, frozenset[str]]:
+    return {name: frozenset(words) for name, words in read_table("harm.yaml").items()}
+
+
+_GO: Final = frozenset({VerbKind.GO})
+_ON_TOP: Final = ("in", "out")
+
+
+def check_ways_and_speaker(clauses: Sequence[Clause], actions: Sequence[Action]) -> None:
+    """Refuse a way that is to be taken, and relations to the speaker but "to me". Raises RefusalError."""
+    for action in actions:
+        for place in action.ways:
+            if place.phrase is None or place.phrase.head.lemma not in _relations()["doors"]:
+                raise _refused("go", place.preposition, place.name)
+    for clause in clauses:
+        act = "go" if isinstance(clause.verb, Verb) and clause.verb.kinds == _GO else "bring"
+        for chunk in clause.items:
+            if isinstance(chunk, Chunk) and chunk.phrase.speaker and not _keeps(act, "person", chunk.preposition):
+                raise _refused(act, chunk.preposition, chunk.phrase.spoken)
+
+
+def check_relation(act: str, kinds: Sequence[str], location: Location) -> None:
+    """Refuse a relation that a command which goes, brings or looks ("go", "bring", "look") does not keep.
+
+    `kinds` is what the place may turn out to be: "room", "surface" or "person". Raises RefusalError.
+    """
+    name = location.phrase
+    if name is None:
+        return
+    groups = _ON_TOP if "surface" in kinds and name.head.lemma.split()[-1] in _relations()["open_tops"] else ()
+    on_top = any(_in(group, location.preposition) for group in groups)
+    if not (on_top or any(_keeps(act, kind, location.preposition) for kind in kinds)):
+        raise _refused(act, location.preposition, name.spoken)
+    around = location.within
+    if around is not None and not _keeps("around", "place", around.preposition):
+        raise _refused("around", around.preposition, around.name)
+
+
+def _refused(act: str, preposition: str, name: str) -> RefusalError:
+    said = f"{preposition} {name}".strip()
+    return RefusalError(f"{_relations()['instead'][act]}, not {said!r}", [said])
+
+
+def _keeps(act: str, kind: str, preposition: str) -> bool:
+    return any(_in(group, preposition) for group in _relations()["kept"][act][kind])
+
+
+def _in(group: str, preposition: str) -> bool:
+    return preposition in _relations()["groups"][group]
+
+
+@cache
+def _relations() -> Mapping[str, Any]:
+    return read_table("relations.yaml")

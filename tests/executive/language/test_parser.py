@@ -4,9 +4,7 @@ import pytest
 import srsly
 from spacy.tokenizer import Tokenizer
 
-from executive.language.english_model import _is_plain
-from executive.language.parser import load_parser
-from executive.language.word_rows import FREQUENT_WORDS, WordRows
+from executive.language.parser import FREQUENT_WORDS, WordRows, _is_plain, load_parser
 
 
 @pytest.fixture(scope="module")

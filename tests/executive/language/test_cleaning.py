@@ -1,7 +1,6 @@
 import pytest
 
-from executive.language.normalise import clean
-from executive.language.rephrasing import rephrased
+from executive.language.cleaning import clean, rephrased
 
 
 @pytest.mark.parametrize(

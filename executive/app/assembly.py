@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from executive.app.goal_conditions import Share, verdict_of
-from executive.app.starts import PlacedRobot
+from executive.app.robots import PlacedRobot
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
 from executive.tree.compiler import CompiledTree

@@ -9,8 +9,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
+from executive.app.prepare import Setting, instead, prepare
+from executive.app.prepared import Prepared, compiled_request
 from executive.app.report import RunReport
-from executive.app.requests import Prepared, commanded, prepare, prepared_for, replacing
+from executive.language.questions import Answerer
 from executive.mission.request import Request
 from executive.record.reader import Event, read_events
 from executive.record.schemas import RUN
@@ -79,7 +81,7 @@ def plant_file(store: MissionStore) -> Path:
 
 def new_run(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Durable:
     """A mission that begins in a fresh world."""
-    if prepared.robots:
+    if prepared.request.robots:
         store.place(mission.id, {name: robot.start for name, robot in prepared.robots.items()})
     return Durable(plant_file(store), _journals(store, mission, prepared), str(mission.id))
 
@@ -88,7 +90,7 @@ def _journals(store: MissionStore, mission: StoredMission, prepared: Prepared) -
     """The journals of a mission's robots; what takes the place of one's part by a correction is kept in its stead."""
     return {
         each.mission.robot_name: store.journal(mission.id, _part_of(each)).replaceable(
-            lambda tree: replacing(mission.request, tree)
+            lambda tree: compiled_request(replace(mission.request, sentence=None, file=None, text=None), tree)
         )
         for each in prepared.all
     }
@@ -96,12 +98,12 @@ def _journals(store: MissionStore, mission: StoredMission, prepared: Prepared) -
 
 def _part_of(prepared: Prepared) -> str | None:
     """The robot under whose name the store keeps a part of a mission; None for the only robot of a run."""
-    return prepared.mission.robot_name if prepared.robots else None
+    return prepared.mission.robot_name if prepared.request.robots else None
 
 
 def next_run(store: MissionStore, mission: StoredMission, prepared: Prepared, before: StoredMission) -> Durable:
     """A mission that begins in the world as another has left it."""
-    if prepared.robots:
+    if prepared.request.robots:
         store.place(mission.id, before.poses)
     return replace(new_run(store, mission, prepared), take_up=True, poses=before.poses)
 
@@ -109,7 +111,7 @@ def next_run(store: MissionStore, mission: StoredMission, prepared: Prepared, be
 def same_world(one: StoredMission, other: StoredMission) -> bool:
     """Whether two missions are to be done by the same robots in one world."""
     a, b = one.request, other.request
-    same = (a.world, a.world_name, a.seed, dict(a.robots)) == (b.world, b.world_name, b.seed, dict(b.robots))
+    same = (a.world, a.world_name, a.seed, frozenset(a.robots)) == (b.world, b.world_name, b.seed, frozenset(b.robots))
     return same and (a.robots or a.robot == b.robot) and (a.scenario, a.variation) == (b.scenario, b.variation)
 
 
@@ -127,19 +129,19 @@ class TakenUp:
         return tuple(line for each in self.recollections for line in each.told)
 
 
-def take_up(store: MissionStore, mission: StoredMission) -> TakenUp:
-    """All that is needed to go on with a mission, each robot from where it was.
+def take_up(store: MissionStore, mission: StoredMission, *, ask: Answerer | None = None) -> TakenUp:
+    """All that is needed to go on with a mission, each robot from where it was; `ask` is that of `prepare`.
 
     Raises:
         InputError: what the store knows of it cannot be read, or its tree is no longer the one that was begun.
     """
-    prepared = prepare(as_it_was(mission, store.path))
+    prepared = prepare(as_it_was(mission, store.path), ask=ask)
     if prepared.request.fingerprint != mission.request.fingerprint:
         raise _other_version(store, mission)
     every = [_with_replacement(store, mission, each) for each in prepared.all]
     memories = [store.memory(mission.id, _part_of(each)) for each in every]
     resumed = [
-        (ended_tree(each.tree, memory) if prepared.robots else None) or resumed_tree(each.tree, memory)
+        (ended_tree(each.tree, memory) if prepared.request.robots else None) or resumed_tree(each.tree, memory)
         for each, memory in zip(every, memories, strict=True)
     ]
     journals = _journals(store, mission, prepared)
@@ -157,12 +159,13 @@ def take_up(store: MissionStore, mission: StoredMission) -> TakenUp:
 def _with_replacement(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Prepared:
     """What a robot is to do, or what has taken its place by a correction. Raises InputError: its tree is another."""
     name = prepared.mission.robot_name
-    instead = mission.instead.get(name)
-    if instead is None:
+    other = mission.instead.get(name)
+    if other is None:
         return prepared
-    asked = replace(prepared.request, name=instead.name, commands=instead.commands, robot=name)
-    own = prepared_for(asked, commanded(asked, prepared.world), prepared.world, prepared.knowledge)
-    if own.request.fingerprint != instead.fingerprint:
+    asked = replace(prepared.request, name=other.name, commands=other.commands, robot=name)
+    commanded = Setting(asked, prepared.world, prepared.knowledge, prepared.robots).commanded()
+    own = instead(replace(prepared, request=asked), commanded)
+    if own.request.fingerprint != other.fingerprint:
         raise _other_version(store, mission)
     return replace(prepared, mission=own.mission, tree=own.tree)
 

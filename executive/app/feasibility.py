@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache, cached_property
-from pathlib import Path
 
-from executive.app.requests import Prepared
+from executive.app.prepared import Prepared
+from executive.app.robots import DEFAULT_KIND, PlacedRobot
 from executive.app.route_cache import route_cache_of
-from executive.app.starts import DEFAULT_KIND
 from executive.app.worlds import refuse_unusable
-from executive.mission.stack_file import load_stack
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
 from executive.tree.estimate import Route, RoutePlanner, load_estimates
 from plant.kinds import robot_kind
@@ -22,17 +20,18 @@ from skills.files.errors import Problems
 from skills.perception.attributes import known_attributes
 from skills.perception.class_forms import class_forms
 from skills.robot import Capabilities, Pose2D
-from skills.stack import RobotStack, default_component
+from skills.stack import default_component
 
 
 class _RoutesOnMap(RoutePlanner):
     """Routes on the robot's map of a world for the robot's footprint; the map is read when the first is asked for.
 
-    A stack plans them with its costmap and planner; None stands for the default one, of which only these are loaded.
+    The costmap and the planner of its stack plan them; of the stack that comes with Errand only these are loaded.
     """
 
-    def __init__(self, world: World, stack: RobotStack | None, kind: str) -> None:
-        self._world, self._stack, self._kind = world, stack, kind
+    def __init__(self, world: World, robot: PlacedRobot) -> None:
+        self._world, self._robot = world, robot
+        self._stack = None if robot.stack_file is None else robot.stack
 
     @cached_property
     def _routes(self) -> PlannedRoutes:
@@ -44,29 +43,25 @@ class _RoutesOnMap(RoutePlanner):
             default_component(slot) if self._stack is None else getattr(self._stack, slot)
             for slot in ("costmap", "planner")
         )
-        return PlannedRoutes(costmap.build(keepout_map), Footprint.of(robot_kind(self._kind).capabilities()), planner)
+        return PlannedRoutes(costmap.build(keepout_map), Footprint.of(self._robot.capabilities), planner)
 
     def route(self, start: Pose2D, goal: Pose2D) -> Route:
         """The route from start to goal. Raises ValueError with one sentence when there is none, InputError."""
         return self._routes.route(start, goal)
 
 
-def route_planner_of(
-    world: World, stack_file: Path | None = None, kind: str = DEFAULT_KIND, *, kept: bool = True
-) -> RoutePlanner:
-    """Routes of a kind of robot on its map of a world, as a stack file has them planned (None: the kind's own stack).
+def route_planner_of(world: World, robot: PlacedRobot, *, kept: bool = True) -> RoutePlanner:
+    """Routes of a robot on its map of a world.
 
     They are `kept` for later processes, or only as long as the planner. When there is no such map, the first route
     raises InputError.
 
     Raises:
-        InputError: with file and line where the stack file cannot be used.
+        InputError: with file and line where its stack file cannot be used.
     """
-    stack_file = stack_file or robot_kind(kind).stack
-    stack = None if stack_file is None else load_stack(stack_file)
-    facts = robot_kind(kind).facts
-    files = (facts,) if stack_file is None else (facts, stack_file)
-    planned = _RoutesOnMap(world, stack, kind)
+    facts = robot_kind(robot.kind).facts
+    files = (facts,) if robot.stack_file is None else (facts, robot.stack_file)
+    planned = _RoutesOnMap(world, robot)
     return route_cache_of(world, planned, *files) if kept else planned
 
 
@@ -76,13 +71,13 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
     Raises:
         InputError: the world's map or the request's stack file cannot be used.
     """
-    world = prepared.world
+    world, robot = prepared.world, prepared.robot
     return check_tree(
         prepared.tree,
         knowledge=prepared.knowledge,
         start=world.start,
-        abilities=_by_sight(abilities_in(world, prepared.kind), prepared.stack_file, prepared.kind),
-        planner=planner or route_planner_of(world, prepared.stack_file, prepared.kind),
+        abilities=_by_sight(abilities_in(world, robot.kind), robot),
+        planner=planner or route_planner_of(world, robot),
         estimates=load_estimates(),
     )
 
@@ -115,15 +110,13 @@ def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
     return replace(abilities, masses_kg=masses, takers=takers, taken_m2=taken_m2, apart_m=rules.rules.clear_m)
 
 
-def _by_sight(abilities: Abilities, stack_file: Path | None, kind: str) -> Abilities:
-    """The abilities with only those classes that the detector of a stack knows. Raises InputError."""
-    file = stack_file or robot_kind(kind).stack
-    stack = None if file is None else load_stack(file)
-    if stack is None or stack.detector == default_component("detector"):
+def _by_sight(abilities: Abilities, robot: PlacedRobot) -> Abilities:
+    """The abilities with only those classes that the detector of the robot's stack knows. Raises InputError."""
+    if robot.stack_file is None or robot.stack.detector == default_component("detector"):
         return abilities
     from executive.app.assembly import shared_detector
 
-    return replace(abilities, classes=abilities.classes & frozenset(shared_detector(stack).class_names))
+    return replace(abilities, classes=abilities.classes & frozenset(shared_detector(robot.stack).class_names))
 
 
 @cache

@@ -9,7 +9,7 @@ from executive.app.auction import Bid
 from executive.app.chain import Chain, Split, soonest, splits
 from executive.app.fleet_missions import FleetMission, with_commands
 from executive.app.fleet_progress import is_plain
-from executive.app.requests import Prepared
+from executive.app.prepared import Prepared
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge, SurfaceFacts
 from skills.files.errors import InputError

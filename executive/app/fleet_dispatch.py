@@ -19,9 +19,9 @@ from executive.app.fleet_report import EndedMission, missions_message, told
 from executive.app.fleet_robots import FleetRobot, Offers
 from executive.app.goal_conditions import Share
 from executive.app.mission_run import entry_for, robot_report
+from executive.app.prepared import Prepared
 from executive.app.report_file import EndedTree
-from executive.app.requests import Prepared
-from executive.app.starts import PlacedRobot
+from executive.app.robots import PlacedRobot
 from executive.mission.scenario import Scenario
 from executive.record.announce import announce
 from executive.record.event_log import EventLog

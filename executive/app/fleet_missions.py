@@ -10,9 +10,9 @@ from executive.app.auction import Bid
 from executive.app.durable import as_it_was
 from executive.app.feasibility import check_prepared
 from executive.app.goal_conditions import Share
-from executive.app.requests import Prepared, prepare_alone, prepared_for
-from executive.app.several import prepared_part, understood_for_robots
-from executive.app.starts import PlacedRobot, knowledge_for
+from executive.app.prepare import Setting, instead, prepare_alone
+from executive.app.prepared import Prepared
+from executive.app.robots import PlacedRobot
 from executive.language.robots import Part, Whom
 from executive.mission.mission import mission_from_lines
 from executive.mission.request import Request
@@ -101,15 +101,15 @@ def _options(
         hint = f"run those of {request.world_name} in a run of their own"
         raise InputError(f"it is for the world {request.world_name}, and this run is in {world.name}", hint=hint)
     if request.sentence is not None:
-        meant = understood_for_robots(request, robots, knowledge, None)
+        setting = Setting(request, world, _patient(knowledge), robots)
+        meant = setting.understood()
         meanings = [part.meaning for part in meant.parts]
-        named = _named(meant.parts, robots)
-        patient = _patient(knowledge)
-        return {name: prepared_part(name, meanings, request, world, patient, robots) for name in named}
-    filed = prepare_alone(as_it_was(stored, store.path))
-    if filed.world.seed_rules != world.seed_rules:
+        return {name: setting.part(name, meanings) for name in _named(meant.parts, robots)}
+    alone = prepare_alone(as_it_was(stored, store.path))
+    if alone.world.seed_rules != world.seed_rules:
         raise InputError("its file brings objects into the world", hint="run it by `errand run`")
-    return {name: _for_robot(name, filed, world, robots) for name in robots}
+    setting = Setting(alone.request, world, _patient(alone.knowledge), robots)
+    return {name: setting.for_robot(name).compiled(replace(alone.mission, robot_name=name)) for name in robots}
 
 
 def _named(parts: Sequence[Part], robots: Mapping[str, PlacedRobot]) -> tuple[str, ...]:
@@ -118,14 +118,6 @@ def _named(parts: Sequence[Part], robots: Mapping[str, PlacedRobot]) -> tuple[st
     if len(named) > 1 or (Whom.ALL in named and len(robots) > 1):
         raise InputError("it is for several robots at once", hint="queue a mission for each of them")
     return tuple(name for name in robots if not named or name in named or Whom.ALL in named)
-
-
-def _for_robot(name: str, filed: Prepared, world: World, robots: Mapping[str, PlacedRobot]) -> Prepared:
-    robot = robots[name]
-    known = knowledge_for(name, robot, robots, _patient(filed.knowledge))
-    own = replace(world, start=robot.start, dock=robot.dock)
-    mission = replace(filed.mission, robot_name=name)
-    return replace(prepared_for(filed.request, mission, own, known), kind=robot.kind, robots=robots)
 
 
 def rest_of(prepared: Prepared, done: int) -> Prepared:
@@ -143,8 +135,7 @@ def with_commands(prepared: Prepared, commands: Sequence[Command]) -> Prepared:
     """A mission of plain commands with others in their place. Raises InputError: they cannot be carried out."""
     (step,) = prepared.mission.steps
     mission: Mission = replace(prepared.mission, steps=(replace(step, commands=tuple(commands)),))
-    other = prepared_for(prepared.request, mission, prepared.world, prepared.knowledge)
-    return replace(other, kind=prepared.kind, robots=prepared.robots)
+    return instead(prepared, mission)
 
 
 def _patient(knowledge: Knowledge) -> Knowledge:
@@ -155,21 +146,12 @@ def _patient(knowledge: Knowledge) -> Knowledge:
 
 def charging_missions(world: World, knowledge: Knowledge, robots: Mapping[str, PlacedRobot]) -> Mapping[str, Prepared]:
     """What each robot does to charge; one without a dock is not among them."""
-    docks = {name: robot for name, robot in robots.items() if robot.dock is not None}
     line = str(Command(task=Task.CHARGE))
+    setting = Setting(Request(commands=(line,), world_name=world.name), world, _patient(knowledge), robots)
     return {
-        name: _for_robot(
-            name,
-            prepared_for(
-                Request(commands=(line,), world_name=world.name),
-                mission_from_lines((line,), world=world.name, robot_name=name),
-                replace(world, dock=robot.dock),
-                knowledge_for(name, robot, robots, knowledge),
-            ),
-            world,
-            robots,
-        )
-        for name, robot in docks.items()
+        name: setting.for_robot(name).compiled(mission_from_lines((line,), world=world.name, robot_name=name))
+        for name, robot in robots.items()
+        if robot.dock is not None
     }
 
 

@@ -13,8 +13,8 @@ from executive.app.auction import Bid
 from executive.app.feasibility import route_planner_of
 from executive.app.fleet_missions import FleetMission, RobotNow, bid_for, is_way
 from executive.app.fleet_progress import Progress, ProgressJournal
-from executive.app.requests import Prepared
-from executive.app.starts import PlacedRobot
+from executive.app.prepared import Prepared
+from executive.app.robots import PlacedRobot
 from executive.run.runner import RunEntry
 from executive.tree.estimate import RoutePlanner
 from executive.words.knowledge import BatteryFacts, SurfaceFacts
@@ -81,7 +81,7 @@ class Offers:
         robot = self._robots[name]
         if robot.planner is None:
             some = wanted.options.get(name, next(iter(wanted.options.values())))
-            robot.planner = route_planner_of(some.world, some.request.stack, robot.placed.kind, kept=False)
+            robot.planner = route_planner_of(some.world, robot.placed, kept=False)
         now = RobotNow(robot.pose, robot.charge, self._battery.low, robot.planner, robot.dock)
         if resting and robot.dock is not None:
             now = replace(now, pose=robot.dock.world.dock or robot.pose, charge=self._battery.charged)

@@ -9,7 +9,7 @@ from executive.app.artifacts import Artifacts
 from executive.app.fleet_dispatch import FleetDispatch
 from executive.app.fleet_report import mission_rows, told, write_fleet_report
 from executive.app.page_view import PageView, log_map
-from executive.app.requests import Prepared
+from executive.app.prepared import Prepared
 from executive.app.signals import cancelled_by_signals, ended_by_signals
 from executive.record.event_log import EventLog
 from executive.record.reader import read_events

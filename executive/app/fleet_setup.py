@@ -9,12 +9,12 @@ from rich.console import Console
 
 from executive.app.fleet_dispatch import FleetDispatch
 from executive.app.fleet_missions import FleetMission, charging_missions, fleet_mission
-from executive.app.simulated import SimulatedBackend
-from executive.app.starts import placed_robots
+from executive.app.robots import placed_robots
+from executive.app.simulated import SimulatedBackend, compile_first
 from executive.app.worlds import knowledge_of, open_world
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 from plant.worlds.world import World
 from skills.files.errors import InputError, Problems
 
@@ -24,7 +24,7 @@ __all__ = ["simulated_fleet"]
 def simulated_fleet(
     store: MissionStore,
     queued: Sequence[StoredMission],
-    setups: Mapping[str, RobotSetup],
+    configs: Sequence[RobotConfig],
     *,
     world: str | None = None,
     seed: int = 1,
@@ -42,7 +42,7 @@ def simulated_fleet(
     """
     where = _world_of(queued) if world is None else open_world(world)
     knowledge = knowledge_of(where)
-    robots = placed_robots(where, knowledge, setups)
+    robots = placed_robots(where, knowledge, configs)
     given = GivenMissions(store).all()
     missions, left_out = dict[int, FleetMission](), Problems()
     for each in queued:
@@ -62,8 +62,6 @@ def simulated_fleet(
                 console.print(f"It is left out of this run: {error}", markup=False)
     if not missions:
         left_out.raise_any()
-    from executive.app.kernels import compile_first
-
     compile_first()
     return FleetDispatch(
         store,

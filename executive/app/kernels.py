@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,20 +9,19 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 import numpy as np
-import typer
 from numba.core.dispatcher import Dispatcher
 
 from executive.app.mission_run import run_request
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
+from executive.app.robots import DEFAULT_KIND, only_robot
 from executive.app.simulated import SimulatedBackend
-from executive.app.starts import DEFAULT_KIND, alone
 from executive.app.worlds import open_world
 from executive.mission.request import Request
+from executive.words.robots import RobotConfig
 from executive.words.steps import DEFAULT_WORLD
 from skills.estimate.compiled import CompiledFunction
-from skills.navigate.lattice import search
 
-__all__ = ["compile_first", "compile_kernels", "newly_compiled"]
+__all__ = ["compile_kernels", "newly_compiled"]
 
 _MISSION: Final = """
 name: warm up
@@ -49,14 +47,6 @@ _DRIVEN_S: Final = 2.5
 _SURVEYED_S: Final = 4.0
 
 
-def compile_first() -> None:
-    """Run `errand warm-up` where nothing was compiled yet, and say so on standard error."""
-    if any(_cache_folder().glob("lattice.search-*.nbi")):
-        return
-    typer.echo("errand: compiles its numeric code for this machine, once; that takes about half a minute", err=True)
-    subprocess.run([sys.executable, "-m", "executive.cli", "warm-up"], stdout=subprocess.DEVNULL, check=False)
-
-
 def newly_compiled() -> int:
     """How many functions this process compiled that numba's cache did not hold."""
     modules = [module for name, module in sys.modules.items() if name.startswith(("skills.", "plant."))]
@@ -67,11 +57,6 @@ def newly_compiled() -> int:
 
 def _is_code(value: object) -> bool:
     return isinstance(value, Dispatcher) or (isinstance(value, CompiledFunction) and value.is_compiled)
-
-
-def _cache_folder() -> Path:
-    """Where numba keeps the planner's search."""
-    return Path(search.machine_code.stats.cache_path)  # type: ignore[attr-defined]
 
 
 def compile_kernels() -> None:
@@ -96,9 +81,9 @@ def _begin(drive: _Drive, folder: Path) -> None:
     if drive.stack is not None:
         stack = folder / "stack.yaml"
         stack.write_text(drive.stack, encoding="utf-8")
-    prepared = prepare(Request(file=mission, out=folder, record=False, time_limit_s=_DRIVEN_S), ask=None)
-    robots = {prepared.mission.robot_name: alone(prepared.world, stack=stack, kind=drive.kind)}
-    run_request(prepared, SimulatedBackend(prepared.world, robots, seed=1, record=False))
+    robots = (RobotConfig("Alice", drive.kind, stack=stack),)
+    prepared = prepare(Request(file=mission, out=folder, record=False, time_limit_s=_DRIVEN_S, robots=robots))
+    run_request(prepared, SimulatedBackend(prepared.world, prepared.robots, seed=1, record=False))
 
 
 def _search() -> None:
@@ -148,7 +133,7 @@ def _survey() -> None:
     from skills.mapping.survey import Survey
 
     world, name = open_world(DEFAULT_WORLD), "Alice"
-    simulation = simulate(world, {name: alone(world)}, seed=1, record=False)
+    simulation = simulate(world, {name: only_robot(name, world)}, seed=1, record=False)
     robot, clock, mapper = simulation.robots[name], simulation.clock, Mapper(world.start)
     survey = Survey(robot, robot.acquire_lease("errand warm-up"), mapper, home=world.start)
     while clock.now() < _SURVEYED_S and not survey.done:

@@ -13,10 +13,10 @@ from executive.app.goal_conditions import Share
 from executive.app.happening_log import HappeningLog
 from executive.app.page_view import PageView, log_map
 from executive.app.preload import preload
+from executive.app.prepared import Prepared
 from executive.app.profiling import profiled
 from executive.app.report import RefereeReport, RobotReport, RunReport
 from executive.app.report_file import EndedTree, write_report
-from executive.app.requests import Prepared
 from executive.app.signals import HUNG_UP, cancelled_by_signals
 from executive.mission.request import Request
 from executive.record.announce import announce
@@ -70,7 +70,7 @@ def run_request(
     scenario = prepared.request.scenario
     entries = [entry_for(each, backend, durable, work) for each in prepared.all]
     spare = _spare(prepared, backend)
-    log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock, apart=len(prepared.robots) > 1)
+    log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock, apart=prepared.several)
     if listener is not None:
         log.listen(listener)
     artifacts = Artifacts(log)
@@ -79,7 +79,7 @@ def run_request(
             page.begin(log, backend.show_live())
         log_map(log, prepared)
         world, seed = prepared.world.name, prepared.request.seed
-        kinds = {name: robot.kind for name, robot in prepared.robots.items()} if len(prepared.robots) > 1 else {}
+        kinds = {name: robot.kind for name, robot in prepared.robots.items()} if prepared.several else {}
         for each in prepared.all:
             lines = scenario.lines()
             announce(log, clock, each.tree, each.knowledge, world=world, seed=seed, scenario=lines, robots=kinds)
@@ -169,15 +169,15 @@ def _judged(
     views = {each.robot_name: node_view(trees[each.robot_name].root, each.states) for each in result.robots}
     ended = [EndedTree(trees[name], view, robots[name]) for name, view in views.items()]
     report = _report(prepared, robots[worst], result, log=str(log.path))
-    return Finished(replace(report, robots=robots) if prepared.robots else report, views[worst]), ended
+    return Finished(replace(report, robots=robots) if prepared.request.robots else report, views[worst]), ended
 
 
 def _robot_report(name: str, shares: Mapping[str, Share], backend: Backend, prepared: Prepared) -> RobotReport:
     """What one robot did; what the others moved in the same run was moved by the mission, too."""
-    robot, own = prepared.robots.get(name), shares[name]
+    own = shares[name]
     others = [share for other, share in shares.items() if other != name]
     seen = backend.judge(own.tree, own.result, before=others)
-    return robot_report(own.result, own.tree, prepared.kind if robot is None else robot.kind, seen)
+    return robot_report(own.result, own.tree, prepared.robots[name].kind, seen)
 
 
 def robot_report(ended: RobotResult, tree: CompiledTree, kind: str, seen: RefereeReport | None) -> RobotReport:

@@ -12,7 +12,8 @@ from rich.console import Console
 from executive.app.backend import Scene
 from executive.app.feasibility import refuse_impossible
 from executive.app.mission_files import shipped_missions
-from executive.app.requests import Prepared, prepare
+from executive.app.prepare import prepare
+from executive.app.prepared import Prepared
 from executive.app.talk import Talk, load_ahead
 from executive.conversation import ReplyKind
 from executive.mission.file.parameters import given_values

@@ -14,8 +14,8 @@ from py_trees.common import Status
 
 from executive.app.artifacts import Artifacts, detection_picture, file_name, to_jpeg
 from executive.app.picture_files import read_picture
+from executive.app.prepared import Prepared
 from executive.app.report import VERDICTS, RobotReport, RunReport, counts_text
-from executive.app.requests import Prepared
 from executive.record.reader import Event
 from executive.record.schemas import TRANSITIONS
 from executive.run.outcome import Outcome
@@ -83,7 +83,7 @@ def write_report(
 
     `ended` are the robots' trees, `events` are those of the run's log, `artifacts` has the run's pictures.
     """
-    out, several = prepared.request.out, len(prepared.robots) > 1
+    out, several = prepared.request.out, prepared.several
     names = tuple(prepared.robots)
     for each in ended:
         (out / f"{file_name(TREE, each.tree.robot_name, names)}.svg").write_text(each.picture, encoding="utf-8")

@@ -19,7 +19,7 @@ from skills.faults.words import random_faults
 from skills.files.errors import InputError
 from skills.robot import FloatArray
 
-__all__ = ["with_happenings", "with_scenario"]
+__all__ = ["with_events", "with_scenario"]
 
 DIRECTIONS: Final = 36
 _STEP_M: Final = 0.01
@@ -48,7 +48,7 @@ def with_scenario(request: Request, world: World, knowledge: Knowledge) -> Reque
     return replace(request, scenario=scenario.with_drawn(drawn), scenario_files=())
 
 
-def with_happenings(world: World, scenario: Scenario) -> World:
+def with_events(world: World, scenario: Scenario) -> World:
     """The world in which the scenario's events happen. Raises InputError: it has changed, and they fit no longer."""
     try:
         walking = world.with_walks({name: RouteRule.model_validate(each) for name, each in scenario.people.items()})

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import logging
+import subprocess
+import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Final
 
 from executive.app.artifacts import Artifacts, draw_artifacts
 from executive.app.assembly import judge, run_entry, simulate, take_up_plant
@@ -13,9 +17,9 @@ from executive.app.durable import Durable
 from executive.app.goal_conditions import Share
 from executive.app.mission_run import Finished, run_request
 from executive.app.page_view import PageView
+from executive.app.prepared import Prepared
 from executive.app.report import RefereeReport
-from executive.app.requests import Prepared
-from executive.app.starts import PlacedRobot, alone
+from executive.app.robots import PlacedRobot
 from executive.record.event_log import Listener
 from executive.record.profile import Profile
 from executive.run.control import Control
@@ -29,9 +33,12 @@ from plant.referee import Referee
 from plant.simulation import Simulation
 from plant.worlds.world import World
 from skills.files.errors import InputError
+from skills.navigate.lattice import search
 from skills.robot import Clock
 
-__all__ = ["SimulatedBackend", "run_simulated"]
+__all__ = ["SimulatedBackend", "compile_first", "run_simulated"]
+
+_LOG: Final = logging.getLogger(__name__)
 
 
 class SimulatedBackend:
@@ -148,13 +155,11 @@ def run_simulated(
     listener: Listener | None = None,
 ) -> Finished:
     """Run a request in the plant, as `run_request` does. Raises InputError: the world cannot be used."""
-    from executive.app.kernels import compile_first
-
     compile_first()
     request = prepared.request
     backend = SimulatedBackend(
         prepared.world,
-        robots_of(prepared),
+        prepared.robots,
         seed=request.seed,
         record=request.record,
         variation=request.variation,
@@ -172,16 +177,24 @@ def run_simulated(
     )
 
 
-def robots_of(prepared: Prepared) -> Mapping[str, PlacedRobot]:
-    """The robots of a request: those that it names, or the one that its mission is for. Raises InputError."""
-    if prepared.robots:
-        return prepared.robots
-    request, name = prepared.request, prepared.mission.robot_name
-    return {name: alone(prepared.world, seed=request.seed, stack=request.stack, start=request.start)}
-
-
 def spoken_classes(prepared: Prepared) -> frozenset[str]:
     """The classes of the objects that a mission speaks of; clutter is of none of them."""
     named = {each.name for command in prepared.tree.commands for each in (command.item, command.object) if each}
     known = prepared.knowledge
     return frozenset(one for name in named for one in known.classes(known.thing(name) or name))
+
+
+def compile_first(cache: Path | None = None) -> None:
+    """Has `errand warm-up` compile the numeric code, and warns that it takes a while, where a cache holds none of it.
+
+    `cache` is numba's folder for the planner's search unless another is given.
+    """
+    if any((cache or _kernel_cache()).glob("lattice.search-*.nbi")):
+        return
+    _LOG.warning("errand: compiles its numeric code for this machine, once; that takes about half a minute")
+    subprocess.run([sys.executable, "-m", "executive.cli", "warm-up"], stdout=subprocess.DEVNULL, check=False)
+
+
+def _kernel_cache() -> Path:
+    """Where numba keeps the planner's search."""
+    return Path(search.machine_code.stats.cache_path)  # type: ignore[attr-defined]

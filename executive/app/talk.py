@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 
 from executive.app.feasibility import refuse_impossible
-from executive.app.requests import Prepared
+from executive.app.prepared import Prepared
 from executive.conversation import Conversation, Reply, ReplyKind, Speech
 from executive.conversation.parts import Waiting
 from executive.language.followups import remark_of

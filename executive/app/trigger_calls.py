@@ -11,7 +11,7 @@ from typing import Any
 
 from executive.app.durable import as_it_was
 from executive.app.feasibility import refuse_impossible
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.mission.file.parameters import values_in_json
 from executive.mission.request import Request
 from executive.store.missions import MissionStore, StoredMission
@@ -74,7 +74,7 @@ def _request(store: MissionStore, standing: StandingMission, body: bytes) -> Req
         if not values:
             return standing.request
         before = as_it_was(mission, store.path)
-        prepared = prepare(replace(before, given={**before.given, **values}), ask=None)
+        prepared = prepare(replace(before, given={**before.given, **values}))
         refuse_impossible(prepared)
     except InputError as error:
         raise CallError(HTTPStatus.BAD_REQUEST, str(error)) from error

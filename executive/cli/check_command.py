@@ -14,7 +14,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from executive.app.feasibility import check_prepared, route_planner_of
-from executive.app.requests import Prepared, prepare
+from executive.app.prepare import prepare
+from executive.app.prepared import Prepared
 from executive.app.worlds import refuse_unusable
 from executive.cli.output import BAD_INPUT, console_for, print_json, refusals
 from executive.cli.run_options import ROBOTS, SET, START, robots_of
@@ -65,7 +66,7 @@ class Checker:
         """Check one file; raises nothing for what stands in it."""
         trees: tuple[CompiledTree, ...] = ()
         try:
-            prepared = prepare(replace(self._like, file=file), ask=None)
+            prepared = prepare(replace(self._like, file=file))
             trees = tuple(each.tree for each in prepared.all)
             refuse_unusable(prepared.world)
             checked = {each.mission.robot_name: check_prepared(each, self._planner(each)) for each in prepared.all}
@@ -80,10 +81,10 @@ class Checker:
         return CheckedFile(file, _placed(file, errors), trees, _of_all(prepared, estimates), warnings)
 
     def _planner(self, prepared: Prepared) -> RoutePlanner:
-        world, stack = prepared.world, prepared.stack_file
-        key = (world.folder, prepared.kind, stack)
+        world, robot = prepared.world, prepared.robot
+        key = (world.folder, robot.kind, robot.stack_file)
         if key not in self._routes:
-            self._routes[key] = route_planner_of(world, stack, prepared.kind)
+            self._routes[key] = route_planner_of(world, robot)
         return self._routes[key]
 
 

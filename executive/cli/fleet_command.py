@@ -24,7 +24,7 @@ from executive.cli.run_options import (
 from executive.cli.serve_command import AsJson
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.words.robots import display_name, robot_called
+from executive.words.robots import robot_called
 from skills.files.errors import InputError
 from skills.files.outside import is_folder
 from skills.quantities import Seed
@@ -78,13 +78,13 @@ def run(
         from executive.app.fleet_setup import simulated_fleet
         from executive.app.page_view import PageView
 
-        setups, queued = robots_of(robots), _to_do(missions)
-        faults = _faults(fault or (), tuple(map(display_name, setups)))
+        configs, queued = robots_of(robots), _to_do(missions)
+        faults = _faults(fault or (), [each.name for each in configs])
         lines = None if quiet else console
         dispatch = simulated_fleet(
             missions,
             queued,
-            setups,
+            configs,
             world=world,
             seed=seed,
             faults=faults,

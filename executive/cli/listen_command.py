@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
-from types import MappingProxyType
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -29,13 +28,12 @@ from executive.speech.vocabulary import Vocabulary, of_world, read_vocabulary
 from executive.speech.voice import Voice, installed_voice
 from executive.speech.whisper import load_whisper
 from executive.words.knowledge import Knowledge
-from executive.words.robots import RobotSetup, display_name
+from executive.words.robots import RobotConfig, display_name
 from executive.words.steps import DEFAULT_WORLD
 from skills.files.errors import InputError, listing
 
 __all__ = ["answer_line", "called_robots", "hear_request", "heard_sentence", "listen", "listener_for", "show_hearing"]
 
-NO_ROBOTS: Final[Mapping[str, RobotSetup]] = MappingProxyType({})
 _METER_WIDTH = 24
 _QUIETEST_DB = -60.0
 
@@ -117,9 +115,9 @@ def listener_for(
     return Listener(load_whisper(), load_detector, reader, spoken_phrases(heard))
 
 
-def called_robots(robots: Mapping[str, RobotSetup], knowledge: Knowledge) -> tuple[str, ...]:
+def called_robots(robots: Sequence[RobotConfig], knowledge: Knowledge) -> tuple[str, ...]:
     """The names of several robots as people say them: those that are given, else those that the world names."""
-    return tuple(map(display_name, robots or knowledge.robots or ()))
+    return tuple(each.name for each in robots) or tuple(map(display_name, knowledge.robots or ()))
 
 
 def heard_sentence(wav: Path, listener: Listener) -> str:
@@ -141,7 +139,7 @@ def hear_request(
     world: str | None,
     require_wake: bool,
     console: Console,
-    robots: Mapping[str, RobotSetup] = NO_ROBOTS,
+    robots: Sequence[RobotConfig] = (),
 ) -> str:
     """The sentence in a recording, shown on the console; `other` is what else was asked for, which must be nothing.
 

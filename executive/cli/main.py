@@ -18,7 +18,8 @@ from executive.app.evaluate.seeds import seed_range
 from executive.app.feasibility import refuse_impossible
 from executive.app.mission_run import Finished
 from executive.app.page_view import PageView, queueing
-from executive.app.requests import Prepared, prepare
+from executive.app.prepare import prepare
+from executive.app.prepared import Prepared
 from executive.app.simulated import run_simulated
 from executive.cli.listen_command import hear_request
 from executive.cli.number_options import quantity_option
@@ -55,6 +56,7 @@ from executive.cli.sweep import (
     sweep,
     totals,
 )
+from executive.cli.terminal import terminal_answerer
 from executive.language.questions import QuestionPolicy
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
@@ -286,7 +288,7 @@ def _disturbed(
 
 def _prepared(asked: Request, *, anyway: bool) -> Prepared:
     """The request understood, and refused where it cannot be done. Raises InputError."""
-    prepared = prepare(asked)
+    prepared = prepare(asked, ask=terminal_answerer())
     if not anyway:
         refuse_impossible(prepared)
     return prepared

@@ -71,7 +71,7 @@ def build(
         opened = open_world(world) if people else open_world(world).without_people()
         points = None if route is None else _route_points(route)
         mapper = _mapper(opened, out)
-        from executive.app.kernels import compile_first
+        from executive.app.simulated import compile_first
 
         compile_first()
         building = _Building(opened, seed, mapper, points, out, console)
@@ -100,7 +100,7 @@ class _Building:
         console: Console,
     ) -> None:
         from executive.app.assembly import simulate
-        from executive.app.starts import alone
+        from executive.app.robots import only_robot
         from skills.geometry import compose
         from skills.mapping.survey import Survey
         from skills.robot import Pose2D
@@ -108,7 +108,9 @@ class _Building:
         self._mapper, self._out, self._console = mapper, out, console
         self._seed, self._world = seed, world
         self._name = "Alice"
-        self._simulation: Simulation = simulate(world, {self._name: alone(world)}, seed=seed, record=False)
+        self._simulation: Simulation = simulate(
+            world, {self._name: only_robot(self._name, world)}, seed=seed, record=False
+        )
         self._robot = self._simulation.robots[self._name]
         route = None
         if points is not None:

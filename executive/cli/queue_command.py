@@ -12,12 +12,13 @@ from typing import Annotated, Any
 import typer
 
 from executive.app.durable import STORE
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.run_options import ROBOTS, SET, robots_of
 from executive.cli.serve_command import AsJson, Out, Store, serve
 from executive.cli.stack_command import STACK
+from executive.cli.terminal import terminal_answerer
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
@@ -90,7 +91,7 @@ def add(
         values = given_values(given or ())
         asked = Request(say, file, world, wake, seed=seed, out=out, record=not no_record, stack=stack, given=values)
         asked = replace(asked, robots=robots_of(robots))
-        prepared = prepare(asked)
+        prepared = prepare(asked, ask=terminal_answerer())
         if not anyway:
             from executive.app.feasibility import refuse_impossible
 

@@ -13,9 +13,11 @@ from rich.console import Console
 
 from executive.app.durable import Durable, as_it_was, kept, new_run, next_run, plant_file, same_world, take_up
 from executive.app.memory import return_memory
-from executive.app.requests import Prepared, prepare
+from executive.app.prepare import prepare
+from executive.app.prepared import Prepared
 from executive.app.simulated import run_simulated
 from executive.cli.shown import control_for, show_files, show_run
+from executive.cli.terminal import terminal_answerer
 from executive.run.control import Control
 from executive.store.database import StoreError
 from executive.store.missions import MissionState, MissionStore, StoredMission
@@ -137,7 +139,7 @@ def go_on(
     if not missions.has_steps(mission.id):
         console.print(f"Mission {mission.id} ({name}) had not begun; it begins now.", markup=False)
         return start_of(missions, mission, console, quiet=quiet, control=control)
-    taken = take_up(missions, mission)
+    taken = take_up(missions, mission, ask=terminal_answerer())
     console.print(f"Mission {mission.id} ({name}) goes on.", markup=False)
     prepared = _in_its_folder(mission, taken.prepared)
     result = run_kept(missions, mission, prepared, taken.durable, console, quiet=quiet, control=control)
@@ -155,7 +157,7 @@ def start_of(
     Raises:
         InputError: its file, its world or the plant's state cannot be used.
     """
-    prepared = _in_its_folder(mission, prepare(as_it_was(mission, missions.path)))
+    prepared = _in_its_folder(mission, prepare(as_it_was(mission, missions.path), ask=terminal_answerer()))
     before = _before(missions, mission) if mission.queued else None
     durable = new_run(missions, mission, prepared) if before is None else next_run(missions, mission, prepared, before)
     console.print(f"Mission {mission.id}: {mission.request.name}", markup=False, style="bold")

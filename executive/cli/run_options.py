@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,7 +17,7 @@ from executive.words.variation import Clutter, Friction, MorePeople
 from skills.quantities import LongDuration, Port, QuantityError, Wait, clock_text
 
 if TYPE_CHECKING:
-    from executive.words.robots import RobotSetup
+    from executive.words.robots import RobotConfig
     from skills.robot import Pose2D
 
 __all__ = [
@@ -127,12 +127,12 @@ def time_of_day(text: str | None) -> str | None:
         raise InputError(f"--time-of-day {text}: {error.what}", hint=error.hint) from error
 
 
-def robots_of(text: str | None) -> Mapping[str, RobotSetup]:
+def robots_of(text: str | None) -> tuple[RobotConfig, ...]:
     """The robots of the option. Raises InputError: they are none, or of a kind that is not installed."""
     from executive.words.robots import parse_robots
     from plant.kinds import robot_kinds
 
-    return {} if text is None else parse_robots(text, robot_kinds())
+    return () if text is None else parse_robots(text, robot_kinds())
 
 
 def start_pose(text: str | None) -> Pose2D | None:

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from executive.app.durable import STORE
 from executive.app.mission_run import Finished, both
-from executive.app.requests import Prepared
+from executive.app.prepared import Prepared
 from executive.app.talk import Talk, load_ahead
 from executive.cli.live import live_view
 from executive.language.parser import load_parser
@@ -89,7 +89,7 @@ def show_run(
     for line in (*prepared.request.scenario.lines(), *prepared.request.variation.lines()):
         console.print(f"Scenario: {line}", markup=False)
     for each in prepared.all:
-        to = f"{each.mission.robot_name}: " if prepared.robots else ""
+        to = f"{each.mission.robot_name}: " if prepared.request.robots else ""
         for command in each.mission.commands:
             console.print(f"{to}{command}", markup=False)
     elsewhere, talk = talk is not None, talk or Talk(prepared, control)

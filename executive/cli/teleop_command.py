@@ -15,8 +15,8 @@ import typer
 from executive.app.assembly import simulate
 from executive.app.backend import Scene
 from executive.app.page_view import scene_actions
+from executive.app.robots import only_robot
 from executive.app.saved_pose import save_pose
-from executive.app.starts import alone
 from executive.app.worlds import open_world, refuse_blocked
 from executive.cli.keys import keys_pressed
 from executive.cli.number_options import quantity_option
@@ -61,10 +61,10 @@ def teleop(
         if not _NAME.fullmatch(robot):
             raise InputError(f"'{robot[:60]}' is no name for a robot", hint="use letters and digits, as in Alice")
         opened = open_world(world)
-        placed = alone(opened, seed=seed, start=None if start is None else Start.of(start))
+        placed = only_robot(robot, opened, seed=seed, start=None if start is None else Start.of(start))
         if start is not None:
             refuse_blocked(opened, placed.start)
-        from executive.app.kernels import compile_first
+        from executive.app.simulated import compile_first
 
         compile_first()
         simulation = simulate(opened, {robot: placed}, seed=seed, record=False)

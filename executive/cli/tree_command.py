@@ -13,9 +13,10 @@ from typing import Annotated, Final
 import typer
 
 from executive.app.mission_files import shipped_missions
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.cli.number_options import quantity_option
 from executive.cli.output import refusals
+from executive.cli.terminal import terminal_answerer
 from executive.mission.request import Request
 from executive.record.history import read_history
 from executive.tree.node_view import NodeView, node_view, to_json
@@ -94,7 +95,7 @@ def _view(text: str | None, say: str | None, world: str | None, at_s: float | No
     if at_s is not None or robot is not None:
         option = "--at" if robot is None else "--robot"
         raise InputError(f"{option} is for logs", hint="name a log.mcap that a run has written")
-    prepared = prepare(_request(text, say, world))
+    prepared = prepare(_request(text, say, world), ask=terminal_answerer())
     for each in prepared.all:
         for note in each.mission.notes:
             typer.echo(note, err=True)

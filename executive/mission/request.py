@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from executive.language.questions import QuestionPolicy
 from executive.mission.scenario import NO_SCENARIO, Scenario
-from executive.words.robots import RobotSetup, pose_in
+from executive.words.robots import RobotConfig, pose_in
 from executive.words.variation import NO_VARIATION, Variation
 from skills.files.errors import InputError
 from skills.files.outside import is_there
@@ -59,7 +59,7 @@ class Request:
     folder of the map that it has in place of the world's own. `scenario` is what goes wrong and happens meanwhile, and
     `scenario_files` hold more of it; `variation` is how the world differs from what its files say.
 
-    `robots` are those of a run with several, or with one of another kind or start than the world's, by their names.
+    `robots` are those of a run with several, or with one of another kind or start than the world's.
 
     The run begins at `time_of_day` ("14:30"; None: what it is) and is ended after `time_limit_s` (None: as usual).
 
@@ -86,7 +86,7 @@ class Request:
     given: Mapping[str, Any] = field(default_factory=dict)
     time_of_day: str | None = None
     time_limit_s: float | None = None
-    robots: Mapping[str, RobotSetup] = field(default_factory=dict)
+    robots: tuple[RobotConfig, ...] = ()
     name: str = ""
     world_name: str = ""
     robot: str = ""
@@ -114,10 +114,9 @@ class Request:
         world = self.world if self.world is None or not is_there(Path(self.world)) else str(Path(self.world).resolve())
         stack = None if self.stack is None else self.stack.resolve()
         own_map = None if self.map is None else self.map.resolve()
-        robots = {
-            name: robot if robot.stack is None else replace(robot, stack=robot.stack.resolve())
-            for name, robot in self.robots.items()
-        }
+        robots = tuple(
+            robot if robot.stack is None else replace(robot, stack=robot.stack.resolve()) for robot in self.robots
+        )
         return replace(self, file=file, world=world, out=self.out.resolve(), stack=stack, map=own_map, robots=robots)
 
 

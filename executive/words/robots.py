@@ -6,7 +6,6 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
@@ -20,7 +19,7 @@ from skills.robot import Pose2D
 __all__ = [
     "EVERYBODY",
     "NamedRobot",
-    "RobotSetup",
+    "RobotConfig",
     "RobotsFile",
     "checked_kind",
     "checked_name",
@@ -42,14 +41,15 @@ _NUMBER: Final = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?\s*", re.
 
 
 @dataclass(frozen=True)
-class RobotSetup:
-    """One robot of a run.
+class RobotConfig:
+    """One robot of a run, by its name as people read it.
 
     `kind` is a name of the entry-point group `errand.robots`; the robot begins at `start` (world frame), charges at the
     place `dock` and uses the components of the file `stack`. What is None is as the world says, or the kind. A file
     names it at `source`.
     """
 
+    name: str
     kind: str
     start: Pose2D | None = None
     dock: str | None = None
@@ -132,15 +132,13 @@ def checked_kind(kind: str, kinds: Collection[str]) -> str:
     return kind
 
 
-def parse_robots(text: str, kinds: Collection[str]) -> Mapping[str, RobotSetup]:
+def parse_robots(text: str, kinds: Collection[str]) -> tuple[RobotConfig, ...]:
     """The robots of the option `--robots`, in its order: "alice=spot,bob=fetch" or "alice=spot@1.0,2.0,1.57,bob=fetch".
-
-    Names stay as they are written.
 
     Raises:
         InputError: there is none, two have one name, a name or start is none, or a kind is not among `kinds`.
     """
-    robots: dict[str, RobotSetup] = {}
+    robots: dict[str, RobotConfig] = {}
     for said in _entries(text):
         match = _ASSIGNED.fullmatch(said)
         if match is None:
@@ -149,36 +147,37 @@ def parse_robots(text: str, kinds: Collection[str]) -> Mapping[str, RobotSetup]:
         if (double := same_name(name, robots)) is not None:
             raise double
         checked_kind(kind.strip(), kinds)
-        robots[name] = RobotSetup(kind.strip(), _start(name, start) if at else None)
-    return MappingProxyType(robots)
+        robots[name] = RobotConfig(display_name(name), kind.strip(), _start(name, start) if at else None)
+    return tuple(robots.values())
 
 
 def robots_in(
     robots: Mapping[str, NamedRobot], kinds: Collection[str], source: YamlSource | None
-) -> Mapping[str, RobotSetup]:
+) -> tuple[RobotConfig, ...]:
     """The robots that stand under `robots` in a file, in its order; their stacks are seen from its folder.
 
     Raises:
         InputError: with file and line: two have one name, a name is none, or a kind is not among `kinds`.
     """
-    setups: dict[str, RobotSetup] = {}
+    found: dict[str, RobotConfig] = {}
     for name, robot in robots.items():
         line = None if source is None else SourceLine(source.path, source.line(("robots", name)))
         try:
-            if (double := same_name(checked_name(name), setups)) is not None:
+            if (double := same_name(checked_name(name), found)) is not None:
                 raise double
             checked_kind(robot.kind, kinds)
         except InputError as error:
             raise InputError.at(line, error.message, hint=error.hint) from error
         stack = None if robot.stack is None else Path(robot.stack)
-        setups[name] = RobotSetup(
+        found[name] = RobotConfig(
+            display_name(name),
             robot.kind,
             None if robot.at is None else Pose2D(*robot.at),
             robot.dock,
             stack if stack is None or source is None else source.path.parent / stack,
             line,
         )
-    return MappingProxyType(setups)
+    return tuple(found.values())
 
 
 def pose_in(words: Sequence[str]) -> Pose2D:

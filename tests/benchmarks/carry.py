@@ -23,7 +23,7 @@ import numpy as np
 import shapely
 
 from executive.app.assembly import simulate
-from executive.app.starts import alone
+from executive.app.robots import only_robot
 from executive.run.outcome import Outcome
 from plant.simulation import Simulation
 from plant.worlds.world import World, load_world
@@ -102,7 +102,7 @@ def attempt(chosen: tuple[str, int]) -> dict[str, Any]:
     """Take an object of a class, carry it there and back and there again; what the plant's truth says of it."""
     class_name, seed = chosen
     world = flat_with(class_name)
-    simulation = simulate(world, {ROBOT: alone(world)}, seed=seed, record=False)
+    simulation = simulate(world, {ROBOT: only_robot(ROBOT, world)}, seed=seed, record=False)
     way, near = Way(simulation), PLACES[class_name]
     simulation.engine.observe(way)
     legs = (FAR[near], near, FAR[near])

@@ -25,10 +25,10 @@ import numpy as np
 
 from executive.app.evaluate.statistics import Rate
 from executive.app.mission_run import run_request
-from executive.app.several import prepare_several
+from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 
 ROBOT: Final = "bob"
 WORLD: Final = "flat"
@@ -87,10 +87,10 @@ def run_mission(number: int, sentence: str, out: Path) -> Result:
         out=out / str(number),
         record=False,
         time_limit_s=TIME_LIMIT_S,
-        robots={ROBOT: RobotSetup("fetch")},
+        robots=(RobotConfig(ROBOT, "fetch"),),
     )
     request.out.mkdir(parents=True, exist_ok=True)
-    prepared = prepare_several(request, ask=None)
+    prepared = prepare(request, ask=None)
     report = run_request(prepared, SimulatedBackend(prepared.world, prepared.robots, seed=number, record=False)).report
     (robot,) = report.robots.values()
     assert robot.referee is not None

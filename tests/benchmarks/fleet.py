@@ -30,7 +30,7 @@ from executive.app.fleet_dispatch import FleetDispatch
 from executive.app.fleet_report import told
 from executive.app.fleet_run import run_fleet
 from executive.app.fleet_setup import simulated_fleet
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
@@ -42,7 +42,7 @@ from executive.store.missions import MissionState, MissionStore
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from tests.executive.conftest import (
     FETCH,
@@ -100,11 +100,11 @@ def fleet_run(
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     begun_s = time.perf_counter()
-    setups = {name: RobotSetup(kind) for name, kind in robots.items()}
+    configs = [RobotConfig(name, kind) for name, kind in robots.items()]
     with MissionStore(out / "missions.sqlite") as store:
         requests = [Request(sentence=each, world=WORLD, require_wake=False, record=False, out=out) for each in said]
         queued = [store.add(prepare(request, ask=None).request, queued=True) for request in requests]
-        dispatch = simulated_fleet(store, queued, setups, seed=seed, faults=faults)
+        dispatch = simulated_fleet(store, queued, configs, seed=seed, faults=faults)
         run_fleet(dispatch, out=out, seed=seed)
         return dispatch, told(store, [each.id for each in queued]), time.perf_counter() - begun_s
 

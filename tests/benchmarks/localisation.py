@@ -26,9 +26,8 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from executive.app.mission_run import run_request
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend
-from executive.app.starts import alone
 from executive.mission.request import Request
 from plant.sensors.lidar import Lidar
 from plant.sensors.proprioception import OdometryModel
@@ -88,7 +87,7 @@ def record(path: Path, seed: int, say: str) -> None:
     path.with_suffix("").mkdir(parents=True, exist_ok=True)
     prepared = prepare(request, ask=None)
     name = prepared.mission.robot_name
-    backend = SimulatedBackend(prepared.world, {name: alone(prepared.world)}, seed=seed, record=False)
+    backend = SimulatedBackend(prepared.world, prepared.robots, seed=seed, record=False)
     simulation: Simulation = backend._simulation
     engine, robot = simulation.engine, simulation.robots[name]
     body = engine.world.robots[name].body

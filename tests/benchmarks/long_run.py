@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from executive.app.durable import STORE, new_run
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.app.simulated import run_simulated
 from executive.mission.request import Request
 from executive.run.runner import Progress

@@ -42,7 +42,7 @@ from pydrake.math import RigidTransform
 from errand_train.commands.worst_sheet import Shown, contact_sheet
 from errand_train.detector.scoring import Judged
 from executive.app.assembly import run_entry, simulate
-from executive.app.starts import alone
+from executive.app.robots import only_robot
 from executive.app.worlds import knowledge_of
 from executive.run.journal import TickNote
 from executive.run.outcome import Outcome, RobotResult
@@ -242,7 +242,7 @@ def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
     """Take, hold, put down; what the plant's truth says of it, and how it ended where it failed, if pictured."""
     with tempfile.TemporaryDirectory() as folder:
         world = room(Path(folder), trial.class_name, others_of(trial), trial.surface, trial.seed, trial.model)
-        simulation = simulate(world, {ROBOT: alone(world)}, seed=trial.seed, record=False)
+        simulation = simulate(world, {ROBOT: only_robot(ROBOT, world)}, seed=trial.seed, record=False)
         watch, before = Watch(simulation), poses(simulation)
         simulation.engine.observe(watch)
         texts = (

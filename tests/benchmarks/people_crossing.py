@@ -24,9 +24,9 @@ from pathlib import Path
 import numpy as np
 
 from executive.app.mission_run import run_request
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
+from executive.app.robots import only_robot
 from executive.app.simulated import SimulatedBackend
-from executive.app.starts import alone
 from executive.mission.request import Request
 from plant.worlds.builder.maps import FREE, OCCUPIED, Grid
 from plant.worlds.builder.own import world_from_grid
@@ -144,9 +144,10 @@ def run_case(folder: Path, drawn: Case) -> Outcome:
     if drawn.what != NOBODY:
         route = RouteRule(waypoints=(drawn.from_W, drawn.to_W), speed=drawn.speed_m_s, start=86400.0, yields=False)
         world = world.with_routes({drawn.what: route})
+    name = prepared.mission.robot_name
     backend = SimulatedBackend(
         world,
-        {prepared.mission.robot_name: alone(world, seed=drawn.number, stack=stack)},
+        {name: only_robot(name, world, seed=drawn.number, stack=stack)},
         seed=drawn.number,
         record=False,
     )

@@ -15,16 +15,16 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from executive.app.mission_run import run_request
-from executive.app.several import prepare_several
+from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.run.runner import Progress
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 from skills.robot import Pose2D
 from tests.benchmarks.traffic_cases import meeting, missions
 
@@ -69,7 +69,7 @@ class Result:
     messages: tuple[str, ...]
 
 
-def case(what: str, number: int) -> tuple[str, str, Mapping[str, RobotSetup]]:
+def case(what: str, number: int) -> tuple[str, str, tuple[RobotConfig, ...]]:
     """A world, what is said, and the robots. Raises KeyError: there is no such kind of case."""
     met = {"door": meeting, "missions": missions}[what](number)
     return met if isinstance(met, tuple) else (met.world, met.sentence, met.robots)
@@ -88,7 +88,7 @@ def run_case(what: str, number: int, out: Path) -> Result:
         robots=robots,
     )
     request.out.mkdir(parents=True, exist_ok=True)
-    prepared = prepare_several(request, ask=None)
+    prepared = prepare(request, ask=None)
     here = prepared.world if what == "missions" else prepared.world.without_people()
     backend = SimulatedBackend(here, prepared.robots, seed=number, record=False)
     standing = Standing()
@@ -98,7 +98,7 @@ def run_case(what: str, number: int, out: Path) -> Result:
         what,
         number,
         world,
-        tuple(setup.kind for setup in robots.values()),
+        tuple(robot.kind for robot in robots),
         sentence,
         resolved=all(each.achieved for each in report.robots.values()),
         contacts=max(each.robots_hit for each in seen),

@@ -10,7 +10,7 @@ import numpy as np
 
 from executive.app.worlds import knowledge_of, open_world
 from executive.words.knowledge import Door, Knowledge
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 from plant.kinds import robot_kind
 from plant.worlds.world import World
 from skills.estimate.grid_map import GridMap, load_grid_map
@@ -19,7 +19,7 @@ from skills.robot import Pose2D
 
 WORLDS = ("flat", "lab")
 PAIRS = (("spot", "spot"), ("spot", "fetch"), ("fetch", "spot"), ("fetch", "fetch"))
-NAMES = ("alice", "bob")
+NAMES = ("Alice", "Bob")
 FOR_ONE_M = 1.0
 NEAR_M = 9.0
 FROM_DOOR_M = (0.9, 3.0)
@@ -44,14 +44,14 @@ class Meeting:
 
     world: str
     door: str
-    robots: Mapping[str, RobotSetup]
+    robots: tuple[RobotConfig, ...]
     places: Mapping[str, str]
     delays_s: Mapping[str, int]
 
     @property
     def sentence(self) -> str:
         """What the two are asked to do."""
-        return ", and ".join(f"{name.capitalize()}, {self._asked(name)}" for name in self.robots)
+        return ", and ".join(f"{robot.name}, {self._asked(robot.name)}" for robot in self.robots)
 
     def _asked(self, name: str) -> str:
         wait = f"wait {self.delays_s[name]} seconds and then " if self.delays_s[name] else ""
@@ -84,7 +84,7 @@ def meeting(number: int) -> Meeting:
             break
     delays = (0, int(rng.choice(DELAYS_S)))
     late = dict(zip(NAMES, delays if rng.integers(2) else delays[::-1], strict=True))
-    robots = {name: RobotSetup(kind, start) for name, kind, start in zip(NAMES, kinds, starts, strict=True)}
+    robots = tuple(RobotConfig(*each) for each in zip(NAMES, kinds, starts, strict=True))
     return Meeting(world.name, " and ".join(door.between), robots, dict(zip(NAMES, reversed(sides), strict=True)), late)
 
 
@@ -118,7 +118,7 @@ def _start(
     return None
 
 
-def missions(number: int) -> tuple[str, str, Mapping[str, RobotSetup]]:
+def missions(number: int) -> tuple[str, str, tuple[RobotConfig, ...]]:
     """A world, a sentence with a mission for each of two robots, and the robots."""
     rng = np.random.default_rng([number, 31])
     world = WORLDS[number % len(WORLDS)]
@@ -129,5 +129,5 @@ def missions(number: int) -> tuple[str, str, Mapping[str, RobotSetup]]:
         first = str(rng.choice(FETCHING[world]))
     elif fetches[1] and kinds[1] == "spot":
         second = str(rng.choice(FETCHING[world]))
-    robots = {name: RobotSetup(kind) for name, kind in zip(NAMES, kinds, strict=True)}
+    robots = tuple(RobotConfig(name, kind) for name, kind in zip(NAMES, kinds, strict=True))
     return world, f"Alice, {first}, and Bob, {second}", robots

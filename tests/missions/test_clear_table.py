@@ -7,7 +7,7 @@ import shutil
 import pytest
 import yaml
 
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.app.simulated import run_simulated
 from executive.mission.request import Request
 from plant.worlds.world import WORLDS_FOLDER

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.app.simulated import run_simulated
 from executive.mission.request import Request, Start
 from skills.robot import Pose2D

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.app.simulated import run_simulated
 from executive.cli.check_command import Checker
 from executive.mission.request import Request

@@ -19,8 +19,9 @@ from executive.app.evaluate.outcome import RunOutcome, Standing
 from executive.app.evaluate.runs import RunSpec
 from executive.app.feasibility import refuse_impossible
 from executive.app.memory import return_memory
+from executive.app.prepare import prepare
+from executive.app.prepared import Prepared
 from executive.app.report import RefereeReport, RunReport
-from executive.app.requests import Prepared, prepare
 from executive.app.simulated import run_simulated
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
@@ -72,7 +73,7 @@ def _ran(spec: RunSpec, folder: Path, checked: bool) -> RunOutcome:
 
 def prepared_run(spec: RunSpec, out: Path) -> Prepared:
     """The run's request, understood; nobody is asked. Raises InputError."""
-    return prepare(request_of(spec, out), ask=None)
+    return prepare(request_of(spec, out))
 
 
 def request_of(spec: RunSpec, out: Path) -> Request:
@@ -91,7 +92,7 @@ def request_of(spec: RunSpec, out: Path) -> Request:
         scenario_files=() if spec.scenario is None else (Path(spec.scenario),),
         time_limit_s=spec.time_limit_s,
         variation=spec.variation,
-        robots=parse_robots(spec.robot_words, robot_kinds()) if spec.robot_words else {},
+        robots=parse_robots(spec.robot_words, robot_kinds()) if spec.robot_words else (),
     )
 
 

@@ -5,10 +5,9 @@ import io
 import pytest
 from typer.testing import CliRunner
 
-from executive.app import answers
-from executive.app.answers import answerer, ask_at_terminal
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.cli import entry
+from executive.cli.terminal import ask_at_terminal
 from executive.language.questions import ClarifyingQuestion, QuestionPolicy, Slot
 from executive.mission.request import Request
 from skills.files.errors import InputError
@@ -46,9 +45,8 @@ def test_an_answer_that_does_not_help_is_refused():
 
 
 def test_who_sits_at_the_terminal_is_asked(monkeypatch, capsys):
-    monkeypatch.setattr(answers, "_somebody_is_there", lambda: True)
     monkeypatch.setattr("sys.stdin", io.StringIO("2\n"))
-    assert answerer((), None, ask_at_terminal)(QUESTION) == "2"
+    assert prepare(Request(TABLE), ask=ask_at_terminal).mission.commands[-1].goal == "coffee table"
     assert "[1] kitchen table  [2] coffee table" in capsys.readouterr().err
 
 

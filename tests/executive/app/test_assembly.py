@@ -7,7 +7,7 @@ import pytest
 from tiny_detector import CLASSES, model_bytes, write_model
 
 from executive.app.assembly import shared_detector
-from executive.app.starts import TURNING_M, stand_at
+from executive.app.robots import TURNING_M, stand_at
 from executive.app.worlds import refuse_blocked
 from executive.mission.request import Start
 from plant.worlds.placement import place_people

@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from executive.app import requests
 from executive.app.mission_run import run_request
+from executive.app.prepare import prepare
 from executive.app.report import RunReport
-from executive.app.requests import prepare
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
 from executive.record.profile import Profile
@@ -19,7 +18,7 @@ from tests.executive.app.scripted_backend import ScriptedBackend
 
 @pytest.fixture
 def prepared(tmp_path, monkeypatch):
-    monkeypatch.setattr(requests, "load_parser", lambda: None)  # no step here is a sentence
+    monkeypatch.setattr("executive.app.prepare.load_parser", lambda: None)  # no step here is a sentence
     path = tmp_path / "drive.yaml"
     path.write_text("name: drive\nsteps:\n  - {skill: navigate, with: {x: 1.0, y: 0.5}}\n")
     return prepare(Request(file=path, out=tmp_path / "out", seed=4))

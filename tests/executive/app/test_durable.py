@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from executive.app.durable import run_arguments
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.mission.request import Request, Start
 
 ROOT = Path(__file__).parents[3]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from executive.app.fleet_missions import FleetMission, RobotNow, bid_for
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.mission.request import Request
 from executive.tree.estimate import Route
 from skills.robot import Pose2D

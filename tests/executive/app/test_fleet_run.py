@@ -17,7 +17,8 @@ from executive.app.fleet_missions import FleetMission
 from executive.app.fleet_report import told
 from executive.app.fleet_run import run_fleet
 from executive.app.page_view import PageView
-from executive.app.requests import Prepared
+from executive.app.prepared import Prepared
+from executive.app.robots import PlacedRobot
 from executive.cli import entry
 from executive.cli.fleet_command import _to_do, resumable_lines
 from executive.mission.mission import lines_of
@@ -61,7 +62,7 @@ class Fleet:
         monkeypatch.setattr(fleet_robots, "bid_for", self._bid)
         self.tables, self.slower_s = None, 0.5
         monkeypatch.setattr(fleet_robots.Offers, "takes_from", self._takes_from)
-        monkeypatch.setattr(fleet_missions, "prepared_for", lambda r, mission, *_: self._prepared(r, mission))
+        monkeypatch.setattr(fleet_missions, "instead", lambda old, mission: self._prepared(old.request, mission))
 
     def _entry(self, prepared):
         name = prepared.tree.robot_name
@@ -81,7 +82,7 @@ class Fleet:
     def _prepared(self, request, mission):
         tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
         world = SimpleNamespace(name="scripted", dock=START)
-        return Prepared(replace(request, commands=lines_of(tree.steps)), mission, world, self.knowledge, tree)
+        return Prepared(replace(request, commands=lines_of(tree.steps)), mission, world, self.knowledge, tree, {})
 
     def queue(self, *lines):
         request = Request(commands=lines, name="work", world_name="scripted")
@@ -103,7 +104,7 @@ class Fleet:
         self.since_s.append(since_s)
 
     def run(self, page=None):
-        placed = {name: SimpleNamespace(start=START, kind="spot") for name in ROBOTS}
+        placed = {name: PlacedRobot(name, "spot", START) for name in ROBOTS}
         docks = {name: self._docking(name) for name in ROBOTS}
         dispatch = FleetDispatch(self.store, dict(self.missions), placed, self, docks=docks)
         run_fleet(dispatch, out=self.out, seed=3, page=page)

@@ -4,30 +4,6 @@ import sys
 
 import pytest
 
-from executive.app import kernels
-
-
-@pytest.fixture
-def commands(monkeypatch):
-    """The commands that were run in place of those that take long."""
-    run = []
-    monkeypatch.setattr(kernels.subprocess, "run", lambda command, **_: run.append(command))
-    return run
-
-
-def test_the_first_run_on_a_machine_compiles_and_says_so_in_one_line(commands, monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(kernels, "_cache_folder", lambda: tmp_path)
-    kernels.compile_first()
-    assert [command[-1] for command in commands] == ["warm-up"]
-    assert capsys.readouterr().err.count("\n") == 1
-
-
-def test_a_later_run_compiles_nothing_and_says_nothing(commands, monkeypatch, tmp_path, capsys):
-    (tmp_path / "lattice.search-93.py311.nbi").touch()
-    monkeypatch.setattr(kernels, "_cache_folder", lambda: tmp_path)
-    kernels.compile_first()
-    assert (commands, capsys.readouterr().err) == ([], "")
-
 
 @pytest.mark.nightly
 def test_a_mission_after_warming_up_compiles_nothing(tmp_path):

@@ -14,7 +14,7 @@ from websockets.sync.client import connect
 
 from executive.app.page_view import PageView, queueing
 from executive.app.page_view import said as sentence_action
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.mission.request import Request
 from executive.run.control import Mode
 from executive.store.missions import MissionState, MissionStore

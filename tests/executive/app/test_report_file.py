@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from executive.app import requests
 from executive.app.artifacts import MOST_BYTES, Artifacts
 from executive.app.durable import mission_events
 from executive.app.mission_run import run_request
+from executive.app.prepare import instead, prepare
 from executive.app.report import ReportedAnswer, ReportedObject, RunReport
 from executive.app.report_file import step_rows
-from executive.app.requests import prepare, prepared_for
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.run.findings import Said
@@ -40,7 +39,7 @@ steps:
 
 @pytest.fixture
 def talk(tmp_path, monkeypatch):
-    monkeypatch.setattr(requests, "load_parser", lambda: None)
+    monkeypatch.setattr("executive.app.prepare.load_parser", lambda: None)
     path = tmp_path / "talk.yaml"
     path.write_text(TALK)
     return prepare(Request(file=path, out=tmp_path / "out", seed=4, record=False))
@@ -165,7 +164,7 @@ class TwoRobots(ScriptedBackend):
 def test_a_run_with_two_robots_leaves_the_tree_and_the_steps_of_each(talk):
     def named(name):
         mission = replace(talk.mission, robot_name=name)
-        return replace(prepared_for(talk.request, mission, talk.world, talk.knowledge), kind="spot", robots=robots)
+        return replace(instead(talk, mission), robots=robots)
 
     robots = dict.fromkeys(("Alice", "Bob"), SimpleNamespace(kind="spot"))
     run_request(replace(named("Alice"), others=(named("Bob"),)), TwoRobots())

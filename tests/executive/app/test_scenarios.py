@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.app.scenarios import doorway, with_happenings, with_scenario
+from executive.app.scenarios import doorway, with_events, with_scenario
 from executive.app.worlds import knowledge_of, open_world
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
@@ -50,7 +50,7 @@ def test_a_fault_of_a_camera_that_spot_does_not_have_is_refused():
 
 def test_events_happen_in_the_world(file):
     scenario = understood(scenario_files=(file,)).scenario
-    world = with_happenings(WORLD, scenario)
+    world = with_events(WORLD, scenario)
     assert [(door.name, door.closes) for door in world.doors] == [("door between kitchen and living room", 5.0)]
     assert [(move.name, move.to) for move in world.moves] == [("beer", "kitchen table")]
     (robin,) = (rule for rule in world.seed_rules.people if rule.name == "Robin")

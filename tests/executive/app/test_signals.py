@@ -32,15 +32,15 @@ RUN = """
     sys.path.insert(0, {tests!r})
     from scripted_backend import ScriptedBackend
     from executive.cli import (shown)
-    from executive.app import requests
+    from executive.app import prepare as preparing
     from executive.app.durable import kept
     from executive.app.mission_run import run_request
-    from executive.app.requests import prepare
+    from executive.app.prepare import prepare
     from executive.mission.request import Request
     from executive.store.missions import MissionStore
     from rich.console import Console
 
-    requests.load_parser = shown.load_parser = lambda: None
+    preparing.load_parser = shown.load_parser = lambda: None
     out, robot = Path({out!r}), ScriptedBackend()
     request = Request(file=out / "m.yaml", out=out)
     prepared = prepare(request)

@@ -2,14 +2,17 @@
 
 import pytest
 
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.app.talk import Talk
 from executive.conversation import ReplyKind
 from executive.mission.request import Request
 from executive.run.control import Control, Mode
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 
-TWO = {"alice": RobotSetup("spot"), "bob": RobotSetup("spot")}
+TWO = (
+    RobotConfig("Alice", "spot"),
+    RobotConfig("Bob", "spot"),
+)
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,7 @@ import json
 
 import pytest
 
-from executive.app import requests
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.app.trigger_calls import TriggerCalls
 from executive.mission.request import Request
 from executive.store.missions import MissionState, MissionStore
@@ -36,7 +35,7 @@ def file(tmp_path):
 
 @pytest.fixture
 def stand(path, file, monkeypatch):
-    monkeypatch.setattr(requests, "load_parser", lambda: None)  # no step here is a sentence
+    monkeypatch.setattr("executive.app.prepare.load_parser", lambda: None)  # no step here is a sentence
     request = prepare(Request(file=file, given={"fast": 0.3})).request.from_anywhere()
 
     def standing(*triggers):

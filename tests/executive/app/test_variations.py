@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.app.simulated import spoken_classes
 from executive.mission.request import Request
 from executive.words.variation import Variation

@@ -6,10 +6,9 @@ import os
 import pytest
 import typer
 
-from executive.app import requests
 from executive.app.durable import kept
 from executive.app.mission_run import run_request
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.cli.output import refusals
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
@@ -23,7 +22,7 @@ FULL_AT_S = 3.0
 
 @pytest.fixture
 def prepared(tmp_path, monkeypatch):
-    monkeypatch.setattr(requests, "load_parser", lambda: None)  # no step here is a sentence
+    monkeypatch.setattr("executive.app.prepare.load_parser", lambda: None)  # no step here is a sentence
     path = tmp_path / "drive.yaml"
     path.write_text("name: drive\nsteps:\n  - {skill: navigate, with: {x: 3.0, y: 0.5}}\n")
     return prepare(Request(file=path, out=tmp_path, seed=4))

@@ -13,7 +13,7 @@ from executive.cli.entry import app
 from executive.cli.listen_command import answer_line, hear_request, show_hearing
 from executive.language.understand import Status, Understanding
 from executive.speech.microphone import follow
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 from skills.files.errors import InputError
 
 GO = "Hey Alice, go to the kitchen."
@@ -123,7 +123,10 @@ def test_robots_that_cannot_be_called_by_voice_are_refused(says, wav, options, w
 
 def test_a_run_with_several_robots_hears_the_one_that_is_called(says, wav):
     says("Hey Bob, go to the kitchen.")
-    robots = {"alice": RobotSetup("spot"), "bob": RobotSetup("fetch")}
+    robots = (
+        RobotConfig("Alice", "spot"),
+        RobotConfig("Bob", "fetch"),
+    )
     console = Console(file=io.StringIO())
     assert hear_request(wav, None, world=None, require_wake=True, console=console, robots=robots) == (
         "Hey Bob, go to the kitchen."

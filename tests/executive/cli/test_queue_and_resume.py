@@ -11,7 +11,6 @@ import pytest
 from py_trees.common import Status
 from typer.testing import CliRunner
 
-from executive.app import requests
 from executive.app.mission_run import Finished
 from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry, main, queue_run
@@ -81,7 +80,7 @@ def plant(monkeypatch):
     stand_in = Plant()
     for module in (main, queue_run):
         monkeypatch.setattr(module, "run_simulated", stand_in)
-    monkeypatch.setattr(requests, "load_parser", lambda: None)  # no step here is a sentence
+    monkeypatch.setattr("executive.app.prepare.load_parser", lambda: None)  # no step here is a sentence
     return stand_in
 
 

@@ -9,8 +9,8 @@ from pydrake.math import RollPitchYaw
 from typer.testing import CliRunner
 
 from executive.app.assembly import simulate
+from executive.app.robots import only_robot
 from executive.app.saved_pose import save_pose
-from executive.app.starts import alone
 from executive.app.worlds import open_world
 from executive.cli.entry import app
 from executive.cli.teleop_command import TerminalKeys, context_for, page_actions, period
@@ -111,7 +111,9 @@ def test_bad_arguments_are_one_clear_line(arguments, said):
 def test_the_plants_robot_is_driven_by_hand():
     """Half a metre ahead, the hand 10 cm up, the gripper closed; at rest half a second after the keys end."""
     world = open_world("flat")
-    simulation = simulate(world, {"Alice": alone(world, start=Start(Pose2D(5.2, 4.5, math.pi)))}, seed=1, record=False)
+    simulation = simulate(
+        world, {"Alice": only_robot("Alice", world, start=Start(Pose2D(5.2, 4.5, math.pi)))}, seed=1, record=False
+    )
     robot = simulation.robots["Alice"]
     context = context_for(world, robot, simulation.clock, simulation.starts["Alice"])
     hands, model = Teleop(context), arm_model(robot.capabilities())

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.app.simulated import run_simulated
 from executive.app.talk import conversation_of
 from executive.mission.request import Request

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from executive.mission.request import Request, Start
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
@@ -17,9 +17,15 @@ def test_a_start_is_read_back_as_it_was_written(start):
 
 def test_from_anywhere_the_stacks_of_robots_are_found(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    robots = {"alice": RobotSetup("spot", stack=Path("own.yaml")), "bob": RobotSetup("fetch")}
+    robots = (
+        RobotConfig("Alice", "spot", stack=Path("own.yaml")),
+        RobotConfig("Bob", "fetch"),
+    )
     found = Request("go", robots=robots).from_anywhere().robots
-    assert found == {"alice": RobotSetup("spot", stack=tmp_path / "own.yaml"), "bob": RobotSetup("fetch")}
+    assert found == (
+        RobotConfig("Alice", "spot", stack=tmp_path / "own.yaml"),
+        RobotConfig("Bob", "fetch"),
+    )
 
 
 @pytest.mark.parametrize("text", ["", "nowhere", "1 2", "1 2 3 4", "1 2 nan", "1 2 x"])

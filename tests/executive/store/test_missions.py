@@ -15,7 +15,7 @@ from executive.run.journal import TickNote
 from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.snapshot import Change, NodeState
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 from skills.api import Cause
 from skills.files.errors import InputError
 from skills.robot import Pose2D
@@ -218,14 +218,14 @@ def test_a_store_of_an_older_version_is_refused_with_what_to_do(path):
 
 
 def test_a_mission_keeps_its_robots(path):
-    robots = {
-        "bob": RobotSetup("fetch", Pose2D(1.0, 2.5, -0.25), "kitchen", Path("/stacks/own.yaml")),
-        "alice": RobotSetup("spot"),
-    }
+    robots = (
+        RobotConfig("Bob", "fetch", Pose2D(1.0, 2.5, -0.25), "kitchen", Path("/stacks/own.yaml")),
+        RobotConfig("Alice", "spot"),
+    )
     with MissionStore(path) as store:
         store.add(replace(REQUEST, robots=robots), queued=True)
     with MissionStore(path, create=False) as store:
-        assert list(store.missions()[0].request.robots.items()) == list(robots.items())
+        assert store.missions()[0].request.robots == robots
 
 
 def test_each_of_several_robots_has_its_own_steps_values_and_pose(path):

@@ -13,7 +13,7 @@ from executive.store.resuming import BEFORE, ended_tree, resumed_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.command import parse_command
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from skills.api import Cause, Failed, Running, Succeeded
 
@@ -21,7 +21,10 @@ TAKE_AND_PUT = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
     "Take [drink] to [bedroom] and do [place] to [drink]",
 )
-ROBOTS = {"Alice": RobotSetup("spot"), "Bob": RobotSetup("fetch")}
+ROBOTS = (
+    RobotConfig("Alice", "spot"),
+    RobotConfig("Bob", "fetch"),
+)
 REQUEST = Request("tidy", name="tidy", world_name="flat", robot="Alice", fingerprint="print", robots=ROBOTS)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.words.robots import RobotSetup, display_name, parse_robots, robot_called
+from executive.words.robots import RobotConfig, display_name, parse_robots, robot_called
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
@@ -12,19 +12,17 @@ KINDS = ("fetch", "spot")
 
 
 def test_each_robot_has_its_kind_in_the_order_of_the_option():
-    assert list(parse_robots("bob=fetch, alice=spot", KINDS).items()) == [
-        ("bob", RobotSetup("fetch")),
-        ("alice", RobotSetup("spot")),
-    ]
+    expected = (RobotConfig("Bob", "fetch"), RobotConfig("Alice", "spot"))
+    assert parse_robots("bob=fetch, alice=spot", KINDS) == expected
 
 
 def test_a_start_may_follow_the_kind():
     robots = parse_robots("alice=spot@1.0,-2,1.57,bob=fetch,eve=spot@0,0,0", KINDS)
-    assert robots == {
-        "alice": RobotSetup("spot", Pose2D(1.0, -2.0, 1.57)),
-        "bob": RobotSetup("fetch"),
-        "eve": RobotSetup("spot", Pose2D(0.0, 0.0, 0.0)),
-    }
+    assert robots == (
+        RobotConfig("Alice", "spot", Pose2D(1.0, -2.0, 1.57)),
+        RobotConfig("Bob", "fetch"),
+        RobotConfig("Eve", "spot", Pose2D(0.0, 0.0, 0.0)),
+    )
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import pytest
 
 from executive.mission.file.overrides import overridden
 from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
-from executive.words.robots import RobotSetup, robots_in
+from executive.words.robots import RobotConfig, robots_in
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
@@ -55,10 +55,10 @@ def part(load, parser, flat):
 
 def test_robots_stand_in_the_file_with_what_they_begin_with(load, tmp_path):
     loaded = load()
-    setups = robots_in(loaded.robots, KINDS, loaded.source)
-    own = RobotSetup("fetch", Pose2D(1.0, 2.5, 0.0), "office", tmp_path / "own.yaml")
-    assert setups == {"alice": RobotSetup("spot"), "bob": own}
-    assert (setups["bob"].source.file.name, setups["bob"].source.line) == ("mission.yaml", 4)
+    alice, bob = robots_in(loaded.robots, KINDS, loaded.source)
+    own = RobotConfig("Bob", "fetch", Pose2D(1.0, 2.5, 0.0), "office", tmp_path / "own.yaml")
+    assert (alice, bob) == (RobotConfig("Alice", "spot"), own)
+    assert (bob.source.file.name, bob.source.line) == ("mission.yaml", 4)
 
 
 def test_each_robot_has_its_steps(part):

@@ -1,10 +1,11 @@
-"""Where the robots of a run stand at the beginning and where they charge: told, or found free on the map."""
+"""The robots of a run: where each stands at the beginning and charges, told by the user or found free on the map."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -13,7 +14,7 @@ import numpy as np
 from executive.mission.request import Start
 from executive.mission.stack_file import load_stack
 from executive.words.knowledge import Knowledge, Pose, RobotFacts
-from executive.words.robots import RobotSetup, display_name
+from executive.words.robots import RobotConfig
 from plant.kinds import robot_kind
 from plant.worlds.world import World
 from skills.files.errors import InputError
@@ -24,7 +25,7 @@ from skills.stack import RobotStack
 if TYPE_CHECKING:
     from skills.estimate.grid_map import GridMap
 
-__all__ = ["DEFAULT_KIND", "PlacedRobot", "alone", "knowledge_for", "placed_robots", "stand_at"]
+__all__ = ["DEFAULT_KIND", "PlacedRobot", "knowledge_for", "only_robot", "placed_robots", "stand_at"]
 
 DEFAULT_KIND: Final = "spot"
 TURNING_M: Final = 0.7
@@ -36,15 +37,17 @@ _START_STREAM: Final = 7
 
 @dataclass(frozen=True)
 class PlacedRobot:
-    """One robot of a run: its kind and stack, where it stands at the beginning and charges (world frame).
+    """One robot of a run: its kind, where it stands at the beginning and charges (world frame), and what it uses.
 
-    Without a `dock` it charges where the world says; it is `told` where it stands, or finds that out.
+    Without a `dock` it charges where the world says. Without an `own_stack` file it uses what its kind does. It is
+    `told` where it stands, or finds that out.
     """
 
+    name: str
     kind: str
     start: Pose2D
-    stack: RobotStack
     dock: Pose2D | None = None
+    own_stack: Path | None = None
     told: bool = True
 
     @property
@@ -52,60 +55,79 @@ class PlacedRobot:
         """What this kind of robot is and can do."""
         return robot_kind(self.kind).capabilities()
 
+    @property
+    def stack_file(self) -> Path | None:
+        """The file of its stack; None for the stack that comes with Errand."""
+        return self.own_stack or robot_kind(self.kind).stack
 
-def placed_robots(world: World, knowledge: Knowledge, setups: Mapping[str, RobotSetup]) -> Mapping[str, PlacedRobot]:
-    """The robots of a run by their names as people read them, in the order in which they are named.
+    @cached_property
+    def stack(self) -> RobotStack:
+        """The components that it uses. Raises InputError with file and line: the file cannot be used."""
+        return load_stack(self.stack_file)
+
+
+def placed_robots(world: World, knowledge: Knowledge, configs: Sequence[RobotConfig]) -> Mapping[str, PlacedRobot]:
+    """The robots of a run by their names, in the order in which they are named.
 
     The first stands at the world's start and charges at its dock, where nothing else is said; each other one stands at
     the free pose that is nearest to there, and charges where it stands.
 
     Raises:
-        InputError: two overlap, a robot stands in something, a dock or a stack is none, or there is no room.
+        InputError: two overlap, a robot stands in something, a dock is no place, or there is no room.
     """
     from skills.estimate.grid_map import load_grid_map
 
     free = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     placed: dict[str, PlacedRobot] = {}
-    told = {name: setup.start or (world.start if not number else None) for number, (name, setup) in _numbered(setups)}
-    for number, (name, setup) in sorted(_numbered(setups), key=lambda each: told[each[1][0]] is None):
+    told = {each.name: each.start or (world.start if each is configs[0] else None) for each in configs}
+    for each in sorted(configs, key=lambda one: told[one.name] is None):
         try:
-            start = told[name] or _free_start(free, world, setup, placed)
-            if setup.start is not None:
-                _refuse_overlap(name, setup.kind, start, placed, free)
-            own = _dock(name, setup, knowledge) or (world.dock if number == 0 else start)
+            start = told[each.name] or _free_start(free, world, each.kind, placed.values())
+            if each.start is not None:
+                _refuse_overlap(each, each.start, placed.values(), free)
+            dock = _dock(each, knowledge) or (world.dock if each is configs[0] else start)
         except InputError as error:
-            raise InputError.at(setup.source, error.message, hint=error.hint) from error
-        stack = load_stack(setup.stack or robot_kind(setup.kind).stack)
-        placed[display_name(name)] = PlacedRobot(setup.kind, start, stack, own)
-    return {display_name(name): placed[display_name(name)] for name in setups}
+            raise InputError.at(each.source, error.message, hint=error.hint) from error
+        placed[each.name] = PlacedRobot(each.name, each.kind, start, dock, each.stack)
+    return {each.name: placed[each.name] for each in configs}
 
 
-def _numbered(setups: Mapping[str, RobotSetup]) -> Iterator[tuple[int, tuple[str, RobotSetup]]]:
-    yield from enumerate(setups.items())
+def only_robot(
+    name: str,
+    world: World,
+    *,
+    start: Start | None = None,
+    stack: Path | None = None,
+    seed: int = 0,
+    kind: str = DEFAULT_KIND,
+) -> PlacedRobot:
+    """The only robot of a run, at the world's start or another, charging at the world's dock. Raises InputError."""
+    pose = world.start if start is None else stand_at(world, start, seed)
+    return PlacedRobot(name, kind, pose, world.dock, stack, start is None or start.pose is not None)
 
 
-def _dock(name: str, setup: RobotSetup, knowledge: Knowledge) -> Pose2D | None:
+def _dock(robot: RobotConfig, knowledge: Knowledge) -> Pose2D | None:
     """The dock that is said. Raises InputError: it is no place."""
-    if setup.dock is None:
+    if robot.dock is None:
         return None
-    place = knowledge.place(setup.dock)
+    place = knowledge.place(robot.dock)
     if place is None:
         known = ", ".join(sorted(knowledge.places))
-        raise InputError(f"the dock of {name}, '{setup.dock}', is no place", hint=f"known: {known}")
+        raise InputError(f"the dock of {robot.name}, '{robot.dock}', is no place", hint=f"known: {known}")
     pose = knowledge.place_pose(place)
     return Pose2D(pose.x, pose.y, pose.yaw)
 
 
-def _free_start(free: GridMap, world: World, setup: RobotSetup, placed: Mapping[str, PlacedRobot]) -> Pose2D:
+def _free_start(free: GridMap, world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2D:
     """The free pose nearest to the world's start, clear of the robots that stand already and of where people may be.
 
     Raises InputError: there is none.
     """
     from plant.worlds.placement import people_stand_W
 
-    reach_m = _reach_m(setup.kind)
+    reach_m = _reach_m(kind)
     places = free.centres(np.argwhere(free.distance > max(TURNING_M, reach_m)))
-    for other in placed.values():
+    for other in placed:
         away_m = np.hypot(*(places - [other.start.x_m, other.start.y_m]).T)
         places = places[away_m > reach_m + _reach_m(other.kind) + BETWEEN_M]
     for person_W in people_stand_W(world):
@@ -116,17 +138,17 @@ def _free_start(free: GridMap, world: World, setup: RobotSetup, placed: Mapping[
     return Pose2D(float(x), float(y), world.start.yaw_rad)
 
 
-def _refuse_overlap(name: str, kind: str, start: Pose2D, placed: Mapping[str, PlacedRobot], free: GridMap) -> None:
+def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRobot], free: GridMap) -> None:
     """Raise InputError where a robot would stand in another, or in something."""
-    own = _discs(kind, start)
-    for other, one in placed.items():
-        theirs = _discs(one.kind, one.start)
+    own = _discs(robot.kind, start)
+    for other in placed:
+        theirs = _discs(other.kind, other.start)
         apart = np.hypot(*(own[:, None, :2] - theirs[None, :, :2]).transpose(2, 0, 1))
         if np.any(apart < own[:, None, 2] + theirs[None, :, 2]):
-            raise InputError(f"the starts of {display_name(name)} and {other} overlap", hint="put them further apart")
+            raise InputError(f"the starts of {robot.name} and {other.name} overlap", hint="put them further apart")
     if float(np.min(free.distance_m(own[:, :2]) - own[:, 2])) < 0.0:
         there = f"({start.x_m:g}, {start.y_m:g}, {start.yaw_rad:g})"
-        raise InputError(f"at the start {there} {display_name(name)} stands in something", hint="give a free pose")
+        raise InputError(f"at the start {there} {robot.name} stands in something", hint="give a free pose")
 
 
 def _discs(kind: str, pose: Pose2D) -> FloatArray:
@@ -142,19 +164,10 @@ def _reach_m(kind: str) -> float:
     return float(np.linalg.norm(np.array(robot_kind(kind).capabilities().footprint_m), axis=1).max())
 
 
-def alone(
-    world: World, *, seed: int = 0, stack: Path | None = None, start: Start | None = None, kind: str = DEFAULT_KIND
-) -> PlacedRobot:
-    """The only robot of a run, at the world's start or another, charging at the world's dock. Raises InputError."""
-    pose = world.start if start is None else stand_at(world, start, seed)
-    told = start is None or start.pose is not None
-    return PlacedRobot(kind, pose, load_stack(stack or robot_kind(kind).stack), world.dock, told)
-
-
-def knowledge_for(name: str, robot: PlacedRobot, names: Mapping[str, PlacedRobot], knowledge: Knowledge) -> Knowledge:
+def knowledge_for(robot: PlacedRobot, names: Iterable[str], knowledge: Knowledge) -> Knowledge:
     """What one robot of several knows: its own name, start and dock, and the names of the others."""
-    others = tuple(other for other in names if other != name)
-    facts = RobotFacts(name=name, others=others, require_wake=knowledge.robot.require_wake)
+    others = tuple(other for other in names if other != robot.name)
+    facts = RobotFacts(name=robot.name, others=others, require_wake=knowledge.robot.require_wake)
     dock = None if robot.dock is None else _pose(robot.dock)
     return knowledge.model_copy(update={"robot": facts, "start": _pose(robot.start), "dock": dock})
 

@@ -5,15 +5,18 @@ from pathlib import Path
 
 import pytest
 
-from executive.app.requests import prepare
+from executive.app.prepare import prepare
 from executive.app.worlds import open_world
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.request import Request, Start
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
-TWO = {"alice": RobotSetup("spot"), "bob": RobotSetup("spot")}
+TWO = (
+    RobotConfig("Alice", "spot"),
+    RobotConfig("Bob", "spot"),
+)
 
 # Sentence, and the commands of each robot.
 MEANT = [
@@ -56,7 +59,7 @@ def test_path_ids_carry_the_robots_name():
 
 
 def test_what_is_for_nobody_goes_to_the_robot_that_is_there_first():
-    near_the_office = {**TWO, "bob": RobotSetup("spot", start=asked_pose())}
+    near_the_office = (TWO[0], RobotConfig("Bob", "spot", start=asked_pose()))
     assert asked("go to the office", near_the_office).mission.robot_name == "Bob"
 
 
@@ -75,9 +78,9 @@ def test_one_who_needs_what_another_brings_begins_when_that_one_is_done():
 def test_a_mission_file_goes_to_the_robot_that_is_done_first(tmp_path):
     file = tmp_path / "go.yaml"
     file.write_text("name: go\nsteps:\n  - to: office\n", encoding="utf-8")
-    robots = {**TWO, "bob": RobotSetup("fetch", start=asked_pose())}
+    robots = (TWO[0], RobotConfig("Bob", "fetch", start=asked_pose()))
     prepared = prepare(Request(file=file, robots=robots), ask=None)
-    assert (prepared.mission.robot_name, prepared.kind) == ("Bob", "fetch")
+    assert (prepared.mission.robot_name, prepared.robot.kind) == ("Bob", "fetch")
 
 
 def test_a_sentence_to_a_robot_that_is_not_there_is_refused():
@@ -111,12 +114,12 @@ def test_a_file_with_parts_has_a_mission_for_each_robot_in_the_order_of_the_robo
     every = asked_file(PARTS).all
     goals = {each.mission.robot_name: [command.goal for command in each.tree.commands] for each in every}
     assert list(goals.items()) == [("Alice", ["kitchen"]), ("Bob", ["office"])]
-    assert [(each.kind, each.after) for each in every] == [("spot", ()), ("fetch", ("Alice",))]
+    assert [(each.robot.kind, each.after) for each in every] == [("spot", ()), ("fetch", ("Alice",))]
 
 
 def test_the_option_replaces_the_robots_of_a_file(asked_file):
     every = asked_file(PARTS, robots=TWO).all
-    assert [each.kind for each in every] == ["spot", "spot"]
+    assert [each.robot.kind for each in every] == ["spot", "spot"]
 
 
 def test_a_file_with_robots_and_steps_goes_to_the_robot_that_it_names(asked_file):
@@ -141,7 +144,7 @@ def world_of_two(tmp_path):
 
 def test_a_world_may_name_its_robots(world_of_two):
     prepared = prepare(Request("Hey Bob, go to the kitchen", world=world_of_two()), ask=None)
-    assert (prepared.mission.robot_name, prepared.kind, list(prepared.robots)) == ("Bob", "fetch", ["Eve", "Bob"])
+    assert (prepared.mission.robot_name, prepared.robot.kind, list(prepared.robots)) == ("Bob", "fetch", ["Eve", "Bob"])
 
 
 def test_a_world_may_ask_that_one_of_its_robots_is_called(world_of_two):
@@ -163,7 +166,7 @@ REFUSED = [
     ("after: alice", "after: bob", 7, "Bob would wait for itself"),
     ("alice:\n    steps", "alice:\n    after: bob\n    steps", 10, "Alice and Bob would wait for each other"),
     ("bob: fetch", "bob: {kind: fetch, at: [9.5, 4.05, 0]}", 4, "the starts of Bob and Alice overlap"),
-    ("bob: fetch", "bob: {kind: fetch, dock: moon}", 4, "the dock of bob, 'moon', is no place"),
+    ("bob: fetch", "bob: {kind: fetch, dock: moon}", 4, "the dock of Bob, 'moon', is no place"),
     ("to: kitchen", "to: kichen", 10, "did you mean 'kitchen'?"),
 ]
 

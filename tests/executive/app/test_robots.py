@@ -4,16 +4,19 @@ import math
 
 import pytest
 
-from executive.app.starts import PlacedRobot, alone, knowledge_for, placed_robots
+from executive.app.robots import PlacedRobot, knowledge_for, placed_robots
 from executive.app.worlds import knowledge_of, open_world
-from executive.words.robots import RobotSetup
+from executive.words.robots import RobotConfig
 from plant.worlds.placement import place_people
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 WORLD = open_world("flat")
 KNOWN = knowledge_of(WORLD)
-TWO = {"alice": RobotSetup("spot"), "bob": RobotSetup("fetch")}
+TWO = (
+    RobotConfig("Alice", "spot"),
+    RobotConfig("Bob", "fetch"),
+)
 
 
 def test_the_first_robot_stands_at_the_worlds_start_and_charges_at_its_dock():
@@ -30,22 +33,33 @@ def test_another_robot_stands_free_and_near_and_charges_where_it_stands():
 
 
 def test_robots_keep_the_order_in_which_they_are_named():
-    assert list(placed_robots(WORLD, KNOWN, {"bob": RobotSetup("spot"), **TWO})) == ["Bob", "Alice"]
+    assert list(placed_robots(WORLD, KNOWN, (RobotConfig("Bob", "spot"), TWO[0]))) == ["Bob", "Alice"]
 
 
 def test_a_robot_with_no_start_makes_room_for_one_with_a_start():
     here = Pose2D(WORLD.start.x_m, WORLD.start.y_m, 0.0)
     robots = placed_robots(
-        WORLD, KNOWN, {"bob": RobotSetup("spot"), "carl": RobotSetup("spot", start=Pose2D(4.0, 4.5, 0.0))}
+        WORLD,
+        KNOWN,
+        (
+            RobotConfig("Bob", "spot"),
+            RobotConfig("Carl", "spot", start=Pose2D(4.0, 4.5, 0.0)),
+        ),
     )
     assert (robots["Bob"].start, robots["Carl"].start.x_m) == (here, 4.0)
 
 
 # What is said of the starts and docks; the words of the refusal.
 REFUSED = [
-    ({"alice": RobotSetup("spot"), "bob": RobotSetup("spot", start=Pose2D(9.5, 4.05, 0.0))}, "overlap"),
-    ({"alice": RobotSetup("spot", start=Pose2D(50.0, 50.0, 0.0))}, "stands in something"),
-    ({"alice": RobotSetup("spot", dock="moon")}, "is no place"),
+    (
+        (
+            RobotConfig("Alice", "spot"),
+            RobotConfig("Bob", "spot", start=Pose2D(9.5, 4.05, 0.0)),
+        ),
+        "overlap",
+    ),
+    ((RobotConfig("Alice", "spot", start=Pose2D(50.0, 50.0, 0.0)),), "stands in something"),
+    ((RobotConfig("Alice", "spot", dock="moon"),), "is no place"),
 ]
 
 
@@ -57,20 +71,19 @@ def test_a_start_or_dock_that_cannot_be_is_refused(setups, words):
 
 def test_when_there_is_no_room_for_one_more_robot_that_is_said():
     with pytest.raises(InputError, match="no room"):
-        placed_robots(WORLD, KNOWN, {f"robot {number}": RobotSetup("spot") for number in range(60)})
+        placed_robots(WORLD, KNOWN, [RobotConfig(f"Robot {number}", "spot") for number in range(60)])
 
 
 def test_a_robot_knows_its_own_name_start_and_dock_and_the_names_of_the_others():
-    robots = {"Alice": alone(WORLD), "Bob": PlacedRobot("spot", Pose2D(1.0, 2.0, 0.5), alone(WORLD).stack)}
-    known = knowledge_for("Bob", robots["Bob"], robots, KNOWN)
+    known = knowledge_for(PlacedRobot("Bob", "spot", Pose2D(1.0, 2.0, 0.5)), ("Alice", "Bob"), KNOWN)
     assert (known.robot.name, known.robot.others) == ("Bob", ("Alice",))
     assert (known.start.x, known.start.y, known.start.yaw, known.dock) == (1.0, 2.0, 0.5, None)
 
 
 def test_no_robot_without_a_start_stands_where_a_person_may_stand():
     """Four robots about the world's start, before which a person stands at all seeds."""
-    kinds = {"alice": "spot", "bob": "spot", "carol": "fetch", "dave": "fetch"}
-    robots = placed_robots(WORLD, KNOWN, {name: RobotSetup(kind) for name, kind in kinds.items()})
+    kinds = {"Alice": "spot", "Bob": "spot", "Carol": "fetch", "Dave": "fetch"}
+    robots = placed_robots(WORLD, KNOWN, [RobotConfig(name, kind) for name, kind in kinds.items()])
     people = [one.X_WO.translation()[:2] for seed in range(20) for one in place_people(WORLD, seed)]
     for name in ("Bob", "Carol", "Dave"):
         start = robots[name].start

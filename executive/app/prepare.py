@@ -1,0 +1,396 @@
+"""From what the user asks for to what can be run: the one place where a sentence or a mission file is understood."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from graphlib import CycleError, TopologicalSorter
+
+from executive.app.mission_files import mission_file
+from executive.app.prepared import Prepared, compiled_request, together
+from executive.app.robots import PlacedRobot, knowledge_for, only_robot, placed_robots
+from executive.app.worlds import knowledge_of, open_world, refuse_blocked, with_map
+from executive.language.parser import load_parser
+from executive.language.questions import Answerer, ClarifyingQuestion, QuestionPolicy, answer_by
+from executive.language.robots import Addressed, Part, Whom, understand_for_robots_asking
+from executive.language.understand import Status, Understanding
+from executive.mission.file.objects import import_folders
+from executive.mission.file.overrides import overridden
+from executive.mission.file.people import routes_in
+from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
+from executive.mission.file.schema import MissionFile, PartFile
+from executive.mission.mission import (
+    mission_from_lines,
+    mission_from_meaning,
+    mission_from_steps,
+    steps_of,
+    understood,
+)
+from executive.mission.request import Request
+from executive.tree.compiler import compile_mission
+from executive.tree.registry import installed_skills
+from executive.words.knowledge import Knowledge, Pose
+from executive.words.robots import RobotConfig, robot_called, robots_in
+from executive.words.steps import DEFAULT_WORLD, KeyPath, Mission
+from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
+from skills.files.errors import InputError, Problems, listing, suggestion
+from skills.files.texts import LONGEST_ANSWER, plain_text
+from skills.files.yaml_source import read_yaml
+from skills.robot import Pose2D
+
+__all__ = ["Setting", "instead", "prepare", "prepare_alone"]
+
+
+def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
+    """Understand a request, and compile it.
+
+    Of several robots the first by name stands for all; `others` are the rest.
+
+    Args:
+        request: what the user asks for.
+        ask: who is asked what a sentence leaves open, where the request's policy allows it; None: nobody.
+
+    Raises:
+        InputError: with file and line where it has a file: it or the world or its knowledge is broken, a sentence is
+            not understood, the robots do not fit into the world, or the mission cannot be carried out.
+    """
+    if not request.only_commands and (request.file is None) == (request.sentence is None):
+        raise InputError("a mission file or --say is needed, and not both", hint='try: --say "Hey Alice, ..."')
+    if request.given and request.file is None:
+        raise InputError("--set gives values to a mission file, and there is none", hint="name the file as well")
+    request, loaded, world, knowledge = _opened(request)
+    configs = request.robots or _named_robots(loaded, world, knowledge)
+    if not configs:
+        return _for_the_only_robot(_standing(request, world, knowledge, ask), loaded)
+    if request.start is not None or request.stack is not None:
+        what = "--start and --stack are for a run with one robot"
+        raise InputError(what, hint="write alice=spot@X,Y,YAW, or `robots` with `at` and `stack` in a mission file")
+    robots = placed_robots(world, knowledge, configs)
+    setting = Setting(replace(request, robots=configs), world, knowledge, robots, ask)
+    if loaded is None:
+        return _for_whom_it_calls(setting)
+    return _in_parts(setting, loaded, loaded.parts) if loaded.parts is not None else _for_one_robot(setting, loaded)
+
+
+def prepare_alone(request: Request) -> Prepared:
+    """A request understood for one robot, whichever robots it names; nobody is asked. Raises InputError."""
+    request, loaded, world, knowledge = _opened(replace(request, robots=()))
+    return _for_the_only_robot(_standing(request, world, knowledge, None), loaded)
+
+
+def instead(prepared: Prepared, mission: Mission) -> Prepared:
+    """Another mission in the place of a robot's own. Raises InputError: it cannot be carried out."""
+    tree = compile_mission(mission, knowledge=prepared.knowledge, registry=installed_skills())
+    request = compiled_request(prepared.request, tree)
+    return replace(prepared, request=request, mission=mission, tree=tree, meant=None)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A request in its world, with what is known of that and the robots in it (none: the world's only one).
+
+    `ask` is who is asked what a sentence leaves open; None: nobody.
+    """
+
+    request: Request
+    world: World
+    knowledge: Knowledge
+    robots: Mapping[str, PlacedRobot]
+    ask: Answerer | None = None
+
+    def for_robot(self, name: str) -> Setting:
+        """The same as one of the robots knows it, from where it stands."""
+        robot = self.robots[name]
+        world = replace(self.world, start=robot.start, dock=robot.dock)
+        return replace(self, world=world, knowledge=knowledge_for(robot, self.robots, self.knowledge))
+
+    def understood(self) -> Addressed:
+        """What the request's sentence asks of each robot. Raises InputError: it is not understood."""
+        asked = self.request.require_wake
+        meant = understand_for_robots_asking(
+            self.request.sentence or "",
+            answer=self.answerer(self.request.questions),
+            robots=tuple(self.robots),
+            parser=load_parser(),
+            knowledge=self.knowledge,
+            require_wake=self.knowledge.robot.require_wake if asked is None else asked,
+        )
+        if meant.status is not Status.OK:
+            raise InputError(meant.reason or "the sentence was not understood")
+        return meant
+
+    def answerer(self, policy: QuestionPolicy | None) -> Answerer:
+        """Who answers: first the request's own answers in their order; the policy says how further ones are answered.
+
+        Raises InputError: an answer that was given is too long or no plain text.
+        """
+        left = iter([plain_text(text, what="--answer", longest=LONGEST_ANSWER) for text in self.request.answers])
+        further = answer_by(policy or QuestionPolicy.ASK, self.ask)
+
+        def answer(question: ClarifyingQuestion) -> str | None:
+            return next(left, None) or further(question)
+
+        return answer
+
+    def part(self, name: str, meanings: Sequence[Understanding]) -> Prepared:
+        """What one robot is to do: all that was meant for it, from where it stands. Raises InputError: it cannot be."""
+        steps = tuple(step for meant in meanings for step in steps_of(meant))
+        notes = tuple(note for meant in meanings for note in meant.notes)
+        mission = mission_from_steps(steps, world=self.world.name, robot_name=name)
+        return self.for_robot(name).compiled(replace(mission, notes=notes))
+
+    def commanded(self) -> Mission:
+        """The mission of the request's commands in their text form, or of steps in their written form."""
+        request = self.request
+        try:
+            mission = mission_from_lines(request.commands, world=self.world.name, robot_name=request.robot)
+        except ValueError as error:
+            raise InputError(f"the mission '{request.name}' cannot be read: {error}", hint="give it again") from error
+        return replace(mission, name=request.name)
+
+    def filed(self, loaded: MissionFile) -> Prepared:
+        """What a mission file asks of the robot that stands in this world. Raises InputError."""
+        knowledge = overridden(loaded, self.knowledge)
+        answer = self.answerer(self.request.questions or loaded.questions)
+        mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
+        world = _with_people(loaded, _with_objects(loaded, self.world, knowledge), knowledge)
+        file = self.request.file
+        text = None if file is None else file.read_text(encoding="utf-8")
+        own = replace(self, request=replace(self.request, text=text), world=world, knowledge=knowledge)
+        return own.compiled(mission)
+
+    def compiled(self, mission: Mission, meant: Understanding | None = None) -> Prepared:
+        """The request with its mission compiled for this world. Raises InputError: it cannot be."""
+        request, world = self.request, self.world
+        if request.scenario or request.scenario_files:
+            from executive.app.scenarios import with_events, with_scenario
+
+            request = with_scenario(request, world, self.knowledge)
+            world = with_events(world, request.scenario)
+        if request.variation.people:
+            world = _with_passers_by(world, request)
+        tree = compile_mission(mission, knowledge=self.knowledge, registry=installed_skills())
+        request = replace(request, world_name=world.name, robot=mission.robot_name)
+        name, robots = mission.robot_name, self.robots
+        if not robots:
+            robots = {name: only_robot(name, world, start=request.start, stack=request.stack, seed=request.seed)}
+        return Prepared(compiled_request(request, tree), mission, world, self.knowledge, tree, robots, meant)
+
+
+def _opened(request: Request) -> tuple[Request, MissionFile | None, World, Knowledge]:
+    """A request with its file read where it has one, its world, and what is known of that. Raises InputError."""
+    loaded = None
+    if request.file is not None:
+        file = mission_file(request.file)
+        request, loaded = replace(request, file=file), load_mission(file, request.given)
+    if request.world is not None or loaded is None:
+        world = open_world(request.world or request.world_name or DEFAULT_WORLD)
+    else:
+        try:
+            world = open_world(loaded.world)
+        except InputError as error:
+            raise loaded.error(("world",), error.message, error.hint) from error
+    knowledge = knowledge_of(world)
+    return request, loaded, world if request.map is None else with_map(world, request.map), knowledge
+
+
+def _named_robots(loaded: MissionFile | None, world: World, knowledge: Knowledge) -> tuple[RobotConfig, ...]:
+    """The robots that a mission file names, else its world; none where it is for the world's only robot."""
+    named = knowledge.robots if loaded is None or loaded.robots is None else loaded.robots
+    if named is None:
+        return ()
+    from plant.kinds import robot_kinds
+
+    own = read_yaml(world.knowledge_path) if loaded is None or loaded.robots is None else loaded.source
+    return robots_in(named, robot_kinds(), own)
+
+
+def _standing(request: Request, world: World, knowledge: Knowledge, ask: Answerer | None) -> Setting:
+    """The setting with the only robot where the request has it. Raises InputError: it is not free there."""
+    start = None if request.start is None else request.start.pose
+    if start is not None:
+        refuse_blocked(world, start)
+        world = replace(world, start=start)
+        known = Pose(x=start.x_m, y=start.y_m, yaw=start.yaw_rad)
+        knowledge = knowledge.model_copy(update={"start": known})
+    return Setting(request, world, knowledge, {}, ask)
+
+
+def _for_the_only_robot(setting: Setting, loaded: MissionFile | None) -> Prepared:
+    """What the world's only robot is to do. Raises InputError."""
+    request, robot = setting.request, setting.knowledge.robot
+    if loaded is not None:
+        return setting.filed(loaded)
+    if request.sentence is None:
+        return setting.compiled(setting.commanded())
+    wake = robot.require_wake if request.require_wake is None else request.require_wake
+    meant = understood(
+        request.sentence,
+        parser=load_parser(),
+        knowledge=setting.knowledge,
+        require_wake=wake,
+        answer=setting.answerer(request.questions),
+    )
+    mission = mission_from_meaning(meant, world=setting.world.name, robot_name=robot.name)
+    asked = replace(request, sentence=meant.text, require_wake=wake)
+    return replace(setting, request=asked).compiled(mission, meant)
+
+
+def _for_whom_it_calls(setting: Setting) -> Prepared:
+    """What each robot is to do that a sentence calls, or that commands are for. Raises InputError."""
+    request, robots = setting.request, setting.robots
+    if request.sentence is None:
+        name = robot_called(request.robot, robots) or next(iter(robots))
+        return setting.for_robot(name).compiled(replace(setting.commanded(), robot_name=name))
+    meant = setting.understood()
+    setting = replace(setting, request=replace(request, sentence=meant.text))
+    parts = [part for each in meant.parts for part in _expanded(each, setting)]
+    waits = _waits(meant.parts, robots)
+    every = [
+        replace(
+            setting.part(name, [part.meaning for part in parts if part.robot == name]),
+            after=waits.get(name, ()),
+            speaker_W=next((_speaker_W(part, robots) for part in parts if part.robot == name), None),
+        )
+        for name in robots
+        if any(part.robot == name for part in parts)
+    ]
+    return together(every)
+
+
+def _expanded(part: Part, setting: Setting) -> Iterator[Part]:
+    """The part for each robot that it is for. Raises InputError: it is for any of them, and none can do it."""
+    if part.robot is Whom.ALL:
+        yield from (replace(part, robot=name) for name in setting.robots)
+    elif part.robot is Whom.ANY:
+        yield replace(part, robot=_first_done(setting.robots, lambda name: setting.part(name, [part.meaning]))[0])
+    else:
+        yield part
+
+
+def _first_done(names: Collection[str], prepared_for: Callable[[str], Prepared]) -> tuple[str, Prepared]:
+    """The robot that can do a mission and is done first, by the estimate, and its part. Raises InputError: none can."""
+    from executive.app.feasibility import check_prepared  # which loads the check, where more than one may do it
+
+    able, reasons = dict[str, float](), list[str]()
+    every = {name: prepared_for(name) for name in names}
+    for name, prepared in every.items():
+        checked = check_prepared(prepared)
+        if checked.errors:
+            reasons.append(f"{name}: {checked.errors[0].message}")
+        else:
+            able[name] = checked.estimate.duration_s
+    if not able:
+        raise InputError(f"no robot can do it: {'; '.join(reasons)}")
+    first = min(able, key=lambda name: able[name])
+    return first, every[first]
+
+
+def _for_one_robot(setting: Setting, loaded: MissionFile) -> Prepared:
+    """A mission file, done by the robot that it names, or that can do it and is done first. Raises InputError."""
+    robots = setting.robots
+    names = tuple(robots) if loaded.robot is None else (_robot_in(loaded, ("robot",), loaded.robot, robots),)
+
+    def filed(name: str) -> Prepared:
+        return setting.for_robot(name).filed(for_robot(loaded, name))
+
+    return filed(names[0]) if len(names) == 1 else _first_done(names, filed)[1]
+
+
+def _in_parts(setting: Setting, loaded: MissionFile, parts: Mapping[str, PartFile]) -> Prepared:
+    """The parts of a mission file, in the order of the robots. Raises InputError: one is for no robot of the run."""
+    robots, written = setting.robots, dict[str, str]()
+    for part in parts:
+        name = _robot_in(loaded, ("parts", part), part, robots)
+        if name in written:
+            raise loaded.error(("parts", part), f"there are two parts for {name}", "put their steps into one")
+        written[name] = part
+    waits: dict[str, tuple[str, ...]] = {}
+    for name, part in written.items():
+        at = ("parts", part, "after")
+        waits[name] = tuple(_robot_in(loaded, at, first, written) for first in parts[part].first)
+        try:
+            _refuse_rings(waits)
+        except InputError as error:
+            raise loaded.error(at, error.message, "let one of them begin") from error
+    problems, made = Problems(), list[Prepared]()
+    for name in (name for name in robots if name in written):
+        with problems:
+            own = for_robot(loaded, name, written[name])
+            made.append(replace(setting.for_robot(name).filed(own), after=waits[name]))
+    problems.raise_any()
+    return together(made)
+
+
+def _robot_in(loaded: MissionFile, at: KeyPath, said: str, robots: Collection[str]) -> str:
+    """The robot that a file names. Raises InputError: it is none of those that it could be."""
+    name = robot_called(said, robots)
+    if name is None:
+        what = "has no part to wait for" if at[-1] == "after" else "is no robot of this run"
+        raise loaded.error(at, f"'{said[:60]}' {what}", suggestion(said, robots))
+    return name
+
+
+def _waits(parts: Sequence[Part], robots: Mapping[str, PlacedRobot]) -> Mapping[str, tuple[str, ...]]:
+    """For each robot those that must be done first. Raises InputError: two wait for each other."""
+    waits: dict[str, set[str]] = {}
+    for part in parts:
+        first = {str(parts[number].robot) for number in part.after if parts[number].robot in robots}
+        if isinstance(part.robot, str):
+            waits.setdefault(part.robot, set()).update(first - {part.robot})
+    _refuse_rings(waits)
+    return {name: tuple(sorted(first)) for name, first in waits.items() if first}
+
+
+def _refuse_rings(waits: Mapping[str, Collection[str]]) -> None:
+    """Raise InputError where robots would wait for each other."""
+    try:
+        TopologicalSorter(waits).prepare()
+    except CycleError as error:
+        ring = sorted(set(error.args[1]))
+        what = f"{ring[0]} would wait for itself" if len(ring) == 1 else f"{listing(ring)} would wait for each other"
+        raise InputError(what, hint="give the last part when the first is done") from error
+
+
+def _speaker_W(part: Part, robots: Mapping[str, PlacedRobot]) -> Pose2D | None:
+    """Where the robot stands by which the speaker stands, when it is another than the one that acts."""
+    by = part.speaker_by
+    return robots[by].start if by is not None and by in robots and by != part.robot else None
+
+
+def _with_people(loaded: MissionFile, world: World, knowledge: Knowledge) -> World:
+    """The world with the people who walk in a mission's file. Raises InputError."""
+    routes = {name: RouteRule.model_validate(values) for name, values in routes_in(loaded, knowledge).items()}
+    try:
+        return world.with_routes(routes) if routes else world
+    except WorldError as error:
+        raise loaded.error(("people",), str(error), "change the route or its name here") from error
+
+
+def _with_objects(loaded: MissionFile, world: World, knowledge: Knowledge) -> World:
+    """The world with the models and objects of a mission's file. Raises InputError."""
+    problems = Problems()
+    for index, folder in enumerate(import_folders(loaded)):
+        try:
+            world = world.with_imports([folder])
+        except InputError as error:
+            problems.add(loaded.error(("imports", index), str(error), ""))
+    problems.raise_any()
+    for name, file in (loaded.objects or {}).items():
+        surfaces = tuple(knowledge.place(surface) or surface for surface in file.surfaces)
+        try:
+            world = world.with_objects([ObjectRule(name=name, model=file.model, surfaces=surfaces)])
+        except WorldError as error:
+            problems.add(loaded.error(("objects", name), str(error), ""))
+    problems.raise_any()
+    return world
+
+
+def _with_passers_by(world: World, request: Request) -> World:
+    """The world with the people of the request's variation. Raises InputError: the world has no place for them."""
+    from plant.worlds.clutter import with_passers_by
+
+    try:
+        return with_passers_by(world, request.variation.people, request.seed)
+    except WorldError as error:
+        raise InputError(str(error), hint="take --people out") from error

@@ -9,11 +9,10 @@ from typing import Any
 
 from executive.app.artifacts import Artifacts
 from executive.app.report import VERDICTS
-from executive.app.report_file import EndedTree, map_of, part_of, save_report
+from executive.app.report_file import EndedTree, MissionRow, ReportPage, ReportPart, map_of, part_of, save_report
 from executive.record.reader import Event
 from executive.store.given import GivenMission, GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.view.report_page import MissionRow, ReportPage, ReportPart
 
 __all__ = ["EndedMission", "mission_rows", "missions_message", "told", "write_fleet_report"]
 
@@ -92,8 +91,6 @@ def write_fleet_report(
     page = ReportPage(
         title="Fleet",
         request=f"{did} of {len(rows)} missions done",
-        commands=(),
-        verdicts=(),
         facts=(("robots", ", ".join(f"{name} ({kind})" for name, kind in robots.items())), *facts),
         missions=rows,
         map=map_of(artifacts, events, several=len(robots) > 1),

@@ -1,15 +1,22 @@
-"""The report of one run: what the tree claimed and what the referee saw."""
+"""The report of one run: what the tree claimed, what the referee saw, and what was found out.
+
+The same dataclasses are what `--json` prints and what `report.html` shows.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, Final
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final
 
 from rich.markup import escape
 
 from executive.run.findings import Said
 from skills.files.errors import count_text
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 
 @dataclass(frozen=True)
@@ -41,7 +48,7 @@ class ReportedAnswer:
     """
 
     question: str
-    answer: bool | str | float | None
+    answer: bool | str | int | float | None
     sentence: str
     t_s: float
     place: str | None = None
@@ -58,12 +65,31 @@ class ReportedObject:
     position_W: tuple[float, float, float]
     t_s: float
 
+    @property
+    def where(self) -> str:
+        """The surface and the room in words."""
+        on = f"on the {self.surface}" if self.surface else ""
+        return ", ".join(filter(None, (on, self.place))) or "somewhere else"
+
 
 @dataclass(frozen=True)
-class RobotReport:
-    """How the mission of one robot ended, what the referee saw of it, and what it was to do."""
+class Verdict:
+    """What somebody says of a mission: who, whether it is good (None: not judged), in one word, and why."""
 
-    kind: str
+    who: str
+    good: bool | None
+    word: str
+    text: str
+
+    def line(self) -> str:
+        """The verdict in one line, with rich markup."""
+        return f"[bold]{escape(self.who)}:[/bold] {_MARKS[self.good]} {self.word}: {escape(self.text)}"
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a mission ended, what it was to do, and what the referee saw; None where nobody but the robot saw it."""
+
     outcome: str
     cause: str | None
     message: str
@@ -71,42 +97,52 @@ class RobotReport:
     commands: tuple[str, ...]
 
     @property
+    def claimed(self) -> bool:
+        """The tree says that the mission is achieved."""
+        return self.outcome == "success"
+
+    @property
     def achieved(self) -> bool:
-        """The tree says that the mission is achieved, and no referee denies it."""
-        return self.outcome == "success" and (self.referee is None or self.referee.success is not False)
+        """The tree says so, and no referee denies it."""
+        return self.claimed and self.seen.success is not False
 
-    def to_json(self) -> dict[str, Any]:
-        """The report as JSON values; the referee's events are for people only."""
-        values = {**asdict(self), "commands": list(self.commands)}
+    @property
+    def false_claim(self) -> bool:
+        """The tree says so and the referee denies it."""
+        return self.claimed and self.seen.success is False
+
+    @property
+    def seen(self) -> RefereeReport:
+        """What the referee saw: nothing judged where there is none."""
+        return self.referee or NOT_JUDGED
+
+    def verdicts(self, *, name: str | None = None, counts: bool = False) -> Iterator[Verdict]:
+        """What the tree claims, of the robot that is named, and what the referee saw, with its counts if asked for."""
+        cause = f" ({self.cause})" if self.cause else ""
+        who = "The tree claims" if name is None else f"{name}'s tree claims"
+        yield Verdict(who, self.claimed, f"{self.outcome}{cause}", self.message)
         if self.referee is not None:
-            del values["referee"]["events"]
-        return values
-
-    @staticmethod
-    def from_json(values: Mapping[str, Any]) -> RobotReport:
-        """A report that another process has printed."""
-        referee = None if values["referee"] is None else RefereeReport(**values["referee"])
-        return RobotReport(**{**values, "referee": referee, "commands": tuple(values["commands"])})
-
-
-NOT_JUDGED: Final = RefereeReport(None, "there is no referee", 0, 0)
-VERDICTS: Final[Mapping[bool | None, str]] = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
+            counted = f" ({counts_text(self.referee)})" if counts else ""
+            good = self.referee.success
+            yield Verdict("The referee saw", good, VERDICTS[good], f"{self.referee.why}{counted}")
 
 
 @dataclass(frozen=True)
-class RunReport:
+class RobotReport(Ending):
+    """How the mission of one robot ended, and which kind of robot it is."""
+
+    kind: str
+
+
+@dataclass(frozen=True)
+class RunReport(Ending):
     """One run, with the keys that scripts rely on.
 
-    Times in seconds; `log` is the event log's path, `work` what was computed, as counters by name. `referee` is None
-    where nobody but the robot saw what happened. `answers` has all answers in order, `said` what the robot said,
-    `seen_objects` what it is sure to have seen. `scenario` tells what went wrong and happened by intention.
+    Times in seconds; `log` is the event log's path, `work` what was computed, as counters by name. `answers` has all
+    answers in order, `said` what the robot said, `seen_objects` what it is sure to have seen. `scenario` tells what
+    went wrong and happened by intention.
     """
 
-    outcome: str
-    cause: str | None
-    message: str
-    referee: RefereeReport | None
-    commands: tuple[str, ...]
     world: str
     seed: int
     sim_time_s: float
@@ -121,89 +157,52 @@ class RunReport:
     scenario: tuple[str, ...] = ()
     robots: Mapping[str, RobotReport] = field(default_factory=dict)
 
-    @property
-    def claimed(self) -> bool:
-        """The tree says that the mission is achieved."""
-        return self.outcome == "success"
-
-    @property
-    def achieved(self) -> bool:
-        """The tree says so, and no referee denies it."""
-        return self.claimed and self.seen.success is not False
-
-    @property
-    def seen(self) -> RefereeReport:
-        """What the referee saw: nothing judged where there is none."""
-        return self.referee or NOT_JUDGED
-
-    @property
-    def false_claim(self) -> bool:
-        """The tree says so and the referee denies it."""
-        return self.claimed and self.seen.success is False
-
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values; the referee's events are for people only."""
-        robots = {name: robot.to_json() for name, robot in self.robots.items()}
-        values = {**asdict(replace(self, work={}, robots={})), "work": dict(self.work), "robots": robots}
-        lists = {name: list(values[name]) for name in ("commands", "answers", "said", "seen_objects", "scenario")}
-        values = {**values, **lists}
+        no_events = {"referee": {"events"}}
+        without: dict[str, Any] = {**no_events, "robots": {"__all__": no_events}}
         for name in ("scenario", "robots"):
-            if not values[name]:
-                del values[name]
-        if self.referee is not None:
-            del values["referee"]["events"]
+            if not getattr(self, name):
+                without[name] = True
+        plain = replace(self, work=dict(self.work), robots=dict(self.robots))
+        values: dict[str, Any] = _adapter().dump_python(plain, mode="json", exclude=without)
         return values
 
     @staticmethod
     def from_json(values: Mapping[str, Any]) -> RunReport:
         """A report that another process has printed."""
-        values = {"scenario": (), "robots": {}, **values}
-        own = {each.name: values[each.name] for each in fields(RunReport)}
-        referee = None if values["referee"] is None else RefereeReport(**values["referee"])
-        lists = {
-            "commands": tuple(values["commands"]),
-            "answers": tuple(ReportedAnswer(**each) for each in values["answers"]),
-            "said": tuple(Said(**each) for each in values["said"]),
-            "seen_objects": tuple(_reported_object(each) for each in values["seen_objects"]),
-            "scenario": tuple(values["scenario"]),
-            "robots": {name: RobotReport.from_json(each) for name, each in values["robots"].items()},
-        }
-        return RunReport(**{**own, "referee": referee, **lists})
+        return _adapter().validate_python(dict(values))
 
-    def lines(self) -> tuple[str, ...]:
-        """The two verdicts and the figures, with rich markup."""
-        cause = f" ({self.cause})" if self.cause else ""
+    def lines(self) -> Iterator[str]:
+        """The verdicts and the figures, with rich markup."""
         figures = (
             f"{self.sim_time_s:.1f} s simulated in {self.wall_time_s:.1f} s ({self.real_time_factor:.1f} x real time), "
             f"{self.ticks} ticks"
         )
         if self.robots:
-            return (*(line for name, robot in self.robots.items() for line in _robot_lines(name, robot)), figures)
-        claims = f"[bold]The tree claims:[/bold] {_mark(self.claimed)} {self.outcome}{cause}: {escape(self.message)}"
-        if self.referee is None:
-            return claims, figures
-        verdict = f"{_mark(self.referee.success)} {VERDICTS[self.referee.success]}"
-        return (
-            claims,
-            f"[bold]The referee saw:[/bold] {verdict}: {escape(self.referee.why)}",
-            f"{counts_text(self.referee)}; {figures}",
-            *(escape(f"  {event}") for event in self.referee.events),
-        )
+            for name, robot in self.robots.items():
+                yield from (verdict.line() for verdict in robot.verdicts(name=name, counts=True))
+            yield figures
+            return
+        yield from (verdict.line() for verdict in self.verdicts())
+        yield figures if self.referee is None else f"{counts_text(self.referee)}; {figures}"
+        yield from (escape(f"  {event}") for event in self.seen.events)
 
 
-def _robot_lines(name: str, robot: RobotReport) -> Iterator[str]:
-    """The two verdicts on one robot of several, with rich markup."""
-    cause = f" ({robot.cause})" if robot.cause else ""
-    claimed = robot.outcome == "success"
-    yield f"[bold]{escape(name)}'s tree claims:[/bold] {_mark(claimed)} {robot.outcome}{cause}: {escape(robot.message)}"
-    if robot.referee is not None:
-        verdict = f"{_mark(robot.referee.success)} {VERDICTS[robot.referee.success]}"
-        yield f"[bold]The referee saw:[/bold] {verdict}: {escape(robot.referee.why)} ({counts_text(robot.referee)})"
+NOT_JUDGED: Final = RefereeReport(None, "there is no referee", 0, 0)
+VERDICTS: Final[Mapping[bool | None, str]] = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
+_MARKS: Final[Mapping[bool | None, str]] = {
+    True: "[green]✓[/green]",
+    False: "[red]✗[/red]",
+    None: "[yellow]?[/yellow]",
+}
 
 
-def _reported_object(values: Mapping[str, Any]) -> ReportedObject:
-    x_m, y_m, z_m = values["position_W"]
-    return ReportedObject(**{**values, "position_W": (x_m, y_m, z_m)})
+@cache
+def _adapter() -> TypeAdapter[RunReport]:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(RunReport)
 
 
 def counts_text(referee: RefereeReport) -> str:
@@ -214,7 +213,3 @@ def counts_text(referee: RefereeReport) -> str:
     if referee.hit_by_people:
         counts.append(f"{count_text(referee.hit_by_people, 'time')} somebody walked into the robot")
     return ", ".join(counts)
-
-
-def _mark(good: bool | None) -> str:
-    return {True: "[green]✓[/green]", False: "[red]✗[/red]", None: "[yellow]?[/yellow]"}[good]

@@ -15,29 +15,32 @@ from py_trees.common import Status
 from executive.app.artifacts import Artifacts, detection_picture, file_name, to_jpeg
 from executive.app.picture_files import read_picture
 from executive.app.prepared import Prepared
-from executive.app.report import VERDICTS, RobotReport, RunReport, counts_text
+from executive.app.report import Ending, ReportedAnswer, ReportedObject, RobotReport, RunReport, counts_text
 from executive.record.reader import Event
 from executive.record.schemas import TRANSITIONS
-from executive.run.outcome import Outcome
+from executive.run.findings import Said
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView
 from executive.view.collapse import DRAWN_NODES, folded_to, what_ran
+from executive.view.html import render
 from executive.view.map_picture import map_picture
-from executive.view.report_page import (
-    AnswerRow,
-    PagePicture,
-    ReportPage,
-    ReportPart,
-    SeenRow,
-    StepRow,
-    Verdict,
-    to_report,
-)
-from executive.view.styles import ROBOT_COLOURS, Styles, style_of
+from executive.view.styles import ROBOT_COLOURS, NodeStyle, Styles, style_of
 from executive.view.svg import to_svg
 from skills.files.errors import InputError
 
-__all__ = ["REPORT", "EndedTree", "map_of", "part_of", "save_report", "step_rows", "write_report"]
+__all__ = [
+    "REPORT",
+    "EndedTree",
+    "MissionRow",
+    "ReportPage",
+    "ReportPart",
+    "StepRow",
+    "map_of",
+    "part_of",
+    "save_report",
+    "step_rows",
+    "write_report",
+]
 
 REPORT: Final = "report.html"
 TREE: Final = "tree"
@@ -51,6 +54,70 @@ _MAP: Final = "The map, with the path of the robot"
 _MAPS: Final = "The map, with the path of each robot"
 _SKIPPED: Final = "skipped"
 _SKIPS: Final = frozenset({"skip", "ask"})
+
+
+Picture = tuple[str, bytes]
+"""What a picture shows, and its JPEG file."""
+
+
+@dataclass(frozen=True)
+class StepRow:
+    """A step, `depth` levels in: its name, style and word, its span (s; None: not begun), and what came of it."""
+
+    name: str
+    style: NodeStyle
+    word: str
+    depth: int = 0
+    span_s: tuple[float, float] | None = None
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class MissionRow:
+    """A mission of a fleet: its number, what was asked for, its robot, how it ended (`good` is None while it has not),
+    how often it was given to another robot, and the sentence of its end.
+    """
+
+    number: int
+    request: str
+    robot: str
+    good: bool | None
+    word: str
+    reassigned: int
+    message: str
+
+
+@dataclass(frozen=True)
+class ReportPart:
+    """What one robot did, or one mission of a fleet; `colour` is the robot's (hex)."""
+
+    title: str
+    colour: str
+    report: Ending
+    steps: Sequence[StepRow] = ()
+    pictures: Sequence[Picture] = ()
+    tree_svg: str = ""
+
+
+@dataclass(frozen=True)
+class ReportPage:
+    """What `report.html` shows. `request` is the sentence or the file, `facts` are pairs of a name and a value.
+
+    `alone` is what the only robot did; of several, `parts` has what each did, and `missions` what they were given.
+    """
+
+    title: str
+    request: str
+    facts: Sequence[tuple[str, str]]
+    alone: ReportPart | None = None
+    parts: Sequence[ReportPart] = ()
+    missions: Sequence[MissionRow] = ()
+    answers: Sequence[ReportedAnswer] = ()
+    answer_pictures: Sequence[bytes] = ()
+    said: Sequence[Said] = ()
+    seen: Sequence[ReportedObject] = ()
+    events: Sequence[str] = ()
+    map: Picture | None = None
 
 
 @dataclass(frozen=True)
@@ -87,31 +154,19 @@ def write_report(
     names = tuple(prepared.robots)
     for each in ended:
         (out / f"{file_name(TREE, each.tree.robot_name, names)}.svg").write_text(each.picture, encoding="utf-8")
+    parts = [part_of(each, names, artifacts, events) for each in ended]
     page = ReportPage(
         title=", ".join(names) if several else prepared.mission.name,
         request=_request(prepared),
-        commands=() if several else report.commands,
-        verdicts=() if several else tuple(_verdicts(report)),
         facts=_facts(report, "" if several else ended[0].tree.robot_name),
-        answers=[
-            AnswerRow(
-                one.t_s,
-                one.question,
-                one.place or "",
-                one.answer,
-                one.sentence,
-                None if one.picture is None else artifacts.pictures[one.picture],
-            )
-            for one in report.answers
-        ],
-        said=[(one.t_s, one.text) for one in report.said],
-        seen=[SeenRow(each.t_s, each.name, _where(each.surface, each.place)) for each in report.seen_objects],
-        steps=() if several else ended[0].steps(events),
-        events=() if report.referee is None else report.referee.events,
+        alone=None if several else parts[0],
+        parts=parts if several else (),
+        answers=report.answers,
+        answer_pictures=artifacts.pictures,
+        said=report.said,
+        seen=report.seen_objects,
+        events=report.seen.events,
         map=map_of(artifacts, events, several=several),
-        pictures=() if several else tuple(_pictures(artifacts, ended[0].tree.robot_name, names)),
-        tree_svg="" if several else ended[0].picture,
-        parts=[part_of(each, names, artifacts, events) for each in ended] if several else (),
     )
     return save_report(out, page)
 
@@ -123,9 +178,8 @@ def part_of(
     name, report = ended.tree.robot_name, ended.report
     return ReportPart(
         title=title or f"{name} ({report.kind})",
-        colour=ROBOT_COLOURS[sorted(robots).index(name) % len(ROBOT_COLOURS)],
-        commands=report.commands,
-        verdicts=tuple(_verdicts(report, counts=True)),
+        colour=ROBOT_COLOURS[(*sorted(robots), name).index(name) % len(ROBOT_COLOURS)],
+        report=report,
         steps=ended.steps(events),
         pictures=tuple(_pictures(artifacts, name, robots)) if title is None else (),
         tree_svg=ended.picture,
@@ -135,7 +189,7 @@ def part_of(
 def save_report(out: Path, page: ReportPage) -> Path:
     """Write a report's page into a folder; its path."""
     path = out / REPORT
-    path.write_text(to_report(page), encoding="utf-8")
+    path.write_text(render("run.html", page=page), encoding="utf-8")
     return path
 
 
@@ -210,18 +264,6 @@ def _request(prepared: Prepared) -> str:
     return f"mission file {request.file.name}" if request.file is not None else "commands"
 
 
-def _verdicts(report: RunReport | RobotReport, *, counts: bool = False) -> Iterator[Verdict]:
-    """What the tree claims and what the referee saw, with its counts where they are asked for."""
-    cause = f" ({report.cause})" if report.cause else ""
-    yield Verdict(
-        "The tree claims", report.outcome == Outcome.SUCCESS.value, f"{report.outcome}{cause}", report.message
-    )
-    if report.referee is not None:
-        good = report.referee.success
-        why = f"{report.referee.why} ({counts_text(report.referee)})" if counts else report.referee.why
-        yield Verdict("The referee saw", good, VERDICTS[good], why)
-
-
 def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
     """The facts of a run; without a robot's name those of all robots."""
     facts = (
@@ -234,31 +276,26 @@ def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
     return (("robot", robot_name), *facts, *contacts)
 
 
-def _where(surface: str | None, place: str | None) -> str:
-    on = f"on the {surface}" if surface else ""
-    return ", ".join(filter(None, (on, place))) or "somewhere else"
-
-
-def map_of(artifacts: Artifacts, events: Sequence[Event], *, several: bool) -> PagePicture | None:
+def map_of(artifacts: Artifacts, events: Sequence[Event], *, several: bool) -> Picture | None:
     """The world from above where the run was recorded, else the robot's own map; None where there is neither."""
     caption = _MAPS if several else _MAP
     if (drawn := _drawn(artifacts, "map")) is not None:
-        return PagePicture(caption, drawn)
+        return caption, drawn
     try:
         picture = map_picture(events)
     except InputError:
         return None
-    return PagePicture(caption, to_jpeg(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8)))
+    return caption, to_jpeg(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8))
 
 
-def _pictures(artifacts: Artifacts, robot: str, robots: Sequence[str]) -> Iterator[PagePicture]:
+def _pictures(artifacts: Artifacts, robot: str, robots: Sequence[str]) -> Iterator[Picture]:
     """The pictures of a robot in a recorded run; of another, what was detected first."""
     detection = artifacts.of(robot).detection
     for name, caption in _CAPTIONS.items():
         if (drawn := _drawn(artifacts, file_name(name, robot, robots))) is not None:
-            yield PagePicture(caption, drawn)
+            yield caption, drawn
         elif name == "detection" and detection is not None and not artifacts.pictures:
-            yield PagePicture(caption, to_jpeg(detection_picture(detection)))
+            yield caption, to_jpeg(detection_picture(detection))
 
 
 def _drawn(artifacts: Artifacts, name: str) -> bytes | None:

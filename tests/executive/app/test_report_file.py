@@ -53,7 +53,7 @@ def test_what_was_said_is_in_report_and_page(talk):
     page = (talk.request.out / "report.html").read_text(encoding="utf-8")
     assert "Hello &amp; &lt;i&gt;welcome&lt;/i&gt;" in page
     assert "<i>" not in page
-    assert page.count("said &quot;") >= 2
+    assert page.count("said &#34;") >= 2
     assert "The map, with the path of the robot" in page
 
 

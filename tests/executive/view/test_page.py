@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from executive.app.report import ReportedAnswer, RobotReport
+from executive.app.report_file import ReportPage, ReportPart, StepRow
 from executive.conversation import Conversation, Speech
 from executive.language.questions import ClarifyingQuestion, Slot
 from executive.language.understand import Status, Understanding
@@ -25,8 +27,8 @@ from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
 from executive.view.actions import RefusedError, asked_json, control_actions
 from executive.view.feed import Feed
+from executive.view.html import render
 from executive.view.replay import fed, to_html
-from executive.view.report_page import AnswerRow, ReportPage, StepRow, Verdict, to_report
 from executive.view.server import PageContent, PageServer
 from executive.view.styles import Styles
 from executive.view.watch import SEND_LIMIT_S, ControlWatch
@@ -635,10 +637,10 @@ def test_what_the_robot_says_is_announced_and_in_the_list(page, live):
 
 
 def test_the_report_is_drawn_without_scripts_in_the_width_of_a_telephone(browser, tmp_path):
-    answers = (AnswerRow(1.0, "hammer in the office", "office", False, "no hammer " + "x" * 200),)
+    answers = (ReportedAnswer("hammer in the office", False, "no hammer " + "x" * 200, 1.0, "office"),)
     steps = (StepRow("go to the hall", Styles.SUCCESS.value, "success", 0, (0.0, 9.0), "there"),)
-    verdict = Verdict("The tree claims", True, "success", "no hammer")
-    report = to_report(ReportPage("patrol", "patrol.yaml", (), (verdict,), (), answers, steps=steps))
+    alone = ReportPart("Alice", "#0072b2", RobotReport("success", None, "no hammer", None, (), "spot"), steps)
+    report = render("run.html", page=ReportPage("patrol", "patrol.yaml", (), alone, answers=answers))
     (tmp_path / "report.html").write_text(report, encoding="utf-8")
     context = browser.new_context(viewport={"width": 390, "height": 800}, java_script_enabled=False)
     opened = context.new_page()

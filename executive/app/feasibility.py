@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
+import os
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, cached_property
+from pathlib import Path
+from typing import Final
 
 from executive.app.prepared import Prepared
 from executive.app.robots import DEFAULT_KIND, PlacedRobot
-from executive.app.route_cache import route_cache_of
 from executive.app.worlds import refuse_unusable
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
 from executive.tree.estimate import Route, RoutePlanner, load_estimates
@@ -20,7 +26,9 @@ from skills.files.errors import Problems
 from skills.perception.attributes import known_attributes
 from skills.perception.class_forms import class_forms
 from skills.robot import Capabilities, Pose2D
-from skills.stack import default_component
+from skills.stack import DEFAULT_FILE, default_component
+
+__all__ = ["RouteCache", "route_cache_of"]
 
 
 class _RoutesOnMap(RoutePlanner):
@@ -150,3 +158,63 @@ def reached_heights_m(capabilities: Capabilities) -> tuple[float, float]:
     upright_m = math.sqrt(max(0.0, arm.max_reach_m**2 - ahead_m**2))
     low_m, high_m = capabilities.height_range_m
     return low_m + float(z_m) - upright_m, high_m + float(z_m) + upright_m
+
+
+_SKILLS: Final = DEFAULT_FILE.parent
+
+
+class RouteCache(RoutePlanner):
+    """Routes kept in a file. It plans those that the file does not have, and adds them for later processes."""
+
+    def __init__(self, file: Path, planned: RoutePlanner) -> None:
+        self._file, self._planned = file, planned
+
+    @cached_property
+    def _routes(self) -> dict[str, list[float] | str]:
+        """By start and goal: length and progress of a route, or why there is none."""
+        with suppress(OSError, ValueError):
+            routes: dict[str, list[float] | str] = json.loads(self._file.read_text(encoding="utf-8"))
+            return routes
+        return {}
+
+    def route(self, start: Pose2D, goal: Pose2D) -> Route:
+        """The route from start to goal. Raises ValueError with one sentence when there is none."""
+        name = f"{start} {goal}"
+        if name not in self._routes:
+            self._routes[name] = self._new(start, goal)
+            with suppress(OSError):
+                self._write()
+        known = self._routes[name]
+        if isinstance(known, str):
+            raise ValueError(known)
+        return Route(*known)
+
+    def _new(self, start: Pose2D, goal: Pose2D) -> list[float] | str:
+        try:
+            route = self._planned.route(start, goal)
+        except ValueError as error:
+            return str(error)
+        return [route.length_m, route.progress_m]
+
+    def _write(self) -> None:
+        """Write the file; another process sees the old one or the new one."""
+        self._file.parent.mkdir(parents=True, exist_ok=True)
+        draft = self._file.with_suffix(f".{os.getpid()}")
+        draft.write_text(json.dumps(self._routes), encoding="utf-8")
+        draft.replace(self._file)
+
+
+def route_cache_of(world: World, planned: RoutePlanner, *robot_files: Path) -> RouteCache:
+    """The routes kept for a world. They are planned again once its maps, the planner or the robot's files change."""
+    planner = (DEFAULT_FILE, *_SKILLS.glob("navigate/*.py"), *_SKILLS.glob("estimate/*.py"), *_SKILLS.glob("*.py"))
+    digest = _digest((*world.keepout_map_path.parent.glob("*"), *planner, *robot_files))
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return RouteCache(home / "errand" / "routes" / f"{digest}.json", planned)
+
+
+def _digest(files: Iterable[Path]) -> str:
+    """A digest of files' names and contents."""
+    told = hashlib.sha256()
+    for file in sorted(path for path in files if path.is_file()):
+        told.update(file.name.encode() + hashlib.sha256(file.read_bytes()).digest())
+    return told.hexdigest()[:24]

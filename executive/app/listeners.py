@@ -5,22 +5,33 @@ A port is open, and a plug-in started, only while a standing mission waits for i
 
 from __future__ import annotations
 
+import os
 import re
+import secrets
+import stat
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from http import HTTPStatus
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from executive.app.call_token import CallToken, call_token
-from executive.app.trigger_calls import TriggerCalls
+from executive.app.durable import as_it_was
+from executive.app.feasibility import refuse_impossible
+from executive.app.prepare import prepare
+from executive.mission.file.parameters import values_in_json
+from executive.mission.request import Request
+from executive.store.database import STORE_FILE
+from executive.store.missions import MissionStore, StoredMission
+from executive.store.standing import StandingMission, StandingMissions, TooManyError
 from executive.store.trigger_source import TriggerSource, trigger_source
 from executive.store.triggers import OnCall, OnTopic, Trigger
-from executive.view.calls import CallServer
+from executive.store.wakeup import wake_server
+from executive.view.calls import CallError, CallServer
 from skills.files.errors import InputError
 from skills.files.plugins import PluginDefect, run_in_thread
 
-__all__ = ["CallAddress", "Listeners"]
+__all__ = ["CallAddress", "CallToken", "Listeners", "TriggerCalls", "call_token"]
 
 LIMIT_S: Final = 10.0
 """A plug-in may take so long to start, and to stop."""
@@ -160,3 +171,105 @@ class Listeners:
             run_in_thread(source.stop, limit_s=self._limit_s)
         except PluginDefect as defect:
             self._tell(f"trigger source '{kind}' does not stop ({defect})")
+
+
+class TriggerCalls:
+    """Queues missions of a store from any thread, one call after another; `tell` prints a line."""
+
+    def __init__(self, store: Path, tell: Callable[[str], None]) -> None:
+        self._store, self._tell = store, tell
+        self._one_at_a_time = threading.Lock()
+
+    def called(self, name: str, body: bytes) -> Mapping[str, Any]:
+        """Queue what waits for an HTTP call; the numbers of the missions. Raises CallError."""
+        return {"missions": [mission.id for mission in self._queue(OnCall(name), body)]}
+
+    def heard(self, kind: str, topic: str, payload: bytes) -> None:
+        """Queue what waits for a message, or print why it cannot be; raises nothing."""
+        try:
+            self._queue(OnTopic(kind, topic), payload)
+        except CallError as refusal:
+            self._tell(f"{OnTopic(kind, topic)}: {refusal}")
+
+    def _queue(self, trigger: OnCall | OnTopic, body: bytes) -> tuple[StoredMission, ...]:
+        """Queue the standing missions of a trigger, with the values in the body. Raises CallError."""
+        try:
+            with self._one_at_a_time, MissionStore(self._store, create=False) as store:
+                standing = StandingMissions(store)
+                chosen = [each for each in standing.missions() if each.trigger == trigger]
+                if not chosen:
+                    raise CallError(HTTPStatus.NOT_FOUND, f"no standing mission waits for '{trigger}'")
+                fired = standing.fire([(each, _request(store, each, body)) for each in chosen], "")
+        except TooManyError as error:
+            raise CallError(HTTPStatus.TOO_MANY_REQUESTS, str(error)) from error
+        except InputError as error:
+            raise CallError(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
+        except CallError:
+            raise
+        except Exception as defect:
+            said = f"a defect of errand or of a plug-in ({type(defect).__name__}: {defect})"
+            raise CallError(HTTPStatus.INTERNAL_SERVER_ERROR, said) from defect
+        for mission in fired:
+            self._tell(f"Mission {mission.id} is queued: {mission.request.name} ({mission.why})")
+        wake_server(self._store)
+        return fired
+
+
+def _request(store: MissionStore, standing: StandingMission, body: bytes) -> Request:
+    """The request of a standing mission, checked with the values in a body. Raises CallError, InputError."""
+    mission = store.mission(standing.id)
+    try:
+        values = values_in_json(body)
+        if not values:
+            return standing.request
+        before = as_it_was(mission, store.path)
+        prepared = prepare(replace(before, given={**before.given, **values}))
+        refuse_impossible(prepared)
+    except InputError as error:
+        raise CallError(HTTPStatus.BAD_REQUEST, str(error)) from error
+    return replace(prepared.request.from_anywhere(), file=standing.request.file)
+
+
+_FORM: Final = re.compile(r"[A-Za-z0-9._~+/=-]{8,512}")
+
+
+@dataclass(frozen=True)
+class CallToken:
+    """A token, the file that keeps it (None: it was given), and whether it was made just now."""
+
+    text: str
+    file: Path | None = None
+    new: bool = False
+
+
+def call_token(given: str | None, store: Path) -> CallToken:
+    """The token for the calls of a store.
+
+    Raises:
+        InputError: it is too short or of other characters, or others than its owner can read its file.
+    """
+    if given is not None:
+        return CallToken(_checked(given, None))
+    file = store.with_name(f"{store.name}-token")
+    with STORE_FILE.failures(store):
+        try:
+            opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        except FileExistsError:
+            return CallToken(_kept(file), file)
+        text = secrets.token_urlsafe(32)
+        with os.fdopen(opened, "w", encoding="ascii") as writer:
+            writer.write(f"{text}\n")
+    return CallToken(text, file, new=True)
+
+
+def _kept(file: Path) -> str:
+    if stat.S_IMODE(file.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO):
+        raise InputError("others can read the token", hint=f"chmod 600 {file}, or remove it for a new one", file=file)
+    return _checked(file.read_text(encoding="utf-8", errors="replace").strip(), file)
+
+
+def _checked(text: str, file: Path | None) -> str:
+    if not _FORM.fullmatch(text):
+        hint = "give at least 8 letters, digits or any of ._~+/=-"
+        raise InputError("the token for calls cannot be used", hint=hint, file=file)
+    return text

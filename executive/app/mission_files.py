@@ -1,12 +1,18 @@
-"""The files of missions: those that come with Errand, by name, from any folder."""
+"""Mission files by their names: those that come with Errand, and poses saved by hand, each a mission of its own."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+import yaml
 
 from skills.files.errors import InputError, did_you_mean
 from skills.files.outside import is_there
+
+if TYPE_CHECKING:
+    from skills.teleop.driver import SavedPose
 
 __all__ = ["FOLDER", "mission_file", "shipped_missions"]
 
@@ -34,3 +40,37 @@ def mission_file(named: Path) -> Path:
     near = did_you_mean(named.name, known)
     hint = f"did you mean '{near}'?" if near else "`errand missions` lists those that come with Errand"
     raise InputError("there is no such mission", hint=hint, file=named)
+
+
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,59}")
+
+
+def pose_text(name: str, pose: SavedPose, *, world: str) -> str:
+    """The mission file of a pose: drive there, take the arm's pose, set the gripper."""
+    base = {"x": pose.base.x_m, "y": pose.base.y_m, "yaw": pose.base.yaw_rad}
+    steps: list[dict[str, object]] = [{"skill": "navigate", "with": {key: round(v, 3) for key, v in base.items()}}]
+    if pose.joints_rad:
+        joints = {"joints": [round(angle, 4) for angle in pose.joints_rad], "opening": round(pose.opening, 3)}
+        steps.append({"skill": "pose_arm", "with": joints})
+    file = {"name": name.replace("_", " "), "world": world, "steps": steps}
+    return str(yaml.safe_dump(file, sort_keys=False, default_flow_style=None, width=120))
+
+
+def save_pose(folder: Path, name: str | None, pose: SavedPose, *, world: str) -> Path:
+    """Write a pose as NAME.yaml, `pose_1` and so on without a name. Raises InputError: there is one, or it cannot be.
+
+    A file that is there is never overwritten.
+    """
+    name = name or next(free for n in range(1, 10_000) if not (folder / f"{(free := f'pose_{n}')}.yaml").exists())
+    path = folder / f"{name}.yaml"
+    if not _NAME.fullmatch(name):
+        raise InputError(f"'{name[:60]}' is no name for a pose", hint="use letters, digits, '_' and '-'")
+    if path.exists():
+        raise InputError("there is a pose of this name", hint="give another name", file=path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with path.open("x", encoding="utf-8") as file:
+            file.write(pose_text(name, pose, world=world))
+    except OSError as error:
+        raise InputError(f"cannot write it ({error.strerror})", hint="name another --poses", file=path) from error
+    return path

@@ -13,8 +13,7 @@ import typer
 from numpy.typing import NDArray
 from rich.console import Console
 
-from executive.app.detector_choice import detector_of, drawn
-from executive.app.picture_files import read_picture, write_picture
+from executive.app.pictures import detector_of, drawn, read_picture, write_picture
 from executive.cli.number_options import quantity_option
 from executive.cli.output import BAD_INPUT, console_for, print_json, refusals, show_table
 from skills.detection import Detection, Detector

@@ -191,7 +191,7 @@ class _Building:
         )
 
     def _draw(self) -> None:
-        from executive.app.picture_files import write_picture
+        from executive.app.pictures import write_picture
         from executive.cli.map_picture import map_picture
 
         if not self._mapper.keyframes:

@@ -23,7 +23,7 @@ from typing import Final
 
 import numpy as np
 
-from executive.app.evaluate.statistics import Rate
+from executive.app.evaluate.summary import Rate
 from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend

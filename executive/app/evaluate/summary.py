@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from scipy.stats import binomtest, fisher_exact
+
 from executive.app.evaluate.outcome import RunOutcome, Standing
 from executive.app.evaluate.runs import RunSpec
-from executive.app.evaluate.statistics import Rate, fisher, mcnemar
 
 __all__ = [
     "COLUMNS",
@@ -18,13 +19,16 @@ __all__ = [
     "Case",
     "Comparison",
     "Group",
+    "Rate",
     "StandingRow",
     "TimeRow",
     "causes_of",
     "compared",
+    "fisher",
     "group_rows",
     "groups_of",
     "label_of",
+    "mcnemar",
     "standing_rows",
     "standing_texts",
     "time_rows",
@@ -315,3 +319,38 @@ def _is_in(case: Case, key: tuple[str, str]) -> bool:
 def _rate(cases: Iterable[Case]) -> Rate:
     found = [case.outcome.achieved for case in cases]
     return Rate(sum(found), len(found))
+
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Rate:
+    """So many successes of so many."""
+
+    successes: int
+    total: int
+
+    @property
+    def value(self) -> float:
+        """The share, 0 where there was none."""
+        return self.successes / self.total if self.total else 0.0
+
+    def interval(self) -> tuple[float, float]:
+        """Wilson's score interval, 95 %; (0, 1) where there was none (Wilson 1927)."""
+        if not self.total:
+            return 0.0, 1.0
+        found = binomtest(self.successes, self.total).proportion_ci(CONFIDENCE, method="wilson")
+        return float(found.low), float(found.high)
+
+
+def mcnemar(only_first: int, only_second: int) -> float:
+    """The exact two-sided p of McNemar's test for pairs of which only one succeeded; 1 where there are none."""
+    discordant = only_first + only_second
+    return 1.0 if discordant == 0 else float(binomtest(only_first, discordant, 0.5).pvalue)
+
+
+def fisher(first: Rate, second: Rate) -> float:
+    """The two-sided p of Fisher's exact test that two rates are one."""
+    table = [[rate.successes, rate.total - rate.successes] for rate in (first, second)]
+    return float(fisher_exact(table).pvalue)

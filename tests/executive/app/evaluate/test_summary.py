@@ -5,7 +5,17 @@ import pytest
 from executive.app.evaluate.outcome import Evidence, RunOutcome, Standing
 from executive.app.evaluate.page import EvaluationPage, to_page
 from executive.app.evaluate.runs import RunSpec
-from executive.app.evaluate.summary import Case, group_rows, groups_of, standing_rows, standing_texts, to_look_at
+from executive.app.evaluate.summary import (
+    Case,
+    Rate,
+    fisher,
+    group_rows,
+    groups_of,
+    mcnemar,
+    standing_rows,
+    standing_texts,
+    to_look_at,
+)
 
 
 def case(seed, outcome, success=None, *, cause=None, holds=None, kind="fetch", world="flat"):
@@ -81,3 +91,20 @@ def test_the_page_lists_each_run_to_look_at_with_its_sentence_and_the_commands()
     assert "claimed, not fulfilled: FALSE CLAIM</b> fetch me the hammer 3, flat, seed 3" in page
     assert page.count("errand log logs/3/log.mcap") == 7
     assert "fetch me the hammer 1," not in page
+
+
+def test_wilson_interval_of_81_of_263_is_that_of_newcombe_1998():
+    assert Rate(81, 263).interval() == pytest.approx((0.2553, 0.3662), abs=5e-5)
+
+
+def test_all_of_ten_leaves_room_below():
+    assert Rate(10, 10).interval() == pytest.approx((0.7225, 1.0), abs=5e-5)
+
+
+def test_mcnemar_counts_only_pairs_that_differ():
+    # 8 to 1: 2 * (1 + 9) / 2**9
+    assert (mcnemar(8, 1), mcnemar(0, 0)) == (pytest.approx(20 / 512), 1.0)
+
+
+def test_fisher_of_the_lady_tasting_tea():
+    assert fisher(Rate(3, 4), Rate(1, 4)) == pytest.approx(0.4857, abs=1e-4)

@@ -1,4 +1,4 @@
-"""The detector that a command uses, and detections drawn into pictures."""
+"""Picture files that the user names, the detector that looks at them, and what it found drawn into pictures."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ from pathlib import Path
 from typing import Final
 
 import cv2
+import numpy as np
 
 from skills.detection import Detection
 from skills.files.errors import InputError
+from skills.files.pictures import read_pixels
 from skills.perception.detector.cascade_files import MODEL_FILE
 from skills.perception.detector.network_file import ModelFileError
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector, load_detector
 from skills.robot import Picture
 
-__all__ = ["FOUND_COLOUR", "detector_of", "draw_box", "drawn"]
+__all__ = ["FOUND_COLOUR", "detector_of", "draw_box", "drawn", "read_picture", "write_picture"]
 
 Colour = tuple[int, int, int]
 
@@ -51,3 +53,24 @@ def draw_box(picture: Picture, box: tuple[float, float, float, float], text: str
     cv2.rectangle(picture, (left, top), (left + width, top + height + 2 * line), colour, cv2.FILLED)
     place = (left, top + height + line)
     cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, size / 2 + 0.25, (0, 0, 0), line, cv2.LINE_AA)
+
+
+def read_picture(file: Path) -> Picture:
+    """A picture file as (H, W, 3) RGB uint8: grey, 16 bits and others are converted, transparency is dropped.
+
+    Raises InputError for what cannot be read, is damaged or has too many pixels.
+    """
+    if file.is_dir():
+        raise InputError("it is a folder", hint=f"name the pictures in it, such as {file}/*.png", file=file)
+    return np.asarray(read_pixels(file, flags=cv2.IMREAD_COLOR_RGB), dtype=np.uint8)
+
+
+def write_picture(file: Path, picture: Picture) -> None:
+    """Write (H, W, 3) RGB in the form that the name's ending tells. Raises InputError when that does not work."""
+    encoded, content = cv2.imencode(file.suffix, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content.tobytes() if encoded else b"")
+    except OSError as error:
+        hint = "name a folder in which files can be written"
+        raise InputError(f"cannot write it ({error.strerror})", hint=hint, file=file) from error

@@ -56,6 +56,7 @@ class Action:
 
 
 _ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})
+_GIVING: Final = [[verb] for verb in ("bring", "get", "fetch", "give", "take", "hand", "serve")]
 _IT: Final = Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),))
 _FRONTED: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
 _AROUND: Final = frozenset({"around", "by"})
@@ -66,22 +67,38 @@ _OUT_OF: Final = "out of"
 _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
 
-def read_actions(clauses: Sequence[Clause], words: Lexicon) -> tuple[Action, ...]:
-    """The actions of all clauses, in order."""
+def read_actions(
+    clauses: Sequence[Clause], words: Lexicon, *, told: bool = False, recipient: Location | None = None
+) -> tuple[Action, ...]:
+    """The actions of all clauses, in order.
+
+    `told` says that things were spoken of before, which may be left out; `recipient` is given things where a clause
+    does not say to whom.
+    """
     merged = list(_without_checks(_without_reasons(_with_fronted(_with_verb(clauses, words)))))
     found = [
         replace(action, said=_said(clause), anew=before is not None and _ends_with_then(before))
         for before, clause in zip([None, *merged], merged, strict=False)
-        for action in _actions(clause, words)
+        for action in _given(_actions(clause, words), clause, recipient)
     ]
-    found = list(_with_elided(found))
+    found = list(_with_elided(found, told))
     last = [replace(action, unknown=(action.said,)) if action.departs else action for action in found[-1:]]
     return tuple(action for action in found[:-1] if not _goes_nowhere(action)) + tuple(last)
 
 
-def _with_elided(actions: Sequence[Action]) -> Iterator[Action]:
+def _given(actions: Iterator[Action], clause: Clause, recipient: Location | None) -> Iterator[Action]:
+    """The actions, things being given to the recipient where the clause does not say to whom."""
+    whom = (PrepositionRole.GOAL, PrepositionRole.FOR)
+    chunks = [item for item in clause.items if isinstance(item, Chunk)]
+    said = any(one.role in whom or (one.role is None and (one.phrase.speaker or one.phrase.person)) for one in chunks)
+    said = said or any(isinstance(item, Adverb) for item in clause.items)
+    for action in actions:
+        gives = recipient is not None and not said and action.verb.split()[:1] in _GIVING
+        yield replace(action, goal=recipient) if gives else action
+
+
+def _with_elided(actions: Sequence[Action], things: bool) -> Iterator[Action]:
     """Say "it" where that was left out: "take the phone and carry to me", "I left my watch there, can you check"."""
-    things = False
     for action in actions:
         lacks = action.unknown == (action.verb,) and not action.objects and action.kind in _ELIDING
         goes_on = action.goal is not None or action.kind is VerbKind.FIND

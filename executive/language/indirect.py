@@ -12,7 +12,18 @@ from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.tokens import Token
 
-__all__ = ["belongs", "do_we_have", "goes_on", "how_many", "narrated", "needed", "told", "what_is", "where_is"]
+__all__ = [
+    "OBJECTS",
+    "belongs",
+    "do_we_have",
+    "goes_on",
+    "how_many",
+    "narrated",
+    "needed",
+    "told",
+    "what_is",
+    "where_is",
+]
 
 _FIND: Final = "find"
 _AT: Final = "at"
@@ -22,7 +33,7 @@ _WE: Final = frozenset({"we", "you", "i", "they"})
 _HAVE: Final = frozenset({"have", "got"})
 _DO: Final = frozenset({"do", "have"})
 _WHATEVER: Final = frozenset({"what", "anything", "something"})
-_OBJECTS: Final = Phrase((Token(0, 0, "objects", "object", "NOUN", "NNS", 0, "obj", kind=NounKind.THING),))
+OBJECTS: Final = Phrase((Token(0, 0, "objects", "object", "NOUN", "NNS", 0, "obj", kind=NounKind.THING),))
 
 
 def where_is(row: Row, items: list[Item]) -> Item | None:
@@ -100,7 +111,7 @@ def what_is(row: Row, items: list[Item]) -> Item | None:
         return None
     if asks:
         items.pop()
-    items += [Verb(_FIND, row.words.verbs[(_FIND,)]), Chunk(_OBJECTS)]
+    items += [Verb(_FIND, row.words.verbs[(_FIND,)]), Chunk(OBJECTS)]
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -61,8 +61,8 @@ _OF_ALL: Final = re.compile(r"all|none|(?:any|every|no)(?:where|one|body|thing)"
 class _Reader(Row):
     """Reads the row from left to right."""
 
-    def read(self) -> Iterable[Item]:
-        """The items of the row in order; the first way of reading that fits takes its words."""
+    def read(self, lead: Sequence[Item] = ()) -> Iterable[Item]:
+        """The items of the row in order, behind `lead`; the first way of reading that fits takes its words."""
         steps: tuple[Callable[[list[Item]], Item | None], ...] = (
             self._mark,
             *(
@@ -75,7 +75,7 @@ class _Reader(Row):
             self._small,
             self._outside,
         )
-        items: list[Item] = []
+        items = list(lead)
         while self.at < len(self.tokens):
             if self.at in self.silent:
                 self.at += 1
@@ -86,7 +86,7 @@ class _Reader(Row):
 
     def _mark(self, items: list[Item]) -> Item | None:
         """What takes something back: "not", "no, the hammer"."""
-        correction, negation = self.match(self.words.corrections), self.match(self.words.negations)
+        correction, negation = (self.match(self.words.corrections), self.match(self.words.negations))
         if correction is not None and len(correction) >= len(negation or ()) and self._is_correction(len(correction)):
             self.at += len(correction)
             return Correction(" ".join(correction), self.words.corrections[correction])
@@ -360,6 +360,13 @@ class _Reader(Row):
         return Unknown(token.text)
 
 
-def split_items(tokens: Sequence[Token], phrases: Mapping[int, Phrase], words: Lexicon) -> tuple[Item, ...]:
-    """The sentence as items, in order; every word is in one of them."""
-    return tuple(_Reader(tokens, phrases, words).read())
+def split_items(
+    tokens: Sequence[Token],
+    phrases: Mapping[int, Phrase],
+    words: Lexicon,
+    *,
+    lead: Sequence[Item] = (),
+    silent: Collection[int] = (),
+) -> tuple[Item, ...]:
+    """The sentence as items, in order; every word is in one of them, but those in `silent`. `lead` comes before it."""
+    return tuple(_Reader(tokens, phrases, words, silent=set(silent)).read(lead))

@@ -193,8 +193,12 @@ def _nested(spoken: Sequence[_Spoken], puts: bool) -> Iterator[_Placed]:
 
 def _tells_closer(one: _Spoken, before: Chunk) -> bool:
     """Whether a place tells the one before it more closely: no "and" between, and another preposition."""
-    place = before.role in _PLACE_ROLES or (before.role in (None, PrepositionRole.FOR) and before.phrase.person)
+    place = before.role in _PLACE_ROLES or (before.role in (None, PrepositionRole.FOR) and _somebody(before.phrase))
     return place and one.chunk.role in _CLOSER and not one.joint and one.chunk.preposition != before.preposition
+
+
+def _somebody(phrase: Phrase) -> bool:
+    return phrase.person or phrase.head.word in _EVERYONE
 
 
 def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
@@ -219,7 +223,7 @@ def _add_bare(roles: Roles, one: _Placed) -> None:
         roles.objects[-1] = one.chunk.phrase.instead_of_one(roles.objects[-1])
     elif one.joint and (roles.goals or roles.ats) and not roles.sources and not _another_thing(roles, one.chunk.phrase):
         roles.joined_goals.append(one.location)
-    elif one.within is not None and one.chunk.phrase.person and not roles.objects:
+    elif one.within is not None and _somebody(one.chunk.phrase) and not roles.objects:
         roles.objects.append(one.chunk.phrase)
         roles.first_at = one.within
     elif one.within is not None:

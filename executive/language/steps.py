@@ -12,7 +12,7 @@ from executive.language.cleaning import MAX_CHARACTERS, MAX_WORDS, rephrased
 from executive.language.command_frames import CommandFrame, command_frames, spoken_command
 from executive.language.disfluency import repair_disfluencies, unwanted_things
 from executive.language.grounding import check_unwanted, ground_noted
-from executive.language.items import Item
+from executive.language.items import Being, Item
 from executive.language.lexicon import VerbKind, lexicon
 from executive.language.limits import check_feasible, check_ways_and_speaker, not_understood, refuse_harm
 from executive.language.nouns import NounKind
@@ -21,14 +21,15 @@ from executive.language.phrases import Phrase, noun_phrases
 from executive.language.questions import ABLE, RefusalError, RefusalKind, Slot, which
 from executive.language.reading import split_items
 from executive.language.reference import Memory, ResolvedAction, resolve
+from executive.language.roles import Location
 from executive.language.spelling import WordFacts
-from executive.language.tokens import Token, name_table, parse_with_names
+from executive.language.tokens import Affirmed, Token, affirmed, name_table, parse_with_names
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
 from executive.words.steps import MissionStep
 from skills.files.errors import listing
 
-__all__ = ["Trace", "trace_sentence"]
+__all__ = ["Part", "Steps", "Trace", "trace_sentence"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Trace:
     `unwanted` is what stands behind "not", `meanings` are pronouns with what each stood for, `notes` say which name was
     taken for which. `refused_at` names the step that refused. `memory` is what was spoken of before, and afterwards
     what was spoken of last. `steps` is the mission of a sentence that decides, repeats, waits or the like, and `parts`
-    are its clauses.
+    are its clauses. `affirmed` is a statement that is checked, without its negation.
     """
 
     text: str
@@ -58,28 +59,68 @@ class Trace:
     memory: Memory = field(default_factory=Memory)
     parts: tuple[str, ...] = ()
     steps: tuple[MissionStep, ...] = ()
+    affirmed: Affirmed | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """What is known of a part of a sentence before it is read.
+
+    `lead` are items that stand before its words. `asked` says that it is a statement to be checked, `elliptic` that it
+    may leave out "it". `recipient` is who is given things where it does not say to whom.
+    """
+
+    lead: tuple[Item, ...] = ()
+    asked: bool = False
+    elliptic: bool = False
+    recipient: Location | None = None
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The steps from words to commands in one world; with `knowledge` None all names stay as they were spoken."""
+
+    parser: DependencyParser
+    knowledge: Knowledge | None
+
+    def trace(
+        self, text: str, memory: Memory | None = None, part: Part | None = None, *, upto: str | None = None
+    ) -> Trace:
+        """All steps, or those up to one by its name, from text without wake phrase; never raises on text.
+
+        `memory` is what earlier sentences spoke of.
+        """
+        names = tuple(_STEPS)
+        first = names if upto is None else names[: names.index(upto) + 1]
+        return self._run(Trace(text, memory=memory or Memory()), first, part or Part())
+
+    def rest(self, trace: Trace, *, behind: str) -> Trace:
+        """The steps behind one, from what that has made; never raises."""
+        names = tuple(_STEPS)
+        return self._run(trace, names[names.index(behind) + 1 :], Part())
+
+    def _run(self, trace: Trace, names: Sequence[str], part: Part) -> Trace:
+        context = _Context(self.parser, self.knowledge, part)
+        for name in names:
+            try:
+                trace = _STEPS[name](trace, context)
+            except RefusalError as refusal:
+                return replace(trace, refusal=refusal, refused_at=name)
+        return trace
 
 
 @dataclass(frozen=True)
 class _Context:
     parser: DependencyParser
     knowledge: Knowledge | None
+    part: Part
 
 
 def trace_sentence(
     text: str, *, parser: DependencyParser, knowledge: Knowledge | None, memory: Memory | None = None
 ) -> Trace:
-    """All steps from text, without wake phrase, to commands; never raises on text.
-
-    With `knowledge` None all names stay as they were spoken. `memory` is what earlier sentences spoke of.
-    """
-    trace, context = Trace(text, memory=memory or Memory()), _Context(parser, knowledge)
-    for name, step in _STEPS.items():
-        try:
-            trace = step(trace, context)
-        except RefusalError as refusal:
-            return replace(trace, refusal=refusal, refused_at=name)
-    return trace
+    """All steps of a whole sentence; see `Steps`."""
+    return Steps(parser, knowledge).trace(text, memory)
 
 
 def _open(trace: Trace, _: _Context) -> Trace:
@@ -96,8 +137,13 @@ def _parse(trace: Trace, context: _Context) -> Trace:
     return replace(trace, tokens=parse_with_names(trace.opened, context.parser.parse, table))
 
 
-def _read(trace: Trace, _: _Context) -> Trace:
-    items = split_items(trace.tokens, noun_phrases(trace.tokens), lexicon())
+def _read(trace: Trace, context: _Context) -> Trace:
+    part = context.part
+    there = any(isinstance(item, Being) and item.existential for item in part.lead)
+    said = affirmed(trace.tokens, there=there) if part.asked else Affirmed(trace.tokens)
+    trace = replace(trace, tokens=said.tokens, affirmed=said)
+    phrases = noun_phrases(trace.tokens)
+    items = split_items(trace.tokens, phrases, lexicon(), lead=part.lead, silent=said.silent)
     return replace(trace, items=repair_disfluencies(items), unwanted=unwanted_things(items))
 
 
@@ -109,8 +155,10 @@ def _split(trace: Trace, context: _Context) -> Trace:
     return replace(trace, clauses=clauses if context.knowledge else without_name(clauses))
 
 
-def _act(trace: Trace, _: _Context) -> Trace:
-    return replace(trace, actions=read_actions(trace.clauses, lexicon()))
+def _act(trace: Trace, context: _Context) -> Trace:
+    told = context.part.elliptic and bool(trace.memory.things)
+    recipient = context.part.recipient
+    return replace(trace, actions=read_actions(trace.clauses, lexicon(), told=told, recipient=recipient))
 
 
 def _check(trace: Trace, context: _Context) -> Trace:

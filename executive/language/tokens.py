@@ -269,3 +269,68 @@ def _named(token: Token, match: re.Match[str] | None, stand_in: str) -> Token:
         return token
     entity = "PERSON" if stand_in == PERSON else ""
     return replace(token, text=match.group(0), lemma=match.group(1).lower(), entity=entity, known=True)
+
+
+@dataclass(frozen=True)
+class Affirmed:
+    """A statement without its negation: its words, those to pass over, and whether it was denied.
+
+    "There is no beer in the hall" is affirmed by "any beer", "nobody is there" by "anybody", "it is not there" by
+    leaving out the "not".
+    """
+
+    tokens: tuple[Token, ...]
+    silent: frozenset[int] = frozenset()
+    denied: bool = False
+
+
+def affirmed(tokens: Sequence[Token], *, there: bool = False) -> Affirmed:
+    """What a statement says, or denies, to be somewhere; one that is denied in another way stays as it is.
+
+    `there` says that "there is" stands before it.
+    """
+    words = [token.word for token in tokens]
+    be = next((n for n, token in enumerate(tokens) if token.lemma == "be" or token.word in ("'s", "'re")), len(words))
+    seen = words[:1] == ["there"]
+    for at in (0, be + 1):
+        for said, instead in _DENYING.items():
+            if tuple(words[at : at + len(said)]) == said and (
+                seen if at else there or (instead in _WHOEVER and be == len(said))
+            ):
+                return Affirmed(_instead(tokens, at, instead), frozenset(range(at + 1, at + len(said))), denied=True)
+    at, behind = be + 1, words[be + 2 :]
+    if words[at : at + 1] in (["not"], ["n't"]):
+        more = 2 if behind[:2] == ["any", "more"] else 1 if behind[:1] in (["anymore"], ["yet"]) else 0
+        if seen:
+            whole = behind[:1] and behind[0] not in ("one", "any", "a", "an", "enough", "left")
+            one = behind[:1] == ["any"] and behind[1:2] in ([], ["left"], ["in"], ["on"], ["at"])
+            changed = _instead(tokens, at + 1, "one") if one else tokens
+            return Affirmed(tuple(changed), frozenset({at}), denied=not whole)
+        if behind[more : more + 1] and behind[more] in _SOMEWHERE:
+            return Affirmed(tuple(tokens), frozenset(range(at, at + 1 + more)), denied=True)
+    if words[at : at + 2] == ["no", "longer"] and behind[1:2] and behind[1] in _SOMEWHERE:
+        return Affirmed(tuple(tokens), frozenset({at, at + 1}), denied=True)
+    if words[at : at + 1] in (["gone"], ["missing"]) and behind[:1] == ["from"]:
+        return Affirmed(_instead(tokens, at + 1, "in"), frozenset({at}), denied=True)
+    return Affirmed(tuple(tokens))
+
+
+def _instead(tokens: Sequence[Token], at: int, word: str) -> tuple[Token, ...]:
+    """The words with another one in the place of one of them."""
+    tag, pos = ("DT", "DET") if word == "any" else ("IN", "ADP") if word == "in" else ("NN", "PRON")
+    new = replace(tokens[at], text=word, lemma=word, tag=tag, pos=pos)
+    return (*tokens[:at], new, *tokens[at + 1 :])
+
+
+_WHOEVER: Final = frozenset({"anybody", "anything"})
+_DENYING: Final[Mapping[tuple[str, ...], str]] = {
+    ("no", "one"): "anybody",
+    ("no", "-", "one"): "anybody",
+    ("nobody",): "anybody",
+    ("nothing",): "anything",
+    ("none",): "one",
+    ("no", "longer", "any"): "any",
+    ("no", "more"): "any",
+    ("no",): "any",
+}
+_SOMEWHERE: Final = frozenset({"in", "on", "at", "inside", "there", "near", "next"})

@@ -7,17 +7,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+from executive.language.items import Adverb, Chunk
+from executive.language.lexicon import PrepositionRole
+from executive.language.nouns import NounKind
 from executive.language.questions import RefusalError, RefusalKind
+from executive.language.roles import Location
 from executive.language.structure.conditions import suppose
-from executive.language.structure.cutting import (
-    Behind,
-    Clause,
-    Kind,
-    behind,
-    cut,
-    pattern,
-    spoken,
-)
+from executive.language.structure.cutting import Behind, Clause, Kind, behind, cut, pattern
 from executive.language.structure.each import (
     EVERY_ROOM,
     GOES_EVERYWHERE,
@@ -26,18 +22,10 @@ from executive.language.structure.each import (
     look_for,
     serves_all,
 )
-from executive.language.structure.leaves import Leaves, State
+from executive.language.structure.leaves import Leaves, State, named, placed, verb
 from executive.language.structure.rounds import Repeats
-from executive.language.structure.row import (
-    SPEAKS,
-    LookedAt,
-    Row,
-    Steps,
-    checked,
-    end_of,
-    sentence_of,
-)
-from executive.language.structure.telling import Asked, Listener, asked_of, bare, said_by, template
+from executive.language.structure.row import SPEAKS, LookedAt, Row, Steps, checked, end_of, sentence_of
+from executive.language.structure.telling import Asked, Listener, asked_of, bare, said_by, said_to, template
 from executive.language.structure.waiting import charged, waited
 from executive.words.blocks import Ask, Check, Speak, Wait
 from executive.words.command import Task
@@ -55,11 +43,8 @@ class Acts(Repeats):
         if clause.begins and not _tells_only(row.plain):
             self.settle(row)
         if self.verb is not None and at == 0 and _NO_VERB.match(clause.text):
-            clause = replace(clause, text=f"{self.verb} {clause.text}")
+            clause = replace(clause, lead=self.leaves.read(self.verb))
             clauses = [clause, *clauses[1:]]
-        if (match := _LOOKS_AT.fullmatch(clause.text)) is not None and row.state.memory.things:
-            clause = replace(clause, text=f"look for it {match[1]}")
-            clauses = [*clauses[:at], clause, *clauses[at + 1 :]]
         text = clause.text
         self.verb = match[0] if (match := _GIVING.match(text)) is not None else self.verb
         if _is_reported(text) and self._reported(row):
@@ -101,17 +86,14 @@ class Acts(Repeats):
         if done is None:
             return None
         self.flush(row)
-        steps, row.state, notes = done
-        row.steps += steps
-        row.asked = None
-        self.notes += notes
+        self.put_done(row, done)
         return at + 1
 
     def known(self, row: Row) -> State:
         """What is known behind the clauses that are still to be understood."""
         if not row.plain:
             return row.state
-        return self.leaves.leaf(spoken([replace(row.plain[0], joint=""), *row.plain[1:]]), row.state).state
+        return self.plain_leaf(row.plain, row.state).state
 
     def _says(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
         clause = clauses[at]
@@ -120,8 +102,7 @@ class Acts(Repeats):
         if not SPEAKS.match(clause.text) or _asks_back(clause.text, self.leaves):
             return None
         if (everywhere_said := _SAYS_EVERYWHERE.fullmatch(clause.text)) is not None:
-            there = [Clause("", "visit every room"), Clause("", everywhere_said[1])]
-            self._in_each(row, there, 0)
+            self._in_each(row, replace(clause, joint="", text=everywhere_said[1]))
             return at + 1
         found = behind(clause.text)
         if found is not None and not _spoken_of(found, clause.text):
@@ -146,16 +127,21 @@ class Acts(Repeats):
         if told is None:
             raise RefusalError(f"what am I to say in '{match[0]}'?", [match[0]])
         self.put(row, Wait(supposed.condition), supposed.holds)
-        who = re.sub(r"^let|^warn", "tell", match["tell"].removesuffix(" know"))
-        steps, row.state = self.sequence([Clause("", f"{who} that {told}")], row.state)
-        row.steps += steps
+        said = said_to(match["who"], told, self.leaves.knowledge)
+        self._to(row, said.to)
+        self.put(row, Speak(Template(template(said.text or told))), row.state)
         return at + 1
 
     def _to(self, row: Row, listener: Listener | None) -> None:
         """Go to whom something is said."""
-        if listener is None or listener.goal is None:
+        if listener is None or not (listener.who or listener.where):
             return
-        leaf = self.leaves.leaf(listener.goal, row.state)
+        if listener.speaker:
+            leaf = self.leaves.done((verb("come"), Adverb(here=True)), row.state)
+        else:
+            who = placed(self.leaves.read(listener.who), "to") if listener.who else ()
+            where = self.leaves.read(listener.where) if listener.where else ()
+            leaf = self.leaves.done((verb("go"), *who, *placed(where, "in" if who else "to")), row.state)
         if leaf.commands[-1].goal != row.state.goal or leaf.commands[-1].goal_at is not None:
             self.add(row, leaf)
 
@@ -190,8 +176,7 @@ class Acts(Repeats):
             body = [*cut(rest), *clauses[at + 1 : end]]
             if not body:
                 raise RefusalError(f"what am I to do {clause.cue} {clause.text}?", [clause.cue])
-            wanted = [replace(each, text=_instead(each.text, asked.choices[0], asked)) for each in body]
-            found[answer], _ = self.sequence([replace(wanted[0], joint=""), *wanted[1:]], state)
+            found[answer], _ = self.sequence([replace(body[0], joint=""), *body[1:]], self._choosing(asked, 0, state))
             at = end
         if at < len(clauses) and not found["yes"] and _brings(clauses[at]):
             raise RefusalError("say 'if yes' before what is to be done then", [clauses[at].text])
@@ -202,9 +187,16 @@ class Acts(Repeats):
         names = [bare(choice) for choice in asked.choices]
         if at >= len(clauses) or clauses[at].kind is not None or not _brings(clauses[at]):
             return dict.fromkeys(names, ()), at
-        texts = [_instead(clauses[at].text, choice, asked) for choice in asked.choices]
-        found = [self.sequence([Clause("", text)], state)[0] for text in texts]
+        brings = replace(clauses[at], joint="")
+        found = [self.sequence([brings], self._choosing(asked, n, state))[0] for n in range(len(names))]
         return dict(zip(names, found, strict=True)), at + 1
+
+    def _choosing(self, asked: Asked, number: int, state: State) -> State:
+        """What is known behind the answer: "it" is what was chosen, and is given to who was asked."""
+        things = tuple(item.phrase for item in self.leaves.read(asked.choices[number]) if isinstance(item, Chunk))
+        person = Location(named(asked.of.name or "", NounKind.PERSON), "to")
+        memory = replace(state.memory, things=things, gathered=things, where=None, person=person)
+        return replace(state, memory=memory, recipient=person)
 
     def _checks(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
         """ "Look whether the door is open", "is the battery low": what only blocks can check."""
@@ -214,7 +206,7 @@ class Acts(Repeats):
         state = self.known(row)
         found = behind(text)
         try:
-            self.leaves.leaf(f"check if {text}", state)
+            self.leaves.leaf(clauses[at].text, state)
         except RefusalError as refusal:
             plain = refusal
         else:
@@ -254,8 +246,9 @@ class Acts(Repeats):
             if (match := _WHAT_THERE.fullmatch(follow)) is not None:
                 what = next(filter(None, match.groups()))
                 leaf, end = look_for(what, self.known(row), self.leaves), at + 2
-            elif SPEAKS.match(follow):
-                return self._in_each(row, clauses, at)
+            elif SPEAKS.match(follow) and behind(follow) is None:
+                self._in_each(row, replace(clauses[at + 1], joint=""))
+                return at + 2
         if leaf is None:
             return None
         self.flush(row)
@@ -263,15 +256,15 @@ class Acts(Repeats):
         self.special = True
         return end
 
-    def _in_each(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
+    def _in_each(self, row: Row, says: Clause) -> None:
         """Say something in every room."""
         self.flush(row)
         for room in self.leaves.knowledge.places:
-            visit = [Clause("", f"go to the {room}"), replace(clauses[at + 1], joint="")]
-            steps, row.state = self.sequence(visit, replace(row.state, goal=None))
-            row.steps += steps
+            there = Chunk(named(room, NounKind.PLACE), "to", PrepositionRole.GOAL)
+            leaf = self.leaves.done((verb("go"), there), replace(row.state, goal=None))
+            said, row.state = self.sequence([says], leaf.state)
+            row.steps += [MissionStep(leaf.commands), *said]
         row.asked = None
-        return at + 2
 
 
 _IDLE: Final = re.compile(
@@ -284,14 +277,11 @@ _GIVING: Final = re.compile(
 )
 
 
-_LOOKS_AT: Final = re.compile(r"(?:look|search)(?: for (?:it|one))? ((?:in|on|at) [\w ]+)", re.IGNORECASE)
-
-
 _NO_VERB: Final = re.compile(r"(?:a|an|some|the|two|three) [\w ]+$", re.IGNORECASE)
 
 
 _TELLS_WHEN: Final = re.compile(
-    r"(?P<tell>(?:tell|let|warn|inform) (?:me|us|him|her|[A-Z]\w*)(?P<know> know)?) (?:when|once"
+    r"(?:tell|let|warn|inform) (?P<who>me|us|him|her|[A-Z]\w*)(?: know)? (?:when|once"
     r"|as soon as) (?P<what>.+)"
 )
 
@@ -353,20 +343,3 @@ def _of_whom(text: str, state: State) -> str:
 
 def _brings(clause: Clause) -> bool:
     return re.match(r"(?:bring|get|fetch|give|take|hand|serve)\b", clause.text, re.IGNORECASE) is not None
-
-
-def _instead(text: str, choice: str, asked: Asked) -> str:
-    """What is to be brought, said by its name, and to whom."""
-    if not re.match(r"(?:bring|get|fetch|give|take|hand|serve)\b", text, re.IGNORECASE):
-        return text
-    name = asked.of.name or ""
-    words = re.sub(
-        r"\b(?:what(?:ever)? (?:he|she|they) (?:wants?|says?|chooses?|likes?)|it|that|one)\b",
-        choice,
-        text,
-        count=1,
-        flags=re.IGNORECASE,
-    )
-    words = re.sub(r"\b(?:him|her|them)\b", name, words, flags=re.IGNORECASE)
-    to_whom = re.search(rf"\b(?:me|us|to|for|{re.escape(name)})\b", words, re.IGNORECASE)
-    return words if to_whom else f"{words} to {name}"

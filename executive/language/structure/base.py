@@ -6,17 +6,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from executive.language.structure.cutting import (
-    Clause,
-    spoken,
-)
+from executive.language.structure.cutting import Clause, spoken
 from executive.language.structure.leaves import Leaf, Leaves, State
-from executive.language.structure.row import (
-    Row,
-    Steps,
-    asked_by,
-    checked,
-)
+from executive.language.structure.row import Row, Steps, asked_by, checked
+from executive.language.structure.waiting import Done
 from executive.words.blocks import Block
 from executive.words.steps import MissionStep
 
@@ -45,12 +38,16 @@ class Base:
         if not row.plain:
             return
         last = row.plain[-1].text
-        text, row.plain = spoken([replace(row.plain[0], joint=""), *row.plain[1:]]), []
-        self.add(row, self.leaves.leaf(text, row.state))
+        leaf, row.plain = self.plain_leaf(row.plain, row.state), []
+        self.add(row, leaf)
         if row.asked is not None and row.asked.looked:
             there = re.sub(r"^(?:is|are) there ", "there is ", last, flags=re.IGNORECASE)
             said = checked(last) or (there if there != last else "")
             row.asked = replace(row.asked, supposed=replace(row.asked.supposed, said=said))
+
+    def plain_leaf(self, clauses: Sequence[Clause], state: State) -> Leaf:
+        """What clauses that are plain commands ask for together."""
+        return self.leaves.leaf(spoken([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead)
 
     def add(self, row: Row, leaf: Leaf) -> None:
         """Put what a plain part asks for."""
@@ -63,6 +60,13 @@ class Base:
         """Put a block; `state` is what is known behind it."""
         row.steps.append(MissionStep(block=block))
         row.state, row.asked = state, None
+
+    def put_done(self, row: Row, done: Done) -> None:
+        """Put steps with what is known behind them, and notes."""
+        steps, row.state, notes = done
+        row.steps += steps
+        row.asked = None
+        self.notes += notes
 
     def settle(self, row: Row) -> None:
         """A new sentence begins: what was said before stands for itself, where it is a request."""

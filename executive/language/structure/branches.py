@@ -10,26 +10,9 @@ from typing import Final
 from executive.language.questions import RefusalError
 from executive.language.structure.base import Base
 from executive.language.structure.conditions import suppose
-from executive.language.structure.cutting import (
-    Behind,
-    Clause,
-    Kind,
-    cut,
-    pattern,
-    spoken,
-    verb_positions,
-)
+from executive.language.structure.cutting import Behind, Clause, Kind, cut, pattern, verb_positions
 from executive.language.structure.leaves import State, Supposed
-from executive.language.structure.row import (
-    Row,
-    Steps,
-    end_of,
-    merged,
-    same,
-    sentence_of,
-    turned,
-    was_not,
-)
+from executive.language.structure.row import Row, Steps, end_of, merged, same, sentence_of, turned, was_not
 from executive.words.blocks import Choose, Group, Repeat, Try, Wait
 from executive.words.steps import MissionStep
 
@@ -82,8 +65,7 @@ class Branches(Base):
         state = row.state
         try:
             if row.plain:
-                text_before = spoken([replace(row.plain[0], joint=""), *row.plain[1:]])
-                state = self.leaves.leaf(text_before, state).state
+                state = self.plain_leaf(row.plain, state).state
             suppose(text, state, self.leaves)
         except RefusalError:
             return False

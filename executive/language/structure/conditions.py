@@ -3,38 +3,42 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
+from executive.language.items import Chunk, Item
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE
 from executive.language.structure.amounts import SHARE, SPAN, seconds_of, share_of, time_of
 from executive.language.structure.cutting import pattern
 from executive.language.structure.doors import door_condition
-from executive.language.structure.leaves import Leaves, State, Supposed
+from executive.language.structure.leaves import Leaves, State, Supposed, negated, placed, verb
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Not, ValueIs
 from executive.words.expression import Expression
 
-__all__ = ["negated", "suppose"]
-
-
-def negated(condition: Condition) -> Condition:
-    """The contrary."""
-    return condition.part if isinstance(condition, Not) else Not(condition)
+__all__ = ["meeting", "pressed", "reading", "suppose"]
 
 
 def suppose(text: str, state: State, leaves: Leaves) -> Supposed:
     """The condition that `text` tells. Raises RefusalError: it tells none that can be looked at or read."""
-    words = " ".join(text.replace(" o' clock", " o'clock").split()).strip(" ,.")
-    words = _TAIL.sub("", words)
-    for read in _READERS:
-        if (found := read(words, state, leaves)) is not None:
-            return found
+    words = _TAIL.sub("", " ".join(text.replace(" o' clock", " o'clock").split()).strip(" ,."))
+    if (found := reading(words, state, leaves)) is not None:
+        return found
     if (unreal := pattern("unreal").search(words)) is not None:
         raise RefusalError(f"I can only decide by how things are now, not by '{words}'", [unreal[0]])
-    joined = _joined(words, state, leaves)
-    return joined if joined is not None else _look(words, state, leaves)
+    joined, left_open = _joined(words, state, leaves)
+    if joined is not None:
+        return joined
+    try:
+        return _look(words, state, leaves)
+    except RefusalError as refusal:
+        raise refusal if refusal.question is not None or left_open is None else left_open from None
+
+
+def reading(words: str, state: State, leaves: Leaves) -> Supposed | None:
+    """The condition of a usual form: of battery, hand, place, clock, button, door, or somebody who comes or leaves."""
+    return next((found for read in _READERS if (found := read(words, state, leaves)) is not None), None)
 
 
 _TAIL: Final = re.compile(r"(?: (?:left|any more|anymore|any longer|again|already|yet|now|at all))+$", re.IGNORECASE)
@@ -158,10 +162,10 @@ def _clock(words: str, state: State, leaves: Leaves) -> Supposed | None:
 
 
 _PRESSED: Final = re.compile(
-    r"(?:i|we|somebody|someone|the operator|anybody) (?:have |has )?(?:press|presses|pressed|push|pushes|pushed"
-    r"|hit|hits|click|clicks)"
+    r"(?:i|we|me|us|somebody|someone|the operator|anybody) (?:have |has |to )?(?:press|presses|pressed|push|pushes"
+    r"|pushed|hit|hits|click|clicks)"
     r"(?: on)? (?P<one>(?:the|a|any) (?:[\w-]+ ){0,2}?)button"
-    r"|(?P<other>(?:the|a) (?:[\w-]+ ){0,2}?)button (?:is|was|gets|has been|is being) (?:pressed|pushed|hit)",
+    r"|(?P<other>(?:the|a) (?:[\w-]+ ){0,2}?)button (?:is|was|gets|has been|is being|to be) (?:pressed|pushed|hit)",
     re.IGNORECASE,
 )
 _BUTTON: Final = "button"
@@ -171,7 +175,12 @@ def _button(words: str, state: State, leaves: Leaves) -> Supposed | None:
     match = _PRESSED.fullmatch(words)
     if match is None:
         return None
-    name = re.sub(r"^(?:the|a|any)\s*", "", (match["one"] or match["other"]).strip(), flags=re.IGNORECASE)
+    return pressed(match["one"] or match["other"], words, state)
+
+
+def pressed(button: str, words: str, state: State) -> Supposed:
+    """Whether a button is pressed, which is spoken of with its article; `words` say it."""
+    name = re.sub(r"^(?:the|a|any)\b\s*|\s*\bbutton$", "", button.strip(), flags=re.IGNORECASE).strip()
     return _plain(ButtonPressed(name.lower() or _BUTTON), words, state)
 
 
@@ -187,18 +196,18 @@ def _door(words: str, state: State, leaves: Leaves) -> Supposed | None:
 
 _COMES: Final = re.compile(
     r"(?P<who>[\w' ]+?) (?:(?:comes|arrives|shows up|appears|gets|is|'s|turns up|walks in|steps in|enters"
-    r"|returns|goes|are|come"
-    r"|arrive|has come|has arrived|is coming|gets back)(?: back| in| up| over| here| home| by| along| again| there)*)"
+    r"|returns|goes|are|come|arrive|has come|has arrived|is coming|gets back"
+    r"|to (?:come|arrive|show up|appear|get|return|be|enter|turn up))"
+    r"(?: back| in| up| over| here| home| by| along| again| there)*)"
     r"(?: (?:in|into|to|at|inside) (?P<place>the .+|here|there)| (?P<room>the .+))?",
     re.IGNORECASE,
 )
 _GOES: Final = re.compile(
     r"(?P<who>[\w' ]+?) (?:leaves|has left|is gone|goes away|has gone|is away|is not there|isn't there"
-    r"|is no longer there"
-    r"|is not here|isn't here|is no longer here|is there no more)(?: (?P<room>the .+))?",
+    r"|is no longer there|is not here|isn't here|is no longer here|is there no more|to leave|to go away)"
+    r"(?: (?P<room>the .+))?",
     re.IGNORECASE,
 )
-_STAYS: Final = re.compile(r"(?P<who>[\w' ]+?) (?:is|stays|remains)(?: still)? (?:there|here)", re.IGNORECASE)
 _NOBODY: Final = re.compile(r"(?:nobody|no one|no-one|no people|none)", re.IGNORECASE)
 
 
@@ -211,15 +220,19 @@ def _meeting(words: str, state: State, leaves: Leaves) -> Supposed | None:
     who = re.sub(r"\b(?:if|until)\b", "", match["who"]).strip()
     where = match.groupdict().get("place") or match["room"]
     where = "there" if where is None and re.search(r"\bthere(?: any more)?$", words, re.IGNORECASE) else where
-    nobody = _NOBODY.fullmatch(who) is not None
-    if not (nobody or leaves.somebody(who, state)) or re.search(r"\b(?:or|and)\b", where or ""):
+    if not (_NOBODY.fullmatch(who) or leaves.somebody(who, state)) or re.search(r"\b(?:or|and)\b", where or ""):
         return None
+    return meeting(who, where, words, state, leaves, gone=gone is not None)
+
+
+def meeting(who: str, where: str | None, words: str, state: State, leaves: Leaves, *, gone: bool = False) -> Supposed:
+    """Whether somebody, or nobody, is where the robot is, or in a room; `words` say it. Raises RefusalError."""
+    nobody = _NOBODY.fullmatch(who) is not None
     room = _where(where, state, leaves)
     if room is None:
         raise RefusalError(f"in which room is '{words}' to be seen? Name it", [words])
-    look = leaves.look("anybody" if nobody or who.lower() in _ANY else who, room, state)
-    holds = Not(look.condition) if (gone is not None) != nobody else look.condition
-    return replace(look, condition=holds, said=words)
+    look = leaves.look("anybody" if nobody or who.lower() in _ANY else who, room, words, state)
+    return replace(look, condition=Not(look.condition) if gone != nobody else look.condition)
 
 
 def _where(where: str | None, state: State, leaves: Leaves) -> str | None:
@@ -240,25 +253,6 @@ _SEES: Final = re.compile(
     r"(?:find|see|spot|discover|notice|have found|found)(?: that)? (?P<what>.+)",
     re.IGNORECASE,
 )
-_REWORDED: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
-    (re.compile(spoken, re.IGNORECASE), meant)
-    for spoken, meant in (
-        (r"there(?: is|'s| are|'re) (?:no more|no longer any|not any more|no) (.+)", r"there is a \1"),
-        (r"there(?: is|'s| are)(?:n't| not) (?:a|an|any|any more|enough) (.+)", r"there is a \1"),
-        (r"there(?: is|'s| are) (?:none|no one|not any|n't any)(?: left| more)?(.*)", r"there is one\1"),
-        (r"there(?: is|'s| are)(?:n't| not)(?: one| any)(?: left| more)?(.*)", r"there is one\1"),
-        (r"(?:nobody|no one|no-one)(?: is|'s)(.+)", r"anybody is\1"),
-        (r"there(?: is|'s) (?:nobody|no one)(.+)", r"anybody is\1"),
-        (r"nothing(?: is|'s)(?: left)? (.+)", r"there is anything \1"),
-        (r"there(?: is|'s) nothing(?: left)? (.+)", r"there is anything \1"),
-        (
-            r"(.+?)(?: is| are|'s)(?:n't| not)(?: any more| anymore| yet)? (in|on|at|inside|there|near|next to)\b(.*)",
-            r"\1 is \2\3",
-        ),
-        (r"(.+?)(?: is| are|'s) no longer (in|on|at|inside|there|near|next to)\b(.*)", r"\1 is \2\3"),
-        (r"(.+?)(?: is| are) (?:gone|missing) from (.+)", r"\1 is in \2"),
-    )
-)
 _FILLED: Final = re.compile(
     r"(?:there is|there's) (?P<some>something|anything) (?:left )?(?:in|on|at) (?P<on>the .+)"
     r"|(?P<what>the .+?) is (?P<not>not )?(?P<how>empty|free|bare|clear|full|occupied)",
@@ -273,48 +267,36 @@ def _look(words: str, state: State, leaves: Leaves) -> Supposed:
         return _seen(match, words, state, leaves)
     match = _FILLED.fullmatch(re.sub(r"n't\b", " not", words))
     if match is not None:
-        found = leaves.check(f"is there anything on {match['on'] or match['what']}", state, asked=True)
+        found = leaves.anything_on(match["on"] or match["what"], words, state)
         empty = (match["how"] or "").lower() in ("empty", "free", "bare", "clear")
-        return _turned(found, words) if empty != bool(match["not"]) else replace(found, said=words)
-    for spoken, meant in _REWORDED:
-        if (other := spoken.fullmatch(words)) is not None:
-            return _turned(leaves.check(other.expand(meant), state), words)
-    found = leaves.check(words, state)
-    return replace(found, said=words)
+        return found.denied(words) if empty != bool(match["not"]) else found
+    return leaves.check(words, state)
 
 
 def _seen(match: re.Match[str], words: str, state: State, leaves: Leaves) -> Supposed:
-    what = match["what"]
-    known = re.fullmatch(r"(?:it|him|her|them|one)\b.*", what, re.IGNORECASE) or re.match(r"the |my |[A-Z]", what)
-    if re.fullmatch(r"it|one|him|her|them", what, re.IGNORECASE):
-        found = leaves.check(f"find {what}", state, asked=True)
-        return _turned(found, words) if match["not"] else replace(found, said=words)
+    """That the robot sees, or does not see, something or somebody."""
+    what = re.sub(r"^(?:him|them)(?= )", "it", match["what"], flags=re.IGNORECASE)
     looks = re.match(r"you (?:can |do |could |\w+n't |not )*(?:see|spot|notice)\b", words, re.IGNORECASE)
-    if looks and state.at is not None and leaves.somebody(what, state):
-        found = leaves.look(what, state.at, state)
-        return _turned(found, words) if match["not"] else replace(found, said=words)
-    said = re.sub(r"^(him|them)\b", "it", what, flags=re.IGNORECASE)
-    if re.fullmatch(r"it(?: there)?", said, re.IGNORECASE):
-        said = "it is there"
-    elif known and re.match(r"one\b", what) is None and " in " in f"{what} ":
-        said = re.sub(r" (in|on|at) ", r" is \1 ", said, count=1)
+    if re.fullmatch(r"it|one|him|her|them", what, re.IGNORECASE):
+        found = leaves.looked((verb("find"), *leaves.read(what)), words, state)
+    elif looks and state.at is not None and leaves.somebody(match["what"], state):
+        found = leaves.look(match["what"], state.at, words, state)
+    elif re.fullmatch(r"it there", what, re.IGNORECASE):
+        found = leaves.it_is_there(words, state)
     else:
-        said = f"there is {said}"
-    found = leaves.check(said, state)
-    return _turned(found, words) if match["not"] else replace(found, said=words)
+        found = leaves.exists(what, words, state)
+    return found.denied(words) if match["not"] else found
 
 
-def _turned(found: Supposed, words: str) -> Supposed:
-    """The contrary of what was looked for."""
-    return Supposed(negated(found.condition), words, found.fails, found.holds, found.notes)
-
-
-def _joined(words: str, state: State, leaves: Leaves) -> Supposed | None:
-    """Several conditions with "and" or "or" between them."""
+def _joined(words: str, state: State, leaves: Leaves) -> tuple[Supposed | None, RefusalError | None]:
+    """Several conditions with "and" or "or" between them, or else a question about one of them."""
+    left_open: RefusalError | None = None
     for word, kind in ((" and ", AllOf), (" or ", AnyOf)):
         for before, after in _halves(words, word):
-            parts = _both(before, after, state, leaves)
-            if parts is None:
+            try:
+                parts = _both(before, after, state, leaves)
+            except RefusalError as refusal:
+                left_open = left_open or (refusal if refusal.question is not None else None)
                 continue
             first, second = parts
             flat = [
@@ -323,8 +305,8 @@ def _joined(words: str, state: State, leaves: Leaves) -> Supposed | None:
                 for each in (one.condition.parts if isinstance(one.condition, kind) else (one.condition,))
             ]
             known = second.holds if kind is AllOf else _either(first, second, state)
-            return Supposed(kind(tuple(flat)), words, known, state, (*first.notes, *second.notes))
-    return None
+            return Supposed(kind(tuple(flat)), words, known, state, (*first.notes, *second.notes)), None
+    return None, left_open
 
 
 def _either(first: Supposed, second: Supposed, state: State) -> State:
@@ -340,33 +322,43 @@ def _halves(words: str, word: str) -> Iterator[tuple[str, str]]:
     start = words.lower().find(word)
     while start > 0:
         after = words[start + len(word) :].removeprefix("if ").removeprefix("that ")
-        yield words[:start].removeprefix("both ").removeprefix("either ").strip(" ,"), after
+        yield (words[:start].removeprefix("both ").removeprefix("either ").strip(" ,"), after)
         start = words.lower().find(word, start + 1)
 
 
-def _both(before: str, after: str, state: State, leaves: Leaves) -> tuple[Supposed, Supposed] | None:
+def _both(before: str, after: str, state: State, leaves: Leaves) -> tuple[Supposed, Supposed]:
+    """Two conditions, where the second may leave out what the first has said, or the first the place of both."""
+    first = suppose(before, state, leaves)
     if _THERE.match(before) and _BARE.match(after):
-        after = f"there is {after}"
-        place = _PLACED.search(after)
-        before = before if place is None or _PLACED.search(before) else f"{before}{place[0]}"
-    elif (is_there := _IS_THERE.match(before)) is not None and re.match(r"(?:in|on|at) ", after, re.IGNORECASE):
-        after = f"{is_there[1]} is {after}"
-    elif (seen := _THERE_AT.match(before)) is not None and re.match(r"(?:in|on|at|the) ", after, re.IGNORECASE):
-        if " is " not in after:
-            after = f"{seen[1]} {'' if after[:4].lower() != 'the ' else seen[2] + ' '}{after}"
-    elif is_there is not None and re.match(r"the ", after, re.IGNORECASE) and " is " not in after:
-        after = f"{is_there[1]} is {is_there[2]} {after}"
-    try:
-        first = suppose(before, state, leaves)
-        return first, suppose(after, first.holds, leaves)
-    except RefusalError:
-        return None
+        place = next((item for item in leaves.read(after) if _is_place(item)), None)
+        if place is not None and not _PLACED.search(before):
+            first = _looked_again(first, (*first.items, place), before, state, leaves)
+        return first, leaves.exists(after, after, first.holds)
+    if _AT.fullmatch(before) and re.match(r"(?:in|on|at|the) ", after, re.IGNORECASE) and " is " not in after:
+        return first, _looked_again(first, _moved(first.items, leaves.read(after)), after, first.holds, leaves)
+    return first, suppose(after, first.holds, leaves)
+
+
+def _looked_again(first: Supposed, items: Sequence[Item], words: str, state: State, leaves: Leaves) -> Supposed:
+    """The same condition with other items."""
+    found = leaves.looked(items, words, state)
+    return found.denied(words) if isinstance(first.condition, Not) else found
+
+
+def _moved(items: Sequence[Item], to: Sequence[Item]) -> tuple[Item, ...]:
+    """The items with another place."""
+    old = next((item for item in items if isinstance(item, Chunk) and item.role is not None), None)
+    rest = tuple(item for item in items if item is not old)
+    return (*rest, *placed(to, old.preposition if isinstance(old, Chunk) else "in"))
+
+
+def _is_place(item: Item) -> bool:
+    return isinstance(item, Chunk) and item.role is not None
 
 
 _THERE: Final = re.compile(r"there(?: is|'s| are)\b|you (?:find|see)\b", re.IGNORECASE)
 _PLACED: Final = re.compile(r" (?:in|on|at) (?:the|my) .+", re.IGNORECASE)
-_IS_THERE: Final = re.compile(r"(.+?) is (in|on|at) the [\w ]+$", re.IGNORECASE)
-_THERE_AT: Final = re.compile(r"((?:there (?:is|are)|you (?:find|see)) .+?) (in|on|at) the [\w ]+$", re.IGNORECASE)
+_AT: Final = re.compile(r"(?:.+? is|(?:there (?:is|are)|you (?:find|see)) .+?) (?:in|on|at) the [\w ]+", re.IGNORECASE)
 _BARE: Final = re.compile(r"(?:a|an|some|any|two|three|no) ", re.IGNORECASE)
 _Reader = Callable[[str, State, Leaves], Supposed | None]
 _READERS: Final[tuple[_Reader, ...]] = (_battery, _holding, _place, _clock, _button, _door, _meeting)

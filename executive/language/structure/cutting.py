@@ -9,21 +9,11 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Final
 
+from executive.language.items import Item
 from executive.language.lexicon import lexicon, read_table
 from executive.language.structure.amounts import SPAN, TIMES
 
-__all__ = [
-    "Behind",
-    "Clause",
-    "Kind",
-    "behind",
-    "cut",
-    "opens",
-    "pattern",
-    "reworded",
-    "spoken",
-    "verb_positions",
-]
+__all__ = ["Behind", "Clause", "Kind", "behind", "cut", "opens", "pattern", "reworded", "spoken", "verb_positions"]
 
 
 class Kind(enum.Enum):
@@ -44,12 +34,16 @@ class Kind(enum.Enum):
 
 @dataclass(frozen=True)
 class Clause:
-    """A clause: what joins it to the one before, its first words where those have a kind, and the others."""
+    """A clause: what joins it to the one before, its first words where those have a kind, and the others.
+
+    `lead` are items that were left out before it, its verb among them.
+    """
 
     joint: str
     text: str
     kind: Kind | None = None
     cue: str = ""
+    lead: tuple[Item, ...] = ()
 
     @property
     def begins(self) -> bool:

@@ -24,9 +24,10 @@ _STANDS: Final = re.compile(
     re.IGNORECASE,
 )
 _TURNS: Final = re.compile(
-    rf"(?:{_DOOR}|(?P<it>it)) (?P<how>opens|closes|is opening|is closing|has opened|has closed)", re.IGNORECASE
+    rf"(?:{_DOOR}|(?P<it>it)) (?P<how>opens|closes|to open|to close|is opening|is closing|has opened|has closed)",
+    re.IGNORECASE,
 )
-_OPEN: Final = frozenset({"open", "opened", "opens", "is opening", "has opened"})
+_OPEN: Final = frozenset({"open", "opened", "opens", "to open", "is opening", "has opened"})
 
 
 def door_condition(words: str, last: DoorOpen | None, knowledge: Knowledge) -> Condition | None:

@@ -6,22 +6,22 @@ import re
 from dataclasses import replace
 from typing import Final
 
+from executive.language.nouns import NounKind
 from executive.language.questions import RefusalError
-from executive.language.structure.leaves import Leaf, Leaves, State
-from executive.words.command import Command, Task
+from executive.language.roles import Location
+from executive.language.structure.leaves import Leaf, Leaves, State, named, verb
+from executive.words.command import Task
 from executive.words.steps import MissionStep
 from skills.files.errors import listing
 
 __all__ = ["EVERY_ROOM", "GOES_EVERYWHERE", "everywhere", "for_everyone", "look_for", "serves_all"]
 
+_GIVES: Final = re.compile(r"(?:bring|give|serve|hand|take|get|fetch|deliver|pass|offer|carry)\b", re.IGNORECASE)
 _EVERYONE: Final = re.compile(
-    r"(?:to |for )?(?P<who>everyone|everybody|(?:each|every)(?: single)? (?:person|one|guest)|all (?:of )?"
-    r"(?:the )?(?:people|persons|guests)|each of the people)"
-    r"(?: who(?: is|'s| are)| that(?: is| are)| sitting| standing)*(?: (?:in"
-    r"|at) (?P<where>the [\w ]+?))?(?= an? | some | one | two | the |$)",
+    r"\b(?:everyone|everybody|(?:each|every)(?: single)? (?:person|one|guest)|all (?:of )?(?:the )?(?:people|persons"
+    r"|guests)|each of the people)\b",
     re.IGNORECASE,
 )
-_GIVES: Final = re.compile(r"(?:bring|give|serve|hand|take|get|fetch|deliver|pass|offer|carry)\b", re.IGNORECASE)
 
 
 def serves_all(text: str) -> bool:
@@ -34,32 +34,32 @@ def for_everyone(text: str, state: State, leaves: Leaves) -> tuple[tuple[Mission
 
     Raises RefusalError: it does not say in which room, nobody is known to be there, or there is only one of the thing.
     """
-    match = _EVERYONE.search(text)
-    if match is None or not _GIVES.match(text):
+    trace = leaves.actions(text, state)
+    to = next((one.goal for one in trace.actions if one.goal is not None and _all_people(one.goal)), None)
+    if to is None or to.phrase is None:
         return None
-    who = match["who"]
-    if match["where"] is None:
+    who = to.phrase.spoken
+    if to.within is None:
         raise RefusalError(f"I bring things to one person at a time, not to {who}; name one, or a room", [who])
-    room = leaves.room(match["where"], state)
-    knowledge = leaves.knowledge
+    room, knowledge = leaves.room_of(to.within, state), leaves.knowledge
     people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
     if not people:
         raise RefusalError(f"I know nobody in the {room} to bring anything to: {who}", [who])
     steps: list[MissionStep] = []
     begun = state
     for name in people:
-        to = "to " if re.match(r"(?:to|for) ", match[0], re.IGNORECASE) else ""
-        leaf = leaves.leaf(f"{text[: match.start()]}{to}{name}{text[match.end() :]}", begun)
+        person = Location(named(name, NounKind.PERSON), "to", to.within)
+        actions = [replace(one, goal=person) if one.goal == to else one for one in trace.actions]
+        leaf = leaves.acted(trace, actions, begun)
         if any(action.target is not None and not action.target.indefinite for action in leaf.trace.resolved):
             raise RefusalError(f"there is one of it, and I cannot bring it to {who}", [who])
-        steps.append(MissionStep(tuple(_at(command, room, people) for command in leaf.commands)))
+        steps.append(MissionStep(leaf.commands))
         begun = replace(leaf.state, memory=state.memory)
     return tuple(steps), begun
 
 
-def _at(command: Command, room: str, people: list[str]) -> Command:
-    """The command, to somebody in that room."""
-    return replace(command, goal_at=room) if command.goal in people and command.goal_at is None else command
+def _all_people(goal: Location) -> bool:
+    return goal.phrase is not None and _EVERYONE.fullmatch(goal.phrase.spoken) is not None
 
 
 _ROOMS: Final = (
@@ -96,7 +96,7 @@ def everywhere(text: str, state: State, leaves: Leaves) -> Leaf | None:
 
 def look_for(what: str, state: State, leaves: Leaves) -> Leaf:
     """Looking for something or somebody wherever they may be. Raises RefusalError."""
-    leaf = leaves.leaf(f"find {what}", state)
+    leaf = leaves.leaf(what, state, (verb("find"),))
     finds = [command for command in leaf.commands if command.task is Task.FIND]
     if len(finds) != len(leaf.commands) or re.search(r"\b(?:in|on|at|near)\b", what):
         raise RefusalError(f"I cannot look for {listing([what])} in every room", [what])

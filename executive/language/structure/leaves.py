@@ -1,25 +1,31 @@
-"""The plain parts of a sentence: understood as sentences of their own, each knowing what was spoken of before it."""
+"""The plain parts of a sentence: from their items to commands, each knowing what was spoken of before it."""
 
 from __future__ import annotations
 
-import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from executive.language.lexicon import lexicon
+from executive.language.actions import Action
+from executive.language.indirect import OBJECTS
+from executive.language.items import Adverb, Being, Chunk, Item, Verb, Whether
+from executive.language.lexicon import PrepositionRole, lexicon
+from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
+from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.steps import Trace, trace_sentence
+from executive.language.steps import Part, Steps, Trace
+from executive.language.tokens import Token
 from executive.words.command import START, Command, Task, Thing
-from executive.words.condition import AllOf, Condition, DoorOpen, Look
+from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
 from executive.words.geometry import inside
 from executive.words.knowledge import Knowledge
 
-__all__ = ["Leaf", "Leaves", "State", "Supposed", "at_start"]
+__all__ = ["IT", "Leaf", "Leaves", "State", "Supposed", "at_start", "named", "negated", "placed", "verb"]
 
-_LEFT_OUT: Final = re.compile(r"\b(?:not|but|except|instead|rather|neither|nor)\b|n't\b", re.IGNORECASE)
+_LEFT_OUT: Final = frozenset({"not", "n't", "but", "except", "instead", "rather", "neither", "nor"})
 SEES: Final = "I can see whether something or somebody is somewhere"
 
 
@@ -28,7 +34,8 @@ class State:
     """What is known where a part of the sentence begins.
 
     `memory` is what was spoken of, `held` what is in the gripper, `goal` where the robot was sent last, `at` the room
-    of that (None: unknown), `door` the door that was spoken of.
+    of that (None: unknown), `door` the door that was spoken of, `recipient` who is given things
+    where nobody is named.
     """
 
     memory: Memory = field(default_factory=Memory)
@@ -36,17 +43,26 @@ class State:
     goal: str | None = START
     at: str | None = None
     door: DoorOpen | None = None
+    recipient: Location | None = None
 
 
 @dataclass(frozen=True)
 class Supposed:
-    """A condition, the words that tell it, and what is known where it holds and where it does not."""
+    """A condition, the words that tell it, and what is known where it holds and where it does not.
+
+    `items` are those of a look, which another condition may leave out.
+    """
 
     condition: Condition
     said: str
     holds: State
     fails: State
     notes: tuple[str, ...] = ()
+    items: tuple[Item, ...] = field(default=(), repr=False)
+
+    def denied(self, said: str) -> Supposed:
+        """The contrary, as it is said."""
+        return Supposed(negated(self.condition), said, self.fails, self.holds, self.notes, self.items)
 
 
 @dataclass(frozen=True)
@@ -58,11 +74,43 @@ class Leaf:
     trace: Trace
 
 
+def negated(condition: Condition) -> Condition:
+    """The contrary."""
+    return condition.part if isinstance(condition, Not) else Not(condition)
+
+
 def at_start(knowledge: Knowledge, memory: Memory) -> State:
     """What is known where a sentence begins."""
     start = (knowledge.start.x, knowledge.start.y)
     room = next((name for name, place in knowledge.places.items() if inside(place.polygon, start)), None)
     return State(memory=memory, at=room)
+
+
+def verb(text: str) -> Verb:
+    """A verb of the dictionary as an item."""
+    return Verb(text, lexicon().verbs[tuple(text.split())])
+
+
+def named(name: str, kind: NounKind) -> Phrase:
+    """The noun phrase of a name that the world knows."""
+    entity = "PERSON" if kind is NounKind.PERSON else ""
+    pos, tag = ("PROPN", "NNP") if entity else ("NOUN", "NN")
+    return Phrase((Token(0, 0, name, name.lower(), pos, tag, 0, "obl", entity, kind, known=True),))
+
+
+def placed(items: Sequence[Item], preposition: str) -> tuple[Item, ...]:
+    """Items whose first noun phrase stands behind a preposition; "there" needs none."""
+    at = next((n for n, item in enumerate(items) if isinstance(item, Chunk | Adverb)), None)
+    first = None if at is None else items[at]
+    if at is None or not isinstance(first, Chunk) or first.role is not None:
+        return tuple(items)
+    role = lexicon().prepositions[tuple(preposition.split())]
+    return (*items[:at], replace(first, preposition=preposition, role=role), *items[at + 1 :])
+
+
+IT: Final = Chunk(Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),)))
+_IS: Final = Being("is", existential=False, asked=False)
+_THERE_IS: Final = Being("there is", existential=True, asked=False)
 
 
 @dataclass(frozen=True)
@@ -72,21 +120,74 @@ class Leaves:
     parser: DependencyParser
     knowledge: Knowledge
 
-    def leaf(self, text: str, state: State) -> Leaf:
-        """What a plain part asks for. Raises RefusalError: it is none, or leaves something open."""
-        trace = trace_sentence(text, parser=self.parser, knowledge=self.knowledge, memory=state.memory)
-        if trace.refusal is not None:
-            raise trace.refusal
-        commands = _without_taking(trace.commands, state.held)
+    @property
+    def _steps(self) -> Steps:
+        return Steps(self.parser, self.knowledge)
+
+    def leaf(self, text: str, state: State, lead: Sequence[Item] = ()) -> Leaf:
+        """What a plain part asks for, behind the items `lead`. Raises RefusalError: it leaves something open."""
+        part = Part(tuple(lead), elliptic=True, recipient=state.recipient)
+        return self._leaf(self._steps.trace(text, state.memory, part), state)
+
+    def done(self, items: Sequence[Item], state: State, tokens: Sequence[Token] = ()) -> Leaf:
+        """The same of items, and the words that they were read from. Raises RefusalError."""
+        trace = Trace("", tokens=tuple(tokens), items=tuple(items), memory=state.memory)
+        return self._leaf(self._steps.rest(trace, behind="reading"), state)
+
+    def acted(self, trace: Trace, actions: Sequence[Action], state: State) -> Leaf:
+        """The same of actions in the place of those of a trace. Raises RefusalError."""
+        trace = replace(trace, actions=tuple(actions), memory=state.memory)
+        return self._leaf(self._steps.rest(trace, behind="understanding"), state)
+
+    def actions(self, text: str, state: State) -> Trace:
+        """What a plain part asks for up to its actions. Raises RefusalError."""
+        return _unrefused(self._steps.trace(text, state.memory, Part(elliptic=True), upto="understanding"))
+
+    def _leaf(self, trace: Trace, state: State) -> Leaf:
+        commands = _without_taking(_unrefused(trace).commands, state.held)
         return Leaf(commands, self._after(commands, trace.memory, state), trace)
 
-    def check(self, text: str, state: State, *, asked: bool = False) -> Supposed:
-        """The status check "check if TEXT", or TEXT where it is `asked` so, as a condition. Raises RefusalError."""
-        text = self._named(text, state)
-        if (left_out := _LEFT_OUT.search(text)) is not None:
-            raise RefusalError(f"I cannot see whether '{text}'; say it without '{left_out[0]}'", [text])
+    def read(self, text: str) -> tuple[Item, ...]:
+        """The items of some words. Raises RefusalError."""
+        return _unrefused(self._steps.trace(text, upto="reading")).items
+
+    def going(self, text: str, state: State) -> Leaf:
+        """Going to a place that is spoken of in a noun phrase, or "there". Raises RefusalError."""
+        items = (Adverb(here=False),) if text.lower() == "there" else self.read(text)
+        return self.done((verb("go"), *placed(items, "to")), state)
+
+    def check(self, text: str, state: State, lead: Sequence[Item] = (), *, said: str | None = None) -> Supposed:
+        """Whether what the text states, or denies, is so; `said` says more of it. Raises RefusalError."""
+        part = Part((verb("check"), Whether(), *lead), asked=True)
+        read = _unrefused(self._steps.trace(text, part=part, upto="reading"))
+        assert read.affirmed is not None
+        words = [token.word for token in read.tokens if token.index not in read.affirmed.silent]
+        if (left_out := next((word for word in words if word in _LEFT_OUT), None)) is not None:
+            raise RefusalError(f"I cannot see whether '{said or text}'; say it without '{left_out}'", [said or text])
+        found = self.looked(read.items, said or text, state, read.tokens)
+        return found.denied(said or text) if read.affirmed.denied else found
+
+    def exists(self, what: str, text: str, state: State) -> Supposed:
+        """Whether there is what is named, or is not ("no beer in the hall"); `text` says it. Raises RefusalError."""
+        return self.check(what, state, (_THERE_IS,), said=text)
+
+    def it_is_there(self, text: str, state: State) -> Supposed:
+        """Whether a thing that was spoken of is where that was. Raises RefusalError."""
+        return self.looked((verb("check"), Whether(), IT, _IS, Adverb(here=False)), text, state)
+
+    def anything_on(self, place: str, text: str, state: State) -> Supposed:
+        """Whether anything lies in a place. Raises RefusalError."""
+        return self.looked((verb("find"), Chunk(OBJECTS), *placed(self.read(place), "on")), text, state)
+
+    def look(self, who: str, room: str, text: str, state: State) -> Supposed:
+        """Whether somebody is in a room. Raises RefusalError."""
+        where = Chunk(named(room, NounKind.PLACE), "in", PrepositionRole.AT)
+        return self.looked((verb("check"), Whether(), *self.read(who), _IS, where), text, state)
+
+    def looked(self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()) -> Supposed:
+        """The condition that the looks of some items make; `text` says it. Raises RefusalError: they are no looks."""
         try:
-            leaf = self.leaf(text if asked else f"check if {text}", state)
+            leaf = self.done([self._by_name(item, state) for item in items], state, tokens)
         except RefusalError as refusal:
             if refusal.kind is not RefusalKind.NOT_UNDERSTOOD:
                 raise
@@ -98,21 +199,28 @@ class Leaves:
             raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text])
         known = self.seen(leaf, replace(state, goal=leaf.state.goal, at=leaf.state.at))
         fails = replace(known, memory=replace(known.memory, where=None, told=state.memory.told))
-        return Supposed(looks[0] if len(looks) == 1 else AllOf(looks), text, known, fails, leaf.trace.notes)
+        condition = looks[0] if len(looks) == 1 else AllOf(looks)
+        return Supposed(condition, text, known, fails, leaf.trace.notes, tuple(items))
 
-    def _named(self, text: str, state: State) -> str:
-        """The text with the name of the person who was spoken of in place of "he"."""
+    def _by_name(self, item: Item, state: State) -> Item:
+        """The person who was spoken of in place of "he"."""
         person = state.memory.person
-        known = person is not None and self.knowledge.person(person.name) is not None
-        return re.sub(r"^(?:he|she)\b", person.name, text, flags=re.IGNORECASE) if person and known else text
+        if person is None or person.phrase is None or self.knowledge.person(person.name) is None:
+            return item
+        he = isinstance(item, Chunk) and item.role is None and item.phrase.head.word in ("he", "she")
+        return replace(item, phrase=person.phrase) if isinstance(item, Chunk) and he else item
 
-    def look(self, who: str, room: str, state: State) -> Supposed:
-        """That somebody is in a room. Raises RefusalError."""
-        return self.check(f"{who} is in the {room}", state)
+    def room_of(self, place: Location, state: State) -> str:
+        """The room of a place that was read. Raises RefusalError."""
+        assert place.phrase is not None
+        return self._room(self.done((verb("go"), Chunk(place.phrase, "to", PrepositionRole.GOAL)), state), place.text)
 
     def room(self, text: str, state: State) -> str:
         """The room of a place as it is spoken. Raises RefusalError."""
-        first, *more = self.leaf("go there" if text.lower() == "there" else f"go to {text}", state).commands
+        return self._room(self.going(text, state), text)
+
+    def _room(self, leaf: Leaf, text: str) -> str:
+        first, *more = leaf.commands
         goal = first.goal
         if more or first.item or first.task or goal is None or self.knowledge.place(goal) is None:
             raise RefusalError(f"'{text}' is no room", [text])
@@ -137,8 +245,8 @@ class Leaves:
         sought = leaf.commands[-1].object
         somebody = sought is not None and self.knowledge.somebody(sought.name) is not None
         if somebody or target.person:
-            named = sought is not None and self.knowledge.person(sought.name) is not None
-            person = Location(target) if named else state.memory.person
+            known = sought is not None and self.knowledge.person(sought.name) is not None
+            person = Location(target) if known else state.memory.person
             met = replace(memory, things=state.memory.things, where=state.memory.where, person=person)
             return replace(state, memory=replace(met, place=where or memory.place))
         memory = replace(memory, things=(target,), where=where, place=where or memory.place, told=told)
@@ -164,6 +272,13 @@ class Leaves:
         if place is not None and place in self.knowledge.people and command.goal_at is None:
             return self.knowledge.room(self.knowledge.people[place].at)
         return None if place is None or self.knowledge.place(place) is None else self.knowledge.room(place)
+
+
+def _unrefused(trace: Trace) -> Trace:
+    """The trace. Raises RefusalError: that of a step."""
+    if trace.refusal is not None:
+        raise trace.refusal
+    return trace
 
 
 def _without_taking(commands: tuple[Command, ...], held: Thing | None) -> tuple[Command, ...]:

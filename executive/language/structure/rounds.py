@@ -10,16 +10,9 @@ from typing import Final
 from executive.language.questions import RefusalError
 from executive.language.structure.amounts import SPAN, seconds_of, time_of, times_of
 from executive.language.structure.branches import Branches
-from executive.language.structure.conditions import negated, suppose
-from executive.language.structure.cutting import (
-    Behind,
-    Clause,
-    Kind,
-    cut,
-    spoken,
-    verb_positions,
-)
-from executive.language.structure.leaves import State, Supposed
+from executive.language.structure.conditions import suppose
+from executive.language.structure.cutting import Behind, Clause, Kind, cut, spoken, verb_positions
+from executive.language.structure.leaves import State, Supposed, negated, verb
 from executive.language.structure.row import (
     LookedAt,
     Rounds,
@@ -34,6 +27,7 @@ from executive.language.structure.row import (
     where_it_is_taken,
 )
 from executive.language.structure.telling import said_by
+from executive.language.structure.waiting import wait
 from executive.words.blocks import Choose, Repeat, Together
 from executive.words.command import Task
 from executive.words.condition import ValueIs
@@ -55,10 +49,8 @@ class Repeats(Branches):
         body = [*cut(rest), *clauses[at + 1 : end]]
         if clause.kind in (Kind.WHILE, Kind.UNTIL) and len(body) == 1 and _STAYS.fullmatch(body[0].text):
             said = clause.text[: len(clause.text) - len(rest)].strip(" ,")
-            waiting = Clause("", f"{body[0].text} {clause.cue} {said}")
-            steps, row.state = self.sequence([waiting], row.state)
-            row.steps += steps
-            row.asked = None
+            how = "until" if clause.kind is Kind.UNTIL else "while"
+            self.put_done(row, wait(body[0].text.partition(" ")[2], how, said, row.state, self.leaves))
             return end
         if not body:
             raise RefusalError(f"what am I to do {clause.cue.lower()}?", [clause.cue])
@@ -133,16 +125,16 @@ class Repeats(Branches):
         if match is None:
             return False
         for cut_at in (*([len(clause.text)] if follows else []), *verb_positions(clause.text)):
-            going, rest = clause.text[match.end() : cut_at].strip(" ,"), clause.text[cut_at:]
+            going, rest = (clause.text[match.end() : cut_at].strip(" ,"), clause.text[cut_at:])
             if cut_at > match.end() and re.match(r"(?:to|into|through|from)\b", going, re.IGNORECASE):
                 body = [*cut(rest), *follows]
-                self.beside(row, f"go {going}", body)
+                self.beside(row, going, body)
                 return True
         raise RefusalError(f"I do not understand '{clause.cue} {clause.text}'", [clause.text])
 
-    def beside(self, row: Row, going: str, body: Sequence[Clause]) -> None:
+    def beside(self, row: Row, where: str, body: Sequence[Clause]) -> None:
         """Say something while going somewhere."""
-        leaf = self.leaves.leaf(going, row.state)
+        leaf = self.leaves.leaf(where, row.state, (verb("go"),))
         said = [] if len(body) != 1 else [said_by(body[0].text, self.leaves.knowledge, self.leaves.parser)]
         first = said[0] if said else None
         if first is None or first.text is None or first.to is not None or len(leaf.commands) != 1:
@@ -156,7 +148,7 @@ class Repeats(Branches):
             self._guarded(row, scope, found)
             return
         if found.kind is Kind.WHILE and (match := _UNDER_WAY.match(found.text)) is not None:
-            self.beside(row, f"go {found.text[match.end() :].strip()}", scope)
+            self.beside(row, found.text[match.end() :].strip(), scope)
             return
         if found.kind is Kind.EVERY:
             rounds = self.limited(_span(found.cue), found.text, row.state)
@@ -194,7 +186,7 @@ class Repeats(Branches):
         row.plain = row.plain[: len(row.plain) - len(earlier)]
         self.flush(row)
         scope = [replace(earlier[0], joint=""), *earlier[1:], main]
-        if not one_errand(self.leaves.leaf(spoken(scope), row.state)):
+        if not one_errand(self.plain_leaf(scope, row.state)):
             raise unclear(found)
         return scope
 

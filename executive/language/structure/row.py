@@ -10,14 +10,8 @@ from typing import Final
 from executive.language.lexicon import VerbKind
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE
-from executive.language.structure.conditions import negated
-from executive.language.structure.cutting import (
-    Behind,
-    Clause,
-    Kind,
-    pattern,
-)
-from executive.language.structure.leaves import Leaf, Leaves, State, Supposed
+from executive.language.structure.cutting import Behind, Clause, Kind, pattern
+from executive.language.structure.leaves import Leaf, Leaves, State, Supposed, negated
 from executive.language.structure.telling import template
 from executive.words.blocks import Repeat, Speak
 from executive.words.command import Command, Task
@@ -105,7 +99,7 @@ def same(one: Condition, other: Condition) -> bool:
 
 def turned(supposed: Supposed) -> Supposed:
     """The contrary, with what is known then."""
-    return Supposed(negated(supposed.condition), f"not {supposed.said}", supposed.fails, supposed.holds, supposed.notes)
+    return supposed.denied(f"not {supposed.said}")
 
 
 def sentence_of(supposed: Supposed) -> str | None:

@@ -12,18 +12,9 @@ from executive.language.questions import RefusalError
 from executive.language.reference import Memory
 from executive.language.structure.acts import Acts
 from executive.language.structure.branches import ends_anyway
-from executive.language.structure.cutting import (
-    Clause,
-    Kind,
-    behind,
-    cut,
-    reworded,
-)
+from executive.language.structure.cutting import Clause, Kind, behind, cut, reworded
 from executive.language.structure.leaves import Leaves, State, at_start
-from executive.language.structure.row import (
-    Row,
-    Steps,
-)
+from executive.language.structure.row import Row, Steps
 from executive.words.blocks import Ask, Choose, Repeat, Together, Try, steps_of
 from executive.words.knowledge import Knowledge
 from executive.words.steps import MissionStep

@@ -12,16 +12,20 @@ from executive.language.questions import RefusalError
 from executive.language.structure.cutting import pattern
 from executive.words.knowledge import Knowledge
 
-__all__ = ["Asked", "Listener", "Said", "asked_of", "bare", "said_by", "template"]
+__all__ = ["Asked", "Listener", "Said", "asked_of", "bare", "said_by", "said_to", "template"]
 
 
 @dataclass(frozen=True)
 class Listener:
-    """To whom something is said; `goal` is where to go for that, in words (None: nowhere)."""
+    """To whom something is said: the speaker, or somebody to go to, by words (`who`), and where they are.
 
-    words: str
-    goal: str | None
+    `name` is that of a known person. Without `who` and `where` it is said on the spot.
+    """
+
+    who: str | None = None
+    where: str | None = None
     name: str | None = None
+    speaker: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,9 +77,17 @@ def said_by(text: str, knowledge: Knowledge, parser: DependencyParser) -> Said |
     if (match := re.fullmatch(rf"announce to {who} (?:that )?(?P<text>.+)", text, re.IGNORECASE)) is not None:
         return Said(_told(match["text"]), _listener(match))
     if (match := _ANNOUNCE.fullmatch(text)) is not None:
-        to = None if match["place"] is None else Listener(match["place"], f"go to {match['place']}")
+        to = None if match["place"] is None else Listener(where=match["place"])
         return Said(_told(match["text"]), to)
     return _relayed(text, who, parser)
+
+
+def said_to(who: str, text: str, knowledge: Knowledge) -> Said:
+    """Telling somebody something. Raises RefusalError: nobody of that name is known, or it cannot be said for them."""
+    match = re.fullmatch(_who(knowledge), who, re.IGNORECASE)
+    if match is None:
+        raise RefusalError(f"I do not know to whom to say it: '{who}'", [who])
+    return Said(_told(text), _listener(match))
 
 
 def _relayed(text: str, who: str, parser: DependencyParser) -> Said | None:
@@ -165,12 +177,12 @@ def _listener(match: re.Match[str]) -> Listener:
     who, where = match["who"], match["where"]
     word = who.lower()
     if word in _SPEAKER:
-        return Listener(who, "come here")
+        return Listener(who, speaker=True)
     if word in _SOMEBODY:
-        return Listener(who, f"go to {who}")
+        return Listener(who)
     if word in ("them", "the others", "everyone", "everybody") or " " in word:
-        return Listener(who, None if where is None else f"go to {where}")
-    return Listener(who, f"go to {who}" if where is None else f"go to {who} in {where}", name=who)
+        return Listener(where=where)
+    return Listener(who, where, name=who)
 
 
 _WANTS: Final = (

@@ -8,12 +8,12 @@ from typing import Final
 
 from executive.language.questions import RefusalError
 from executive.language.structure.amounts import SHARE, SPAN, seconds_of, share_of, time_of
-from executive.language.structure.conditions import negated, suppose
-from executive.language.structure.leaves import Leaves, State, Supposed
+from executive.language.structure.conditions import meeting, pressed, reading, suppose
+from executive.language.structure.leaves import Leaves, State, Supposed, negated
 from executive.words.blocks import Dock, Wait
 from executive.words.steps import MissionStep
 
-__all__ = ["Done", "charged", "waited"]
+__all__ = ["Done", "charged", "wait", "waited"]
 
 Done = tuple[tuple[MissionStep, ...], State, tuple[str, ...]]
 """Steps, what is known behind them, and notes."""
@@ -36,22 +36,26 @@ def waited(text: str, state: State, leaves: Leaves) -> Done | None:
     match = _WAIT.fullmatch(text)
     if match is None or re.fullmatch(rf"(?:about |another )?{SPAN}", match["what"], re.IGNORECASE):
         return None
-    steps, there = _gone(match["where"].strip(), state, leaves)
-    if match["how"].lower() in ("until", "till"):
-        if (passed := _PASSED.fullmatch(match["what"])) is not None and (
-            span := seconds_of(passed["span"])
-        ) is not None:
+    return wait(match["where"].strip(), match["how"].lower(), match["what"], state, leaves)
+
+
+def wait(where: str, how: str, what: str, state: State, leaves: Leaves) -> Done:
+    """A wait in a place: until something is so, for somebody ("for"), or as long as something is so.
+
+    Raises RefusalError.
+    """
+    steps, there = _gone(where, state, leaves)
+    if how in ("until", "till"):
+        if (passed := _PASSED.fullmatch(what)) is not None and (span := seconds_of(passed["span"])) is not None:
             return (*steps, MissionStep(block=Wait(seconds=span))), there, ()
-        time = time_of(_TIME.sub(r"\g<time>", match["what"]))
-        if time is not None:
-            notes = (f"I take '{match['what']}' as {time.text}",) if time.taken else ()
-            return (*steps, MissionStep(block=Wait(until_clock_s=time.seconds))), there, notes
-        found = suppose(match["what"], there, leaves)
-        return _until(found, steps, there)
-    if match["how"].lower() == "for":
-        more, there, what = _awaited(match["what"], there, leaves)
-        return _until(suppose(what, there, leaves), (*steps, *more), there)
-    found = suppose(match["what"], there, leaves)
+        if (time := time_of(_TIME.sub(r"\g<time>", what))) is not None:
+            notes = (f"I take '{what}' as {time.text}",) if time.taken else ()
+            return ((*steps, MissionStep(block=Wait(until_clock_s=time.seconds))), there, notes)
+        return _until(suppose(what, there, leaves), steps, there)
+    if how == "for":
+        more, there, found = _awaited(what, there, leaves)
+        return _until(found, (*steps, *more), there)
+    found = suppose(what, there, leaves)
     return _until(replace(found, condition=negated(found.condition), holds=found.fails), steps, there)
 
 
@@ -69,40 +73,28 @@ def _gone(where: str, state: State, leaves: Leaves) -> tuple[tuple[MissionStep, 
         raise RefusalError(f"I do not understand where to wait: '{where}'", [where])
     if match["there"] and state.goal is not None and state.at is not None:
         return (), state
-    leaf = leaves.leaf(f"go {'to ' + match['place'] if match['place'] else 'there'}", state)
+    leaf = leaves.going(match["place"] or match["there"], state)
     return (MissionStep(leaf.commands),), leaf.state
 
 
-_TO_PRESS: Final = re.compile(
-    r"(?:me|us|somebody|someone|the operator) to (?P<act>(?:press|push|hit|click) .+)", re.IGNORECASE
-)
 _BUTTON: Final = re.compile(
-    r"(?P<button>the (?:[\w-]+ )?button)(?: to be (?:pressed|pushed))?|a (?:press|push) (?:of|on) (?P<of>the "
-    r"(?:[\w-]+ )?button)",
-    re.IGNORECASE,
-)
-_TO_COME: Final = re.compile(
-    r"(?P<who>.+?) to (?P<act>come|arrive|show up|appear|get|return|be|leave|enter|open|close|go|turn up)(?P<rest>.*)",
-    re.IGNORECASE,
+    r"(?P<button>the (?:[\w-]+ )?button)|a (?:press|push) (?:of|on) (?P<of>the (?:[\w-]+ )?button)", re.IGNORECASE
 )
 _PERSON_AT: Final = re.compile(r"(?P<who>.+?) (?:in|at) (?P<where>the .+)", re.IGNORECASE)
-_FINITE: Final = {"be": "is", "go": "goes"}
 
 
-def _awaited(what: str, state: State, leaves: Leaves) -> tuple[tuple[MissionStep, ...], State, str]:
-    """What "wait for ..." waits for, in the words of "wait until ...", and going there where a place is said."""
-    if (match := _TO_PRESS.fullmatch(what)) is not None:
-        return (), state, f"I {match['act']}"
+def _awaited(what: str, state: State, leaves: Leaves) -> tuple[tuple[MissionStep, ...], State, Supposed]:
+    """What "wait for ..." waits for, and going there where a place is said."""
     if (match := _BUTTON.fullmatch(what)) is not None:
-        return (), state, f"{match['button'] or match['of']} is pressed"
-    if (match := _TO_COME.fullmatch(what)) is not None:
-        act = _FINITE.get(match["act"].lower(), re.sub(r"^(\w+)", r"\1s", match["act"].lower()))
-        return (), state, f"{match['who']} {act}{match['rest']}"
+        return (), state, pressed(match["button"] or match["of"], what, state)
+    if " to " in what and (found := reading(what, state, leaves)) is not None:
+        return (), state, found
     if (match := _PERSON_AT.fullmatch(what)) is not None and leaves.somebody(match["who"], state):
-        leaf = leaves.leaf(f"go to {match['where']}", state)
-        return (MissionStep(leaf.commands),), leaf.state, f"{match['who']} comes"
+        leaf = leaves.going(match["where"], state)
+        found = meeting(match["who"], None, what, leaf.state, leaves)
+        return (MissionStep(leaf.commands),), leaf.state, found
     if leaves.somebody(what, state):
-        return (), state, f"{what} comes"
+        return (), state, meeting(what, None, what, state, leaves)
     raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
 
 

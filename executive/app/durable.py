@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -27,28 +26,6 @@ from skills.robot import Pose2D
 
 STORE: Final = "missions.sqlite"
 _MOST_STARTS: Final = 1000
-
-
-def run_arguments(asked: Request, prepared: Prepared) -> list[str]:
-    """The arguments by which `errand run` does the same in a process of its own, where nobody can be asked.
-
-    A sentence has the answers in their places; to the questions of a file they are given again.
-    """
-    arguments = ["--say", prepared.request.sentence or ""] if asked.file is None else [str(asked.file)]
-    arguments += ["--world", asked.world] if asked.world else []
-    arguments += [] if asked.require_wake is None else ["--wake" if asked.require_wake else "--no-wake"]
-    arguments += ["--stack", str(asked.stack)] if asked.stack else []
-    arguments += [] if asked.start is None else [f"--start={asked.start}"]
-    arguments += [f"--set={name}={json.dumps(value)}" for name, value in asked.given.items()]
-    arguments += ["--map", str(asked.map)] if asked.map else []
-    arguments += [f"--fault={words}" for words in asked.scenario.faults]
-    arguments += [f"--random-faults={asked.scenario.random}"] if asked.scenario.random else []
-    arguments += [f"--scenario={path}" for path in asked.scenario_files]
-    arguments += asked.variation.arguments()
-    if asked.file is None:
-        return arguments
-    arguments += [part for answer in asked.answers for part in ("--answer", answer)]
-    return [*arguments, *([] if asked.questions is None else ["--questions", asked.questions.value])]
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,9 @@ from executive.app.feasibility import check_prepared, route_planner_of
 from executive.app.prepare import prepare
 from executive.app.prepared import Prepared
 from executive.app.worlds import refuse_unusable
-from executive.cli.output import BAD_INPUT, console_for, print_json, refusals
-from executive.cli.run_options import ROBOTS, SET, START, robots_of
-from executive.cli.stack_command import STACK
-from executive.mission.file.parameters import given_values
-from executive.mission.request import Request, Start
+from executive.cli.options import takes_request
+from executive.cli.output import BAD_INPUT, console_for, print_json
+from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, RoutePlanner
 from executive.tree.node_view import node_view
@@ -104,24 +102,18 @@ def _of_all(prepared: Prepared, estimates: Mapping[str, Estimate]) -> Estimate:
     return whole.up_to(max(latest_s.values()), *(reason for each in estimates.values() for reason in each.reasons))
 
 
+@takes_request("world", "given", "stack", "start", "robots")
 def check(
+    request: Request,
     files: Annotated[
         list[Path],
         typer.Argument(metavar="MISSION...", help="Files, or names of `errand missions`.", show_default=False),
     ],
-    world: Annotated[str | None, typer.Option(help="World by name or folder, in place of the files' own.")] = None,
-    given: SET = None,
-    stack: STACK = None,
-    start: START = None,
-    robots: ROBOTS = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object for all files on standard output.")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Show commands and trees, too.")] = False,
 ) -> None:
     """Check mission files without running them: commands, tree, paths on the map, time and battery."""
-    with refusals():
-        at = None if start is None else Start.of(start)
-        like = Request(world=world, stack=stack, start=at, given=given_values(given or ()))
-        checker = Checker(replace(like, robots=robots_of(robots)))
+    checker = Checker(request)
     checked = [checker.check(file) for file in files]
     if as_json:
         print_json(to_json(checked))

@@ -21,8 +21,8 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
+from executive.cli.options import StartCommand
 from executive.cli.plugin_commands import help_lines, plugin_command
-from executive.cli.run_options import StartCommand
 from skills.files.errors import MOST_LETTERS, InputError, one_line
 
 __all__ = ["app", "as_command", "command_line", "loaded", "main"]
@@ -41,7 +41,7 @@ class _Command:
 
 
 COMMANDS: Final[Mapping[str, _Command]] = {
-    "run": _Command("main", "run", "Run a sentence or a mission file in the simulated world."),
+    "run": _Command("run_command", "run", "Run a sentence or a mission file in the simulated world."),
     "check": _Command(
         "check_command", "check", "Check mission files without running them: commands, tree, paths, time and battery."
     ),
@@ -58,7 +58,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "fleet": _Command("fleet_command", "fleet", "What is queued, given out among several robots."),
     "resume": _Command("resume_command", "resume", "Resume the mission that was interrupted; then run its queue."),
     "evaluate": _Command(
-        "main",
+        "evaluate_command",
         "evaluate",
         "Run a scenario file, or a mission at many seeds; count claims and what the referee saw.",
     ),
@@ -179,10 +179,6 @@ def command_line() -> None:
     try:
         for argument in sys.argv[1:]:
             _refuse_undecoded(argument)
-        if any(argument.startswith("--say") for argument in sys.argv):
-            from executive.cli.wake_check import refuse_unaddressed
-
-            refuse_unaddressed(sys.argv[2:])
     except InputError as error:
         typer.echo(f"errand: {error}", err=True)
         sys.exit(2)

@@ -25,7 +25,7 @@ from executive.app.feasibility import refuse_impossible
 from executive.app.mission_files import mission_file
 from executive.cli.output import NOT_ACHIEVED, print_json
 from executive.cli.results_view import show_cases, standings_json
-from executive.cli.stack_command import stack_file
+from executive.mission.stack_file import stack_file
 from skills.files.errors import Problems
 
 __all__ = ["Handling", "evaluate_runs", "evaluate_scenario", "give_out_runs"]
@@ -53,7 +53,7 @@ class Handling:
 
 def evaluate_scenario(file: Path, how: Handling) -> int:
     """Run what is still missing of a scenario's runs; the exit status. Raises InputError; results are kept."""
-    evaluation = load_evaluation(file, mission_file=mission_file, stack_file=_stack_file)
+    evaluation = load_evaluation(file, mission_file=mission_file, stack_file=stack_file)
     return evaluate_runs(evaluation, how, before=None if how.anyway else partial(_refuse_impossible, out=how.out))
 
 
@@ -84,10 +84,6 @@ def evaluate_runs(
         kept.note(logs=str((out / LOGS).resolve()))
         workers = _worked_through(missing, kept, how, checked=checked) if missing else 0
         return _shown(evaluation, kept, how, workers=workers)
-
-
-def _stack_file(path: Path) -> Path:
-    return stack_file(path) or path
 
 
 def _worked_through(missing: Sequence[RunSpec], kept: ResultsFile, how: Handling, *, checked: bool) -> int:

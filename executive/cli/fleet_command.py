@@ -8,26 +8,16 @@ from typing import Annotated, Any
 
 import typer
 
-from executive.app.durable import STORE
+from executive.app.durable import STORE as STORE_NAME
 from executive.app.report import VERDICTS
-from executive.cli.number_options import quantity_option
+from executive.cli.options import AS_JSON, QUIET, VIEW, VIEW_FOR, VIEW_PORT, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
-from executive.cli.run_options import (
-    FAULT,
-    NO_RECORD,
-    TIME_LIMIT,
-    VIEW,
-    VIEW_FOR,
-    VIEW_PORT,
-    robots_of,
-)
-from executive.cli.serve_command import AsJson
+from executive.mission.request import Request
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.words.robots import robot_called
 from skills.files.errors import InputError
 from skills.files.outside import is_folder
-from skills.quantities import Seed
 
 __all__ = ["fleet"]
 
@@ -44,27 +34,18 @@ Queue = Annotated[
 
 
 @fleet.command()
+@takes_request("robots", "world", "seed", "faults", "time_limit_s", "record")
 def run(
+    request: Request,
     queue: Queue,
-    robots: Annotated[
-        str,
-        typer.Option(
-            "--robots", metavar="NAME=KIND,...", help="The robots and their kinds, as in alice=spot,bob=spot."
-        ),
-    ],
-    world: Annotated[str | None, typer.Option(help="World by name or folder; that of the first mission.")] = None,
-    seed: Annotated[int, quantity_option(Seed, help="Sets the things in the world and all noise.")] = 1,
     out: Annotated[
         Path | None, typer.Option(help="Folder for log, report and recording; `fleet` beside the store.")
     ] = None,
-    fault: FAULT = None,
-    time_limit: TIME_LIMIT = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No lines while it runs.")] = False,
-    no_record: NO_RECORD = False,
+    quiet: QUIET = False,
     view: VIEW = False,
     view_for: VIEW_FOR = None,
     view_port: VIEW_PORT = 0,
-    as_json: AsJson = False,
+    as_json: AS_JSON = False,
 ) -> None:
     """Run all that is queued, in one world, with several robots.
 
@@ -78,25 +59,27 @@ def run(
         from executive.app.fleet_setup import simulated_fleet
         from executive.app.page_view import PageView
 
-        configs, queued = robots_of(robots), _to_do(missions)
-        faults = _faults(fault or (), [each.name for each in configs])
+        if not request.robots:
+            raise InputError("a fleet needs its robots", hint="name them, as in --robots alice=spot,bob=spot")
+        queued = _to_do(missions)
+        faults = _faults(request.scenario.faults, [each.name for each in request.robots])
         lines = None if quiet else console
         dispatch = simulated_fleet(
             missions,
             queued,
-            configs,
-            world=world,
-            seed=seed,
+            request.robots,
+            world=request.world,
+            seed=request.seed,
             faults=faults,
             console=lines,
-            record=not no_record,
+            record=request.record,
         )
         folder, first = (
             out or store.parent / "fleet",
             next(iter(next(iter(dispatch.missions.values())).options.values())),
         )
         page = PageView(None, console, port=view_port) if view or view_for is not None else None
-        run_fleet(dispatch, out=folder, seed=seed, time_limit_s=time_limit, page=page, first=first)
+        run_fleet(dispatch, out=folder, seed=request.seed, time_limit_s=request.time_limit_s, page=page, first=first)
         results = told(missions, [each.id for each in queued])
         left = resumable_lines(missions, queue)
     achieved = [_achieved(each) for each in results if each["part_of"] is None]
@@ -112,7 +95,7 @@ def run(
 
 
 @fleet.command()
-def status(queue: Queue, as_json: AsJson = False) -> None:
+def status(queue: Queue, as_json: AS_JSON = False) -> None:
     """Show which robot has which mission, also while they run."""
     with refusals(), MissionStore(_store(queue), create=False) as missions:
         from executive.app.fleet_report import told
@@ -126,7 +109,7 @@ def status(queue: Queue, as_json: AsJson = False) -> None:
 
 
 def _store(queue: Path) -> Path:
-    return queue / STORE if is_folder(queue) else queue
+    return queue / STORE_NAME if is_folder(queue) else queue
 
 
 def _to_do(missions: MissionStore) -> Sequence[StoredMission]:

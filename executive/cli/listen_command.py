@@ -15,11 +15,12 @@ from rich.text import Text
 
 from executive.app.signals import interrupted_by_hang_up
 from executive.app.worlds import knowledge_of, open_world
+from executive.cli.options import takes_request
 from executive.cli.output import BAD_INPUT, console_for, refusals
-from executive.cli.run_options import ROBOTS, robots_of
 from executive.language.parser import load_parser
 from executive.language.robots import Part
 from executive.language.understand import Status, Understanding
+from executive.mission.request import Request
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, TeamReader, refuse_alike, spoken_phrases
 from executive.speech.listener import HeardUtterance, Listener, Recording
@@ -38,26 +39,26 @@ _METER_WIDTH = 24
 _QUIETEST_DB = -60.0
 
 
+@takes_request("world", "robots")
 def listen(
+    request: Request,
     files: Annotated[list[Path] | None, typer.Argument(metavar="FILE.wav...", show_default=False)] = None,
     mic: Annotated[bool, typer.Option("--mic", help="Listen to the microphone until Ctrl-C.")] = False,
-    world: Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")] = None,
     open_words: Annotated[bool, typer.Option("--open", help="Ground nothing in a world; names as spoken.")] = False,
     no_wake: Annotated[bool, typer.Option("--no-wake", help="The robot's name need not be said.")] = False,
     vocabulary: Annotated[
         Path | None, typer.Option(help="A text file with one name on each line, in place of the world's names.")
     ] = None,
     robot: Annotated[str | None, typer.Option(help="The robot's name; the world's robot unless said.")] = None,
-    robots: ROBOTS = None,
     jsonl: Annotated[bool, typer.Option("--jsonl", help="One JSON object for each file.")] = False,
 ) -> None:
     """Recognise what is said in wav files or at the microphone, and show the commands that it means."""
     with refusals():
         if mic == bool(files):
             raise InputError("errand listen takes wav files or --mic", hint="try: errand listen request.wav")
-        knowledge = knowledge_of(open_world(world or DEFAULT_WORLD))
-        several = called_robots(robots_of(robots), knowledge) if robot is None else ()
-        if (robot is not None and robots is not None) or (open_words and several):
+        knowledge = knowledge_of(open_world(request.world or DEFAULT_WORLD))
+        several = called_robots(request.robots, knowledge) if robot is None else ()
+        if (robot is not None and request.robots) or (open_words and several):
             what = "--robots stands without --robot and --open"
             raise InputError(what, hint="what is said to several robots is understood in a world")
         listener = listener_for(
@@ -132,26 +133,17 @@ def heard_sentence(wav: Path, listener: Listener) -> str:
     return " ".join(one.meant.understanding.text for one in recording.decisive)
 
 
-def hear_request(
-    wav: Path,
-    other: Path | str | None,
-    *,
-    world: str | None,
-    require_wake: bool,
-    console: Console,
-    robots: Sequence[RobotConfig] = (),
-) -> str:
-    """The sentence in a recording, shown on the console; `other` is what else was asked for, which must be nothing.
-
-    It may call any of the `robots`.
+def hear_request(wav: Path, request: Request, *, console: Console) -> str:
+    """The sentence in a recording, shown on the console; it is for the robots and the world of a request.
 
     Raises:
-        InputError: there is another request, the extra `speech` is not installed, or see `heard_sentence`.
+        InputError: the request says something itself, the extra `speech` is not installed, or see `heard_sentence`.
     """
-    if other is not None:
+    if request.file is not None or request.sentence is not None:
         raise InputError("--listen stands alone", hint="leave out --say and the mission file")
-    knowledge = knowledge_of(open_world(world or DEFAULT_WORLD))
-    listener = listener_for(knowledge, require_wake=require_wake, robots=called_robots(robots, knowledge))
+    knowledge = knowledge_of(open_world(request.world or DEFAULT_WORLD))
+    robots = called_robots(request.robots, knowledge)
+    listener = listener_for(knowledge, require_wake=request.require_wake is not False, robots=robots)
     sentence = heard_sentence(wav, listener)
     console.print(Text(f"heard: {sentence}"))
     return sentence

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from executive.app.durable import STORE
+from executive.app.durable import STORE as STORE_NAME
 from executive.app.prepare import prepare
-from executive.cli.number_options import quantity_argument, quantity_option
+from executive.cli.number_options import quantity_argument
+from executive.cli.options import AS_JSON, QUIET, STORE, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
-from executive.cli.run_options import ROBOTS, SET, robots_of
-from executive.cli.serve_command import AsJson, Out, Store, serve
-from executive.cli.stack_command import STACK
+from executive.cli.serve_command import Out, serve
 from executive.cli.terminal import terminal_answerer
-from executive.mission.file.parameters import given_values
+from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
 from executive.store.missions import MissionState, MissionStore, StoredMission, utc_now
@@ -28,7 +26,7 @@ from executive.store.trigger_source import refuse_missing_source
 from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, local, schedule_of
 from executive.store.wakeup import wake_server
 from skills.files.errors import InputError
-from skills.quantities import Count, Seed
+from skills.quantities import Count
 
 __all__ = ["queue"]
 
@@ -60,50 +58,35 @@ WhenMissed = Annotated[
 
 
 @queue.command()
+@takes_request(without=("start", "questions"))
 def add(
-    file: Annotated[
-        Path | None,
-        typer.Argument(metavar="MISSION", help="A file, or a name of `errand missions`.", show_default=False),
-    ] = None,
-    say: Annotated[str | None, typer.Option(help="What is said.")] = None,
-    world: Annotated[str | None, typer.Option(help="World by name or folder.")] = None,
-    seed: Annotated[int, quantity_option(Seed, help="Sets the things in the world and all noise.")] = 1,
-    wake: Annotated[
-        bool | None, typer.Option("--wake/--no-wake", help="Must the robot's name be said? If the world asks for it.")
-    ] = None,
-    given: SET = None,
-    stack: STACK = None,
-    robots: ROBOTS = None,
-    out: Out = Path("out"),
-    store: Store = None,
-    no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
+    request: Request,
+    store: STORE = None,
     anyway: Annotated[bool, typer.Option("--anyway", help="Queue it although `errand check` would refuse it.")] = False,
     at: At = None,
     every: EveryPeriod = None,
     on: On = None,
     missed: WhenMissed = None,
-    as_json: AsJson = False,
+    as_json: AS_JSON = False,
 ) -> None:
     """Queue a sentence or a mission file, checked; with a trigger, `errand queue serve` queues it each time."""
     with refusals():
         trigger = _trigger(at, every, on, missed)
-        load_stack(stack)
-        values = given_values(given or ())
-        asked = Request(say, file, world, wake, seed=seed, out=out, record=not no_record, stack=stack, given=values)
-        asked = replace(asked, robots=robots_of(robots))
-        prepared = prepare(asked, ask=terminal_answerer())
+        refuse_unaddressed(request)
+        load_stack(request.stack)
+        prepared = prepare(request, ask=terminal_answerer())
         if not anyway:
             from executive.app.feasibility import refuse_impossible
 
             refuse_impossible(prepared)
-        request = prepared.request.from_anywhere()
-        with MissionStore(store or out / STORE) as missions:
+        out, request = request.out, prepared.request.from_anywhere()
+        with MissionStore(store or out / STORE_NAME) as missions:
             if trigger is None:
                 mission, standing = missions.add(request, queued=True), {}
             else:
                 added = StandingMissions(missions).add(request, trigger, missed or Missed.SKIP)
                 mission, standing = missions.mission(added.id), {added.id: added}
-        wake_server(store or out / STORE)
+        wake_server(store or out / STORE_NAME)
     said = "is queued" if trigger is None else f"stands, to be queued by `errand queue serve` ({trigger})"
     console_for(as_json).print(f"Mission {mission.id} {said}: {request.name}", markup=False)
     if as_json:
@@ -111,9 +94,9 @@ def add(
 
 
 @queue.command(name="list")
-def show(out: Out = Path("out"), store: Store = None, as_json: AsJson = False) -> None:
+def show(out: Out = Path("out"), store: STORE = None, as_json: AS_JSON = False) -> None:
     """Show all missions of the store and how far each is."""
-    with refusals(), MissionStore(store or out / STORE, create=False) as missions:
+    with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions:
         known = missions.missions()
         standing = {each.id: each for each in StandingMissions(missions).missions()}
     header = ("mission", "state", "name", "world", "seed", "commands", "message", "trigger")
@@ -123,9 +106,9 @@ def show(out: Out = Path("out"), store: Store = None, as_json: AsJson = False) -
 
 
 @queue.command()
-def remove(number: Number, out: Out = Path("out"), store: Store = None) -> None:
+def remove(number: Number, out: Out = Path("out"), store: STORE = None) -> None:
     """Forget a mission; one that stands can be removed while a server runs."""
-    with refusals(), MissionStore(store or out / STORE, create=False) as missions:
+    with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions:
         stands = missions.mission(number).state is MissionState.STANDING
         with nullcontext() if stands else missions.claimed():
             missions.remove(number)
@@ -136,15 +119,15 @@ def remove(number: Number, out: Out = Path("out"), store: Store = None) -> None:
 @queue.command()
 def run(
     out: Out = Path("out"),
-    store: Store = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while it runs.")] = False,
-    as_json: AsJson = False,
+    store: STORE = None,
+    quiet: QUIET = False,
+    as_json: AS_JSON = False,
 ) -> None:
     """Run all that is queued, each mission in the world as the one before has left it."""
     from executive.cli.queue_run import resumable_line, run_queue
 
     console = console_for(as_json)
-    with refusals(), MissionStore(store or out / STORE, create=False) as missions, missions.claimed():
+    with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
         results = run_queue(missions, console, quiet=quiet)
         resumable = resumable_line(missions)
     if results:

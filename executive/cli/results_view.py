@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,26 +22,17 @@ from executive.app.evaluate.summary import (
     standing_texts,
     to_look_at,
 )
+from executive.cli.options import request_arguments
 from executive.cli.output import show_table
+from executive.mission.request import Request
 
 __all__ = ["command_of", "log_folder", "show_cases", "standings_json"]
 
 
 def command_of(run: RunSpec) -> str:
     """The command line that repeats a run alone."""
-    request = request_of(run, Path("out"))
-    asked = [run.file] if run.file is not None else ["--say", run.sentence or ""]
-    arguments = [*asked, "--seed", str(run.seed)]
-    arguments += ["--world", run.world] if run.world else []
-    arguments += ["--robots", run.robot_words] if run.robots else []
-    arguments += [f"--set={name}={value}" for name, value in run.given.items()]
-    arguments += [part for answer in run.answers for part in ("--answer", answer)]
-    arguments += ["--stack", run.stack] if run.stack else []
-    arguments += [f"--fault={words}" for words in run.faults]
-    arguments += [f"--random-faults={run.random_faults}"] if run.random_faults else []
-    arguments += [f"--scenario={run.scenario}"] if run.scenario else []
-    arguments += [f"--time-limit={run.time_limit_s:g}"] if run.time_limit_s else []
-    return shlex.join(["errand", "run", *arguments, *request.variation.arguments()])
+    request = replace(request_of(run, Request.out), record=True)
+    return shlex.join(["errand", "run", *request_arguments(request)])
 
 
 def show_cases(console: Console, cases: Sequence[Case], *, logs: str | None) -> None:

@@ -7,8 +7,9 @@ from typing import Annotated, Final
 
 import typer
 
-from executive.app.durable import STORE
+from executive.app.durable import STORE as STORE_NAME
 from executive.cli.number_options import quantity_option
+from executive.cli.options import AS_JSON, QUIET
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.queue_run import go_on, run_or_set_aside, run_queue
 from executive.store.missions import MissionState, MissionStore, StoredMission
@@ -21,12 +22,12 @@ _MAY_GO_ON: Final = (MissionState.RUNNING, MissionState.CANCELLED, MissionState.
 
 
 def resume(
-    store: Annotated[Path, typer.Option(help="Where the missions are kept.")] = Path("out") / STORE,
+    store: Annotated[Path, typer.Option(help="Where the missions are kept.")] = Path("out") / STORE_NAME,
     mission: Annotated[
         int | None, quantity_option(Count, help="Its number; by default the one that was broken off or cancelled last.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while it runs.")] = False,
+    as_json: AS_JSON = False,
+    quiet: QUIET = False,
 ) -> None:
     """Go on with the mission that was broken off or cancelled, from its last finished step; then with its queue."""
     console = console_for(as_json)

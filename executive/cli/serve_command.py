@@ -9,27 +9,25 @@ from typing import Annotated, Final
 
 import typer
 
-from executive.app.durable import STORE
+from executive.app.durable import STORE as STORE_NAME
 from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_option
+from executive.cli.options import AS_JSON, QUIET, STORE
 from executive.cli.output import console_for, print_json, refusals
 from executive.store.missions import MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.wakeup import WakeupPipe
 from skills.quantities import Port, Wait
 
-__all__ = ["AsJson", "Out", "Store", "serve"]
+__all__ = ["Out", "serve"]
 
 Out = Annotated[Path, typer.Option(help="Folder for logs; each mission gets one of its own in it.")]
-Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
 _LONGEST_S: Final = 3.2e9  # a hundred years
-
-AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
 
 
 def serve(
     out: Out = Path("out"),
-    store: Store = None,
+    store: STORE = None,
     host: Annotated[str, typer.Option(help="Where HTTP calls are served.")] = "127.0.0.1",
     port: Annotated[int, quantity_option(Port, help="The port for HTTP calls; 0 takes a free one.")] = 8950,
     token: Annotated[
@@ -41,8 +39,8 @@ def serve(
         float | None,
         quantity_option(Wait, "--for", help="End after so long; no mission begins then."),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while a mission runs.")] = False,
-    as_json: AsJson = False,
+    quiet: QUIET = False,
+    as_json: AS_JSON = False,
 ) -> None:
     """Wait for triggers and run what is queued, until Ctrl-C: at times, on a full battery, calls and messages."""
     from executive.app.listeners import CallAddress, Listeners
@@ -55,7 +53,7 @@ def serve(
     def tell(line: str) -> None:
         console.print(line, markup=False)
 
-    with refusals(), MissionStore(store or out / STORE, create=False) as missions, missions.claimed():
+    with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
         end = None if limit is None else missions.now() + limit
         address = CallAddress(host, port, token)
         with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:

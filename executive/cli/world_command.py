@@ -15,8 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from executive.app.worlds import knowledge_of, open_world
 from executive.cli.number_options import quantity_option
+from executive.cli.options import START, StartCommand, start_pose
 from executive.cli.output import refusals
-from executive.cli.run_options import START, StartCommand, start_pose
 from plant.worlds.world import WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.files.errors import InputError, count_text

@@ -1,23 +1,26 @@
-"""What a user asks for, and how it is to be run: the one form of it, from the command line to the store and back."""
+"""What a user asks for, and how it is run: the one form of it, from the command line to the store and back."""
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
 from dataclasses import field, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 from pydantic import ConfigDict, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from executive.language.questions import QuestionPolicy
 from executive.mission.scenario import NO_SCENARIO, Scenario
-from executive.words.robots import RobotConfig, pose_in
+from executive.words.option import Option
+from executive.words.robots import RobotConfig, parse_robots, pose_in
 from executive.words.variation import NO_VARIATION, Variation
 from skills.files.errors import InputError
 from skills.files.outside import is_there
-from skills.quantities import QuantityError
+from skills.files.plugins import installed_plugins
+from skills.quantities import LongDuration, QuantityError, Seed, clock_text
 from skills.robot import Pose2D
 
 __all__ = ["Request", "Start"]
@@ -39,7 +42,7 @@ class Start:
 
     @staticmethod
     def of(text: str) -> Start:
-        """What `str` wrote, or a user. Raises InputError."""
+        """The start that `str` wrote, or a user. Raises InputError."""
         if text == _UNKNOWN:
             return Start()
         try:
@@ -48,45 +51,116 @@ class Start:
             raise InputError(f"--start {text[:60]}: {error.what}", hint=error.hint) from None
 
 
+def _time_of_day(text: str) -> str:
+    """A time of day as "08:30". Raises InputError: it is none."""
+    try:
+        return clock_text(text)
+    except QuantityError as error:
+        raise InputError(f"--time-of-day {text}: {error.what}", hint=error.hint) from error
+
+
+def _given(settings: list[str]) -> Mapping[str, Any]:
+    """The values of parameters in texts such as "speed=0.5". Raises InputError."""
+    from executive.mission.file.parameters import given_values
+
+    return given_values(settings)
+
+
+def _stack_file(path: Path) -> Path:
+    from executive.mission.stack_file import stack_file
+
+    return stack_file(path)
+
+
+def _robots(text: str) -> tuple[RobotConfig, ...]:
+    """The robots in a text such as "alice=spot,bob=fetch". Raises InputError."""
+    return parse_robots(text, [kind.name for kind in installed_plugins("errand.robots")])
+
+
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", defer_build=True))
 class Request:
     """A sentence, or a mission file, or neither where a conversation left only commands.
 
-    `world` is as it was said, if it was; `require_wake` tells whether the robot's name must be said (None: the world
-    decides); `answers` are to the questions that it leaves open, in their order, and `questions` says what becomes of
-    further ones. `given` are values for a file's parameters; the robot stands at `start`, where the world's own is not
-    meant. `out` is the folder for the run's files, `stack` the file that says what the robot uses, `map` the
-    folder of the map that it has in place of the world's own. `scenario` is what goes wrong and happens meanwhile, and
-    `scenario_files` hold more of it; `variation` is how the world differs from what its files say.
+    A field with an `Option` is typed at the command line: commands take their options from here. `world` is as it was
+    said, if it was; `require_wake` tells whether the robot's name must be said (None: the world decides); `answers` are
+    to the questions that it leaves open, in their order, and `questions` says what becomes of further ones. `given` are
+    values for a file's parameters; the robot stands at `start`, where the world's own is not meant. `out` is the folder
+    for the run's files, `stack` the file that says what the robot uses, `map` the folder of the map that it has in
+    place of the world's own. `scenario` is what goes wrong and happens meanwhile, and `scenario_files` hold more of it;
+    `variation` is how the world differs from what its files say.
 
     `robots` are those of a run with several, or with one of another kind or start than the world's.
 
     The run begins at `time_of_day` ("14:30"; None: what it is) and is ended after `time_limit_s` (None: as usual).
 
-    What stands below `robots` is filled once it is understood. Then another process can take it up: a sentence
+    The fields below `robots` are filled once the request is understood. Then another process can run it: a sentence
     has the answers in their places, `text` is that of the file, and `scenario` holds all that its files say and the
     seed draws.
     """
 
-    sentence: str | None = None
-    file: Path | None = None
-    world: str | None = None
-    require_wake: bool | None = None
-    answers: tuple[str, ...] = ()
-    questions: QuestionPolicy | None = None
-    seed: int = 1
-    out: Path = Path("out")
-    record: bool = True
-    stack: Path | None = None
-    map: Path | None = None
-    start: Start | None = None
+    sentence: Annotated[str | None, Option('What is said, as in "Hey Alice, fetch me a drink".', "--say")] = None
+    file: Annotated[
+        Path | None, Option("A file, or a name of `errand missions`.", metavar="MISSION", argument=True)
+    ] = None
+    world: Annotated[str | None, Option("World by name or folder; flat unless said.")] = None
+    require_wake: Annotated[
+        bool | None,
+        Option("Must the robot's name be said? If spoken, or where the world asks for it.", "--wake/--no-wake"),
+    ] = None
+    answers: Annotated[
+        tuple[str, ...], Option("An answer to a question that is asked back; in their order.", "--answer")
+    ] = ()
+    questions: Annotated[
+        QuestionPolicy | None,
+        Option("What becomes of other questions; asked at a terminal, else refused, unless a file says."),
+    ] = None
+    seed: Annotated[Seed, Option("Sets the things in the world and all noise.")] = 1
+    out: Annotated[Path, Option("Folder for log, tree, recording and pictures.")] = Path("out")
+    record: Annotated[bool, Option("No recording and no pictures.", "--no-record", read=operator.not_, typed=bool)] = (
+        True
+    )
+    stack: Annotated[
+        Path | None,
+        Option(
+            "A stack file: localiser, planners and so on; see errand stack show. 'no_map': for unknown places.",
+            read=_stack_file,
+            typed=Path,
+        ),
+    ] = None
+    map: Annotated[Path | None, Option("The robot's map, a folder of `errand map build`; else the world's own.")] = None
+    start: Annotated[
+        Start | None,
+        Option(
+            "Where the robot stands (m, rad); 'unknown': anywhere, and it finds out.", metavar="X Y YAW", read=Start.of
+        ),
+    ] = None
     scenario: Scenario = NO_SCENARIO
-    scenario_files: tuple[Path, ...] = ()
+    scenario_files: Annotated[
+        tuple[Path, ...],
+        Option("Faults and events: people walk, doors close, objects are moved.", "--scenario", metavar="FILE"),
+    ] = ()
     variation: Variation = NO_VARIATION
-    given: Mapping[str, Any] = field(default_factory=dict)
-    time_of_day: str | None = None
-    time_limit_s: float | None = None
-    robots: tuple[RobotConfig, ...] = ()
+    given: Annotated[
+        Mapping[str, Any],
+        Option(
+            "A value for a parameter of the mission file.", "--set", metavar="NAME=VALUE", read=_given, typed=list[str]
+        ),
+    ] = field(default_factory=dict)
+    time_of_day: Annotated[
+        str | None,
+        Option("When the run begins; the time on this machine.", metavar="HH:MM", read=_time_of_day),
+    ] = None
+    time_limit_s: Annotated[
+        LongDuration | None, Option('The run ends after so long: seconds, or "2 h"; 20 min.', "--time-limit")
+    ] = None
+    robots: Annotated[
+        tuple[RobotConfig, ...],
+        Option(
+            "The robots and their kinds, as in alice=spot,bob=fetch@1.0,2.0,0.0.",
+            metavar="NAME=KIND,...",
+            read=_robots,
+        ),
+    ] = ()
     name: str = ""
     world_name: str = ""
     robot: str = ""
@@ -110,14 +184,21 @@ class Request:
 
     def from_anywhere(self) -> Request:
         """The same with whole paths, for a process that works in another folder."""
-        file = None if self.file is None else self.file.resolve()
         world = self.world if self.world is None or not is_there(Path(self.world)) else str(Path(self.world).resolve())
-        stack = None if self.stack is None else self.stack.resolve()
-        own_map = None if self.map is None else self.map.resolve()
-        robots = tuple(
-            robot if robot.stack is None else replace(robot, stack=robot.stack.resolve()) for robot in self.robots
+        return replace(
+            self,
+            file=_whole(self.file),
+            world=world,
+            out=self.out.resolve(),
+            stack=_whole(self.stack),
+            map=_whole(self.map),
+            robots=tuple(replace(robot, stack=_whole(robot.stack)) for robot in self.robots),
+            scenario_files=tuple(path.resolve() for path in self.scenario_files),
         )
-        return replace(self, file=file, world=world, out=self.out.resolve(), stack=stack, map=own_map, robots=robots)
+
+
+def _whole(path: Path | None) -> Path | None:
+    return None if path is None else path.resolve()
 
 
 @cache

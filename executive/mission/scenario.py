@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Final
 
+from executive.words.option import Option
 from skills.quantities import Quantity
 
 __all__ = ["NO_SCENARIO", "RandomFaults", "Scenario"]
@@ -22,8 +23,11 @@ class Scenario:
     time at which they are moved and where to; all points are in the world frame, in metres.
     """
 
-    faults: tuple[str, ...] = ()
-    random: int = 0
+    faults: Annotated[
+        tuple[str, ...],
+        Option('A fault, as in "camera.hand: dropout 5 s at 20 s"; may be repeated.', "--fault", metavar="WORDS"),
+    ] = ()
+    random: Annotated[RandomFaults, Option("So many faults, by the seed.", "--random-faults")] = 0
     people: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     doors: tuple[Mapping[str, Any], ...] = ()
     moves: tuple[Mapping[str, Any], ...] = ()

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from skills.files.outside import is_file, is_there
 from skills.files.yaml_source import read_yaml
-from skills.stack import RobotStack, StackError, default_stack, stack_of
+from skills.stack import DEFAULT_FILE, RobotStack, StackError, default_stack, stack_of
 
-__all__ = ["load_stack"]
+__all__ = ["load_stack", "stack_file"]
+
+
+def stack_file(given: Path) -> Path:
+    """A stack file as it was given, or the one of that name that comes with Errand."""
+    own = DEFAULT_FILE.with_name(f"{given.name}_stack.yaml")
+    return own if given == Path(given.name) and not is_there(given) and is_file(own) else given
 
 
 def load_stack(path: Path | None) -> RobotStack:

@@ -54,7 +54,12 @@ class RobotConfig:
     start: Pose2D | None = None
     dock: str | None = None
     stack: Path | None = None
-    source: SourceLine | None = field(default=None, compare=False)
+    source: Annotated[SourceLine | None, Field(exclude=True)] = field(default=None, compare=False)
+
+    def __str__(self) -> str:
+        """As the option `--robots` has it."""
+        at = "" if self.start is None else f"@{self.start.x_m!r},{self.start.y_m!r},{self.start.yaw_rad!r}"
+        return f"{self.name}={self.kind}{at}"
 
 
 class NamedRobot(BaseModel):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, Final
 
+from executive.words.option import Option
 from skills.files.errors import InputError, suggestion
 from skills.quantities import Quantity, QuantityError, number_in, number_of
 
@@ -82,10 +83,12 @@ class Variation:
         InputError: a value is out of range, or the light is unknown.
     """
 
-    light: str = NORMAL_LIGHT
-    clutter: int = 0
-    people: int = 0
-    friction: float = 1.0
+    light: Annotated[
+        str, Option("normal, dim, bright, evening, low sun, or a brightness (1 is day light).", metavar="NAME")
+    ] = NORMAL_LIGHT
+    clutter: Annotated[Clutter, Option("So many more objects lie about, by the seed.")] = 0
+    people: Annotated[MorePeople, Option("So many more people walk about, by the seed.")] = 0
+    friction: Annotated[Friction, Option("A factor on the friction of loose objects and robots.")] = 1.0
 
     def __post_init__(self) -> None:
         light_called(self.light)
@@ -97,11 +100,6 @@ class Variation:
 
     def __bool__(self) -> bool:
         return self != NO_VARIATION
-
-    def arguments(self) -> list[str]:
-        """The options of `errand run` that mean the same."""
-        options = [f"--{name}={value}" for name, value in asdict(self).items() if value != getattr(NO_VARIATION, name)]
-        return options
 
     def lines(self) -> tuple[str, ...]:
         """What is varied, one line each."""

@@ -149,14 +149,15 @@ def test_a_world_may_name_its_robots(world_of_two):
 
 def test_a_world_may_ask_that_one_of_its_robots_is_called(world_of_two):
     world = world_of_two("robot: {name: Alice}", "robot: {name: Alice, require_wake: true}")
-    refuse_unaddressed(["--say", "Hey Bob, go to the kitchen", "--world", world])
+    refuse_unaddressed(Request("Hey Bob, go to the kitchen", world=world))
     assert prepare(Request("Hey Bob, go to the kitchen", world=world), ask=None).mission.robot_name == "Bob"
     with pytest.raises(InputError, match='begin with "Hey Eve" or "Hey Bob"'):
         prepare(Request("go to the kitchen", world=world), ask=None)
 
 
 def test_any_of_the_robots_of_the_option_may_be_called():
-    refuse_unaddressed(["--wake", "--say", "Hey Bob, go to the kitchen", "--robots", "alice=spot,bob=spot"])
+    robots = (RobotConfig("Alice", "spot"), RobotConfig("Bob", "spot"))
+    refuse_unaddressed(Request("Hey Bob, go to the kitchen", require_wake=True, robots=robots))
 
 
 # What is changed in the file with parts; the line, and what is told.

@@ -63,7 +63,7 @@ WORK: Final = (
     "executive.app.simulated.simulate",
     "executive.cli.teleop_command.simulate",
     "executive.app.assembly.simulate",
-    "executive.cli.main.sweep",
+    "executive.cli.evaluate_command.sweep",
     "executive.app.evaluate.worker_pool.Pool.opened",
     "errand_train.dataset.shards.render",
     "plant.worlds.builder.own.world_from_grid",

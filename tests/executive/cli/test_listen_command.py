@@ -12,6 +12,7 @@ import executive.cli.listen_command as listen_command
 from executive.cli.entry import app
 from executive.cli.listen_command import answer_line, hear_request, show_hearing
 from executive.language.understand import Status, Understanding
+from executive.mission.request import Request
 from executive.speech.microphone import follow
 from executive.words.robots import RobotConfig
 from skills.files.errors import InputError
@@ -128,9 +129,7 @@ def test_a_run_with_several_robots_hears_the_one_that_is_called(says, wav):
         RobotConfig("Bob", "fetch"),
     )
     console = Console(file=io.StringIO())
-    assert hear_request(wav, None, world=None, require_wake=True, console=console, robots=robots) == (
-        "Hey Bob, go to the kitchen."
-    )
+    assert hear_request(wav, Request(robots=robots), console=console) == ("Hey Bob, go to the kitchen.")
 
 
 def test_the_robot_may_have_another_name(says, wav):
@@ -171,13 +170,13 @@ def test_a_missing_vocabulary_is_told(says, wav, tmp_path):
 def test_the_request_to_run_is_what_was_heard(says, wav):
     says("High Alice, go to the kitchen.")
     console = Console(file=io.StringIO())
-    assert hear_request(wav, None, world="flat", require_wake=True, console=console) == "Hey Alice, go to the kitchen."
+    assert hear_request(wav, Request(world="flat"), console=console) == "Hey Alice, go to the kitchen."
     assert "heard: Hey Alice" in console.file.getvalue()
 
 
 def test_there_is_no_second_request_beside_the_one_heard(wav):
     with pytest.raises(InputError, match="stands alone"):
-        hear_request(wav, "go home", world=None, require_wake=True, console=Console(file=io.StringIO()))
+        hear_request(wav, Request("go home"), console=Console(file=io.StringIO()))
 
 
 def test_a_silent_request_is_refused_with_its_file(says, tmp_path):

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from executive.app import simulated
 from executive.app.mission_run import Finished
 from executive.app.report import RefereeReport, RunReport
-from executive.cli import entry, main
+from executive.cli import entry, evaluate_command
 from executive.tree.node_view import node_view
 from plant.worlds.world import WORLDS_FOLDER
 
@@ -47,7 +48,7 @@ def no_plant(monkeypatch):
         prepared.request.out.mkdir(parents=True, exist_ok=True)
         return Finished(ended["report"], node_view(prepared.tree.root))
 
-    monkeypatch.setattr(main, "run_simulated", run_simulated)
+    monkeypatch.setattr(simulated, "run_simulated", run_simulated)
     return ended
 
 
@@ -221,17 +222,17 @@ def test_evaluate_answers_once_for_all_seeds(monkeypatch, tmp_path, flags, table
         asked.append(arguments)
         return ()
 
-    monkeypatch.setattr(main, "sweep", sweep)
+    monkeypatch.setattr(evaluate_command, "sweep", sweep)
     result = invoke("evaluate", "--say", AMBIGUOUS, *flags, "--seeds", "1-2", "--out", str(tmp_path))
-    assert asked == [["--say", f"Hey Alice, put the cube on the {table} table"]], result.output
+    assert asked == [[f"--say=Hey Alice, put the cube on the {table} table"]], result.output
 
 
 def test_evaluate_gives_the_answers_for_a_file_to_every_run(monkeypatch, tmp_path):
     file, asked = tmp_path / "mission.yaml", []
     file.write_text("name: tidy\nworld: flat\nsteps:\n  - say: put the cube on the table\n")
-    monkeypatch.setattr(main, "sweep", lambda arguments, *_, **__: asked.append(arguments) or ())
+    monkeypatch.setattr(evaluate_command, "sweep", lambda arguments, *_, **__: asked.append(arguments) or ())
     result = invoke("evaluate", str(file), "--answer", "the coffee table", "--out", str(tmp_path))
-    assert asked == [[str(file), "--answer", "the coffee table"]], result.output
+    assert asked == [[str(file), "--answer=the coffee table"]], result.output
 
 
 def test_evaluate_refuses_a_question_that_nobody_answers(tmp_path):
@@ -247,12 +248,12 @@ def test_evaluate_counts_claims_and_verdicts(monkeypatch, tmp_path):
     )
 
     def sweep(arguments, seeds, *, jobs, out, done):
-        assert (arguments, seeds, jobs) == (["--say", FETCH], (1, 2, 3), 2)
+        assert (arguments, seeds, jobs) == ([f"--say={FETCH}"], (1, 2, 3), 2)
         for each in reports:
             done(each)
         return reports
 
-    monkeypatch.setattr(main, "sweep", sweep)
+    monkeypatch.setattr(evaluate_command, "sweep", sweep)
     result = invoke("evaluate", "--say", FETCH, "--seeds", "1-3", "--json", "--out", str(tmp_path))
     values = json.loads(result.stdout.splitlines()[-1])
     assert (values["successes"], values["referee_successes"], values["false_claims"]) == (2, 1, 1)
@@ -263,10 +264,10 @@ def test_evaluate_tries_each_fault_alone(monkeypatch, tmp_path):
     asked = []
 
     def sweep(arguments, seeds, *, jobs, out, done):
-        asked.append((arguments[2:], out.name))
-        return (report(outcome="failure" if arguments[2:] else "success"),)
+        asked.append((arguments[1:], out.name))
+        return (report(outcome="failure" if arguments[1:] else "success"),)
 
-    monkeypatch.setattr(main, "sweep", sweep)
+    monkeypatch.setattr(evaluate_command, "sweep", sweep)
     faults = ("--fault", "camera.hand: dropout 5 s at 20 s", "--random-faults", "1")
     options = ("--each-fault", "--json", "--out", str(tmp_path))
     result = invoke("evaluate", "--say", FETCH, *faults, *options)

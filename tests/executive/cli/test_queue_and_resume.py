@@ -11,9 +11,10 @@ import pytest
 from py_trees.common import Status
 from typer.testing import CliRunner
 
+from executive.app import simulated
 from executive.app.mission_run import Finished
 from executive.app.report import RefereeReport, RunReport
-from executive.cli import entry, main, queue_run
+from executive.cli import entry, queue_run
 from executive.mission.mission import mission_from_commands
 from executive.run.journal import TickNote
 from executive.store.missions import MissionStore
@@ -75,10 +76,17 @@ def report(outcome):
     return RunReport(outcome, None, "done", referee, (), "flat", 1, 1.0, 1.0, 1.0, 20, "log.mcap")
 
 
+def change(store, **values):
+    """Change the request of the first mission in the store."""
+    text = replace(store.mission(1).request, **values).to_json()
+    with store.writing() as connection:
+        connection.execute("UPDATE mission SET request = ? WHERE id = 1", (text,))
+
+
 @pytest.fixture
 def plant(monkeypatch):
     stand_in = Plant()
-    for module in (main, queue_run):
+    for module in (simulated, queue_run):
         monkeypatch.setattr(module, "run_simulated", stand_in)
     monkeypatch.setattr("executive.app.prepare.load_parser", lambda: None)  # no step here is a sentence
     return stand_in
@@ -190,7 +198,7 @@ def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(erra
         raise GoneError
 
     with monkeypatch.context() as patch, pytest.raises(GoneError):
-        patch.setattr(main, "run_simulated", corrected)
+        patch.setattr(simulated, "run_simulated", corrected)
         errand("run", mission("first"), "--quiet")
     result = errand("resume", "--quiet")
     assert result.exit_code == 0, result.output
@@ -232,7 +240,7 @@ def test_what_took_the_place_of_one_robots_part_is_resumed_beside_the_others(err
         raise GoneError
 
     with monkeypatch.context() as patch, pytest.raises(GoneError):
-        patch.setattr(main, "run_simulated", corrected)
+        patch.setattr(simulated, "run_simulated", corrected)
         errand("run", two, "--quiet")
     result = errand("resume", "--quiet")
     assert result.exit_code == 0, result.output
@@ -332,7 +340,7 @@ def test_a_tree_that_is_no_longer_the_same_is_refused(errand, mission, plant, tm
     with pytest.raises(GoneError):
         errand("run", mission("alone"), "--quiet")
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
-        store._connection.execute("UPDATE mission SET fingerprint = 'other'")
+        change(store, fingerprint="other")
     result = errand("resume")
     assert (result.exit_code, "begun with another version" in result.output) == (2, True)
 
@@ -341,7 +349,7 @@ def test_a_run_that_cannot_begin_leaves_no_mission_behind(errand, mission, monke
     def refuse(*_, **__):
         raise InputError("the world is full")
 
-    monkeypatch.setattr(main, "run_simulated", refuse)
+    monkeypatch.setattr(simulated, "run_simulated", refuse)
     assert errand("run", mission("alone"), "--quiet").exit_code == 2
     assert states() == []
 
@@ -399,7 +407,7 @@ def test_a_trigger_that_cannot_be_is_refused_and_nothing_is_kept(errand, mission
 def test_what_has_passed_is_over(errand, mission, plant, tmp_path):
     errand("queue", "add", mission("first"), "--at", "2999-01-01 09:00")
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
-        store._connection.execute("UPDATE standing SET trigger = '2020-01-01 09:00'")
+        store._connection.execute("UPDATE mission SET trigger = '2020-01-01 09:00'")
     assert "2020-01-01 09:00, over" in errand("queue", "list").output
 
 
@@ -407,7 +415,7 @@ def test_serve_runs_what_is_due_and_the_list_says_where_it_came_from(errand, mis
     errand("queue", "add", mission("first"), "--every", "1d", "--missed", "once", "--seed", "4")
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
         day_before = (store.now() - timedelta(days=1.5)).isoformat()
-        store._connection.execute("UPDATE standing SET since = ?, anchor = ?", (day_before, day_before))
+        store._connection.execute("UPDATE mission SET since = ?, anchor = ?", (day_before, day_before))
     result = errand("queue", "serve", "--until-idle", "--quiet", "--json")
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout.splitlines()[-1])
@@ -528,7 +536,7 @@ def test_serve_runs_what_a_plug_in_hears(errand, mission, plant, tmp_path, monke
 def test_serve_names_a_plug_in_that_is_gone_and_runs_what_is_queued(errand, mission, plant, tmp_path):
     errand("queue", "add", mission("first"), "--every", "1h")
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
-        store._connection.execute("UPDATE standing SET trigger = 'topic gone:x'")
+        store._connection.execute("UPDATE mission SET trigger = 'topic gone:x'")
     errand("queue", "add", mission("second"))
     result = errand("queue", "serve", "--until-idle", "--quiet")
     assert (result.exit_code, [run[0] for run in plant.runs]) == (0, ["second"])
@@ -572,7 +580,7 @@ def test_what_cannot_begin_is_set_aside_with_its_cause_and_the_next_one_runs(
     errand("queue", "add", mission("alone"))
     errand("queue", "add", mission("second"))
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
-        store._connection.execute(f"UPDATE mission SET {column} = ? WHERE id = 1", (value,))
+        change(store, **{column: value})
     result = errand(*command)
     assert (states(), [run[0] for run in plant.runs]) == (["error", "success"], ["second"])
     assert cause in ended(errand)[0][1]
@@ -598,10 +606,10 @@ def test_a_defect_in_a_run_sets_its_mission_aside_and_keeps_the_traceback(errand
 def test_what_was_set_aside_is_tried_again_by_its_number(errand, mission, plant, states, tmp_path):
     errand("queue", "add", mission("first"))
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
-        store._connection.execute("UPDATE mission SET world = 'nowhere'")
+        change(store, world="nowhere")
     assert errand("queue", "run", "--quiet").exit_code == 1
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
-        store._connection.execute("UPDATE mission SET world = NULL")
+        change(store, world=None)
     assert errand("resume", "--mission", "1", "--quiet").exit_code == 0
     assert states() == ["success"]
 
@@ -615,7 +623,7 @@ def test_a_queued_mission_that_cannot_go_on_is_set_aside_and_the_queue_goes_on(
     with pytest.raises(GoneError):
         errand("queue", "run", "--quiet")
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
-        store._connection.execute("UPDATE mission SET fingerprint = 'other' WHERE id = 1")
+        change(store, fingerprint="other")
     assert errand("queue", "serve", "--until-idle", "--quiet").exit_code == 0
     assert states() == ["error", "success"]
 

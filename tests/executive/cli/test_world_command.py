@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from executive.cli import entry
-from executive.cli.run_options import joined
+from executive.cli.options import joined
 
 MAP = """image: room.pgm
 resolution: 0.05

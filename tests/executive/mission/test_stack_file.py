@@ -1,8 +1,10 @@
-"""Stack files: read with file and line."""
+"""Stack files: found by name, and read with file and line."""
+
+from pathlib import Path
 
 import pytest
 
-from executive.mission.stack_file import load_stack
+from executive.mission.stack_file import load_stack, stack_file
 from skills.files.errors import InputError
 from skills.stack import default_stack
 
@@ -23,3 +25,13 @@ def test_an_unknown_option_is_refused_with_its_line(tmp_path):
     with pytest.raises(InputError, match="unknown key 'margin'") as error:
         load_stack(file)
     assert (error.value.file, error.value.line) == (file, 3)
+
+
+def test_a_stack_that_comes_with_errand_is_taken_by_its_name():
+    assert load_stack(stack_file(Path("no_map"))).names["localiser"] == "dead_reckoning"
+
+
+def test_a_file_is_taken_as_it_is(tmp_path):
+    own = tmp_path / "own.yaml"
+    own.write_text("planner: {use: lattice, greed: 1.5}\n")
+    assert (stack_file(own), stack_file(Path("no_such"))) == (own, Path("no_such"))

@@ -27,8 +27,3 @@ def test_a_misspelt_light_is_refused_with_the_nearest_name() -> None:
 def test_a_value_out_of_range_is_refused_with_the_range(values: dict[str, float]) -> None:
     with pytest.raises(InputError, match="should be from"):
         Variation(**values)  # type: ignore[arg-type]
-
-
-def test_a_variation_is_repeated_by_its_options() -> None:
-    varied = Variation("evening", 3, 1, 1.5)
-    assert varied.arguments() == ["--light=evening", "--clutter=3", "--people=1", "--friction=1.5"]

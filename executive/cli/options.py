@@ -1,0 +1,201 @@
+"""Options that several commands have; those of a request are declared in `executive.mission.request`."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import functools
+import inspect
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import takewhile
+from pathlib import Path
+from types import NoneType
+from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
+
+import typer
+from typer.core import TyperCommand
+
+from executive.cli.number_options import quantity_option
+from executive.cli.output import refusals
+from executive.mission.request import Request, Start
+from executive.words.option import Option
+from skills.quantities import Port, Wait, quantity_of
+from skills.robot import Pose2D
+
+__all__ = [
+    "ANYWAY",
+    "AS_JSON",
+    "QUIET",
+    "START",
+    "STORE",
+    "VIEW",
+    "VIEW_FOR",
+    "VIEW_PORT",
+    "StartCommand",
+    "joined",
+    "request_arguments",
+    "start_pose",
+    "takes_request",
+]
+
+_START: Final = "--start"
+_NUMERIC: Final = re.compile(r"[-+]?\.?\d[\d.,]*(?:e[-+]?\d+)?", re.IGNORECASE)
+
+
+START = Annotated[
+    str | None, typer.Option(_START, metavar="X Y YAW", help="Where the robot stands: metres and radians.")
+]
+STORE = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
+ANYWAY = Annotated[bool, typer.Option("--anyway", help="Begin although `errand check` would refuse it.")]
+AS_JSON = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
+QUIET = Annotated[bool, typer.Option("--quiet", help="No lines and no tree while it runs.")]
+VIEW = Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")]
+VIEW_FOR = Annotated[float | None, quantity_option(Wait, help="The page stays so long (s) after the end.")]
+VIEW_PORT = Annotated[int, quantity_option(Port, help="The page's port; 0 takes a free one.")]
+
+
+class StartCommand(TyperCommand):
+    """A command whose `--start` takes three numbers, or one word."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As click's, after the numbers are joined."""
+        return super().parse_args(ctx, joined(args))
+
+
+def joined(arguments: Sequence[str]) -> list[str]:
+    """The arguments with three numbers after `--start` as one, so that a word may stand there as well."""
+    told, rest = list[str](), list(arguments)
+    while rest:
+        word = rest.pop(0)
+        if word == _START and rest and _NUMERIC.fullmatch(rest[0]):
+            numbers = [*takewhile(lambda each: not each.startswith("--"), rest[:3])]
+            word, rest = f"{_START}={' '.join(numbers)}", rest[len(numbers) :]
+        told.append(word)
+    return told
+
+
+@dataclasses.dataclass(frozen=True)
+class _Typed:
+    """A field that is typed; `part` is the field of the request in which it stands (empty: the request itself)."""
+
+    part: str
+    name: str
+    kind: Any
+    option: Option
+    default: Any
+
+    @property
+    def several(self) -> bool:
+        """Whether it may be given again and again."""
+        return get_origin(self.kind) is tuple
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of its option."""
+        return (self.option.name or f"--{self.name.replace('_', '-')}",)
+
+    def parameter(self, default: Any) -> inspect.Parameter:
+        """What Typer makes the option of."""
+        option, kind = self.option, self.kind
+        plain = next(each for each in get_args(kind) if each is not NoneType) if NoneType in get_args(kind) else kind
+        if quantity_of(plain) is not None:
+            info = quantity_option(plain, *self.names, help=option.help)
+            kind = get_args(plain)[0] if plain is kind else get_args(plain)[0] | None
+        elif option.argument:
+            info = typer.Argument(metavar=option.metavar, help=option.help, show_default=False)
+        else:
+            info = typer.Option(*self.names, metavar=option.metavar, help=option.help)
+        if option.read is not None:
+            kind, default = (bool, False) if option.typed is bool else (option.typed | None, None)
+        elif self.several:
+            kind, default = list[get_args(kind)[0]] | None, None  # type: ignore[misc]
+        hint: Any = Annotated[kind, info]
+        return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
+
+    def value(self, typed: Any) -> Any:
+        """The field's value of what was typed; the default where nothing was. Raises InputError."""
+        if self.option.read is not None:
+            return self.default if typed in (None, False) or typed == [] else self.option.read(typed)
+        return tuple(typed or ()) if self.several else typed
+
+    def arguments(self, value: Any) -> list[str]:
+        """The arguments by which a value is typed."""
+        if self.option.argument:
+            return [str(value)]
+        if isinstance(value, bool):
+            yes, _, no = self.names[0].partition("/")
+            return [yes if value or not no else no]
+        if isinstance(value, Mapping):
+            words = [f"{name}={json.dumps(each)}" for name, each in value.items()]
+        elif self.several:
+            words = [*map(str, value)] if self.option.read is None else [",".join(map(str, value))]
+        else:
+            words = [str(value.value if isinstance(value, enum.Enum) else value)]
+        return [f"{self.names[0]}={word}" for word in words]
+
+
+def _typed_fields(model: Any = Request, part: str = "") -> Iterator[_Typed]:
+    """The fields that are typed, those of the request's parts included."""
+    hints = get_type_hints(model, include_extras=True)
+    for each in dataclasses.fields(model):
+        hint = hints[each.name]
+        option = next((mark for mark in getattr(hint, "__metadata__", ()) if isinstance(mark, Option)), None)
+        if option is not None:
+            default = each.default if each.default_factory is dataclasses.MISSING else each.default_factory()
+            kind = get_args(hint)[0] if quantity_of(hint) is None else hint
+            yield _Typed(part, each.name, kind, option, default)
+        elif not part and dataclasses.is_dataclass(hint):
+            yield from _typed_fields(hint, each.name)
+
+
+def start_pose(text: str | None) -> Pose2D | None:
+    """The pose in `X Y YAW`; None where none is said. Raises InputError."""
+    return None if text is None else Start.of(text).pose
+
+
+def request_arguments(request: Request) -> list[str]:
+    """The arguments of `errand run` that make this request."""
+    arguments = list[str]()
+    for each in _typed_fields():
+        value = getattr(getattr(request, each.part) if each.part else request, each.name)
+        if value != each.default:
+            arguments += each.arguments(value)
+    return arguments
+
+
+def takes_request(
+    *names: str, without: Sequence[str] = (), **defaults: Any
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Gives a command the options of these fields (by default of all), and their Request as its first argument.
+
+    `defaults` stand in for those of the fields.
+    """
+    fields = [each for each in _typed_fields() if (not names or each.name in names) and each.name not in without]
+
+    def decorated(function: Callable[..., None]) -> Callable[..., None]:
+        signature = inspect.signature(function, eval_str=True)
+        _, *own = (each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values())
+        parameters = [*(each.parameter(defaults.get(each.name, each.default)) for each in fields), *own]
+
+        @functools.wraps(function)
+        def command(**given: Any) -> None:
+            with refusals():
+                request = _request([(each, given.pop(each.name)) for each in fields])
+            function(request, **given)
+
+        command.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        command.__annotations__ = {each.name: each.annotation for each in parameters}
+        return command
+
+    return decorated
+
+
+def _request(typed: Iterable[tuple[_Typed, Any]]) -> Request:
+    """The request of what was typed. Raises InputError."""
+    values: dict[str, Any] = {}
+    for each, words in typed:
+        part = values if not each.part else values.setdefault(each.part, {})
+        part[each.name] = each.value(words)
+    return Request(**values)

@@ -1,0 +1,69 @@
+"""The options of a request: each is read to the JSON form that is written down, and comes back by every way."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from executive.cli.entry import loaded
+from executive.cli.options import StartCommand, request_arguments, takes_request
+from executive.mission.request import Request
+from executive.store.missions import MissionStore
+from executive.store.standing import StandingMissions
+from executive.store.triggers import OnCall
+from skills.files.yaml_source import read_yaml
+
+GOLDEN: dict[str, Any] = read_yaml(Path(__file__).with_name("request_options.yaml")).data
+NOT_OF_THE_REQUEST = {
+    *("--listen", "--json", "--quiet", "--tree", "--profile", "--store", "--anyway", "--voice"),
+    *("--view", "--view-for", "--view-port", "--help"),
+}
+
+
+def request_of(words: str) -> Request:
+    """The request that a command with all options makes of these words."""
+    made: list[Request] = []
+
+    @takes_request()
+    def asked(request: Request) -> None:
+        made.append(request)
+
+    alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    alone.command(cls=StartCommand)(asked)
+    result = CliRunner().invoke(alone, shlex.split(words))
+    assert result.exit_code == 0, result.output
+    return made[0]
+
+
+@pytest.mark.parametrize("words", GOLDEN)
+def test_an_option_makes_the_request_that_is_written_down(words):
+    assert json.loads(request_of(words).to_json()) == GOLDEN[words]
+
+
+def test_every_option_of_run_that_is_of_the_request_is_written_down():
+    typed = {option for each in loaded("run").params for option in (*each.opts, *each.secondary_opts)} - {"file"}
+    written = {word.partition("=")[0] for words in GOLDEN for word in shlex.split(words) if word.startswith("--")}
+    assert typed - NOT_OF_THE_REQUEST == written
+
+
+@pytest.mark.parametrize("words", GOLDEN)
+def test_a_request_comes_back_from_its_arguments(words):
+    request = request_of(words)
+    assert request_of(shlex.join(request_arguments(request))) == request
+
+
+@pytest.mark.parametrize("words", GOLDEN)
+def test_a_request_comes_back_from_the_store_and_a_standing_mission(words, tmp_path):
+    request = request_of(words)
+    with MissionStore(tmp_path / "missions.sqlite") as store:
+        store.add(request, queued=True)
+        standing = StandingMissions(store).add(request, OnCall("now"))
+        StandingMissions(store).fire([(standing, request)], "")
+    with MissionStore(tmp_path / "missions.sqlite", create=False) as store:
+        assert [each.request for each in store.missions()] == [request] * 3

@@ -14,9 +14,8 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from executive.record.messages import DESTINATION_TOPIC
 from executive.record.reader import Event
-from executive.record.schemas import TRANSITIONS
+from executive.record.schemas import DESTINATION, TRANSITIONS
 from executive.store.resuming import told_before
 from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.view.styles import ROBOT_COLOURS, rgb_of
@@ -85,7 +84,7 @@ class Artifacts:
         if topic == DETECTIONS:
             own.looked.append(message)
             own.seen = message if message["detections"] else own.seen
-        if topic == DESTINATION_TOPIC:
+        if topic == DESTINATION:
             own.confirmed = own.seen
             own.detection = own.detection or own.seen
         if topic == ANSWER_TOPIC:

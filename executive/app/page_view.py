@@ -18,9 +18,9 @@ from executive.app.talk import Talk, load_ahead
 from executive.conversation import ReplyKind
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request
+from executive.record.announce import map_message
 from executive.record.event_log import EventLog
 from executive.record.schemas import MAP
-from executive.record.surroundings import map_message
 from executive.run.control import Control
 from executive.run.runner import Progress
 from executive.store.missions import MissionStore
@@ -56,7 +56,7 @@ class PageView:
 
     def begin(self, log: EventLog, scene: Scene | None) -> None:
         """Serve the page and print its address. Raises InputError when the port is taken."""
-        from executive.view.server import PageContent, served
+        from executive.view.server import PageContent, serve
 
         log.listen(self._feed)
         sentences: dict[str, Action] = {}
@@ -67,7 +67,7 @@ class PageView:
             sentences["queue"] = said(lambda sentence, _: later(sentence))
         actions = {**control_actions(self.control), **sentences, **({} if scene is None else scene_actions(scene))}
         content = PageContent(self._feed, actions, scene_url=None if scene is None else scene.url)
-        self._server = served(content, self._port)
+        self._server = serve(content, self._port)
         self._watch = ControlWatch(self.control, self._feed)
         self._console.print(f"The page: {self._server.url}", markup=False)
 

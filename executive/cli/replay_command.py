@@ -10,8 +10,8 @@ import typer
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, refusals
 from executive.record.history import History, read_history
-from executive.view.replay import fed, to_html
-from executive.view.server import PageContent, served, wait
+from executive.view.html import feed_of, log_page
+from executive.view.server import PageContent, serve, wait
 from skills.files.errors import InputError
 from skills.quantities import Port, Wait
 
@@ -32,7 +32,7 @@ def replay(
         beside = file.parent / RECORDING
         recording = beside if scene and beside.is_file() else None
         if html is not None:
-            _write(html, to_html(history.events, recording))
+            _write(html, log_page(history.events, recording))
             return
         _serve(history, recording, port, view_for)
 
@@ -45,7 +45,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _serve(history: History, recording: Path | None, port: int, view_for_s: float | None) -> None:
-    content = PageContent(fed(history.events), recording=recording)
-    with served(content, port) as server:
+    content = PageContent(feed_of(history.events), recording=recording)
+    with serve(content, port) as server:
         console_for(False).print(f"{server.url}\n(Ctrl-C ends it)", markup=False)
         wait(view_for_s)

@@ -26,7 +26,7 @@ from executive.mission.request import Start
 from executive.run.worker import LockStepWorker
 from executive.view.actions import Action, RefusedError
 from executive.view.feed import Feed
-from executive.view.server import PageContent, served
+from executive.view.server import PageContent, serve
 from plant.worlds.world import World
 from skills.api import SkillContext
 from skills.estimate.grid_map import load_grid_map
@@ -74,7 +74,7 @@ def teleop(
         hands = Teleop(context)
         saving = _saving(hands, poses, opened.name)
         feed, scene = Feed(), simulation.show_live()
-        server = stack.enter_context(served(PageContent(feed, page_actions(hands, saving, scene), scene.url), port))
+        server = stack.enter_context(serve(PageContent(feed, page_actions(hands, saving, scene), scene.url), port))
         console = console_for(False)
         stack.enter_context(keys_pressed(TerminalKeys(hands, saving, console.print)))
         console.print(f"The page: {server.url}\n{_HELP}", markup=False)

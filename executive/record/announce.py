@@ -1,22 +1,32 @@
-"""What the log says at the beginning: the run's world, seed and versions, and the commands as messages."""
+"""What the log says at the beginning: the run's facts, one message for each command, and the map."""
 
 from __future__ import annotations
 
+import base64
 import math
 import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from types import MappingProxyType
+from typing import Any, Final
 
-from executive.record.messages import TASK_TOPIC, task_messages
-from executive.record.schemas import RUN
+import cv2
+import numpy as np
+
+from executive.record.schemas import RUN, TASK
 from executive.tree.compiler import CompiledTree
-from executive.words.command import START, Command
+from executive.words.command import START, Command, Task, Thing
 from executive.words.knowledge import Knowledge
 from skills.api import Publish
+from skills.estimate.grid_map import GridMap
+from skills.perception.class_forms import class_forms
 from skills.robot import Clock
 
-PACKAGES = ("spot-errand", "drake", "py-trees", "numpy")
+__all__ = ["announce", "command_type", "goal_position", "map_message", "versions"]
+
+PACKAGES: Final = ("spot-errand", "drake", "py-trees", "numpy")
+FREE, UNKNOWN, OCCUPIED = 255, 205, 0
+_NOTHING_ID: Final = 0
 
 
 def announce(
@@ -30,23 +40,51 @@ def announce(
     scenario: Sequence[str] = (),
     robots: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """Write the run's facts, then one message for each command. `scenario` tells what goes wrong and happens in it,
-    `robots` the kind of each robot where there are several.
+    """Publish the run's facts, then one message for each command.
+
+    `scenario` lists the faults and events of the run, `robots` the kind of each of several robots. Raises KeyError for
+    a class without a number.
     """
     texts = [str(command) for command in tree.commands]
     facts = {"world": world, "seed": seed, "commands": texts, "versions": versions(PACKAGES)}
     more = {"scenario": list(scenario), "robots": dict(robots)}
     publish(RUN, {**facts, **{key: value for key, value in more.items() if value}})
-    messages = task_messages(
-        tree.commands,
-        stamp=clock.now(),
-        first_sequence=0,
-        robot_name=tree.robot_name,
-        classes=lambda name: knowledge.classes(knowledge.thing(name) or name),
-        position=lambda command: goal_position(knowledge, command),
-    )
-    for message in messages:
-        publish(TASK_TOPIC, vars(message))
+    count, stamp = len(tree.commands), clock.now()
+    for index, command in enumerate(tree.commands):
+        numbers = {"sequence": index, "robot_name": tree.robot_name, "mission_count": count, "task_count": index + 1}
+        publish(TASK, {"stamp": stamp, **numbers, **_task_message(command, knowledge)})
+
+
+def _task_message(command: Command, knowledge: Knowledge) -> Mapping[str, Any]:
+    """A command as numbers.
+
+    Types are class ids, several where a category was asked for ("drink"); 0 is Nothing. `goal_x`, `goal_y` are in the
+    world frame (m), NaN where the goal was left open. `cmd_type`: 0 go or take, 1 grasp, 2 find, 3 place, 4 wait,
+    5 charge.
+    """
+
+    def ids(thing: Thing | None) -> tuple[int, ...]:
+        """The numbers of an object's classes."""
+        if thing is None:
+            return (_NOTHING_ID,)
+        return tuple(class_forms()[name].id for name in knowledge.classes(knowledge.thing(thing.name) or thing.name))
+
+    items, objects = ids(command.item), ids(command.object)
+    goal_x, goal_y = goal_position(knowledge, command)
+    return {
+        "item_type": items,
+        "item_count": (0 if command.item is None else command.item_count,) * len(items),
+        "obj_type": objects,
+        "obj_count": (0 if command.object is None else command.object_count,) * len(objects),
+        "goal_x": goal_x,
+        "goal_y": goal_y,
+        "cmd_type": command_type(command.task),
+    }
+
+
+def command_type(task: Task | None) -> int:
+    """The number of a task: 0 for Nothing, else its place among the tasks from 1."""
+    return 0 if task is None else [*Task].index(task) + 1
 
 
 def goal_position(knowledge: Knowledge, command: Command) -> tuple[float, float]:
@@ -71,3 +109,28 @@ def _version(package: str) -> str:
         return version(package)
     except PackageNotFoundError:
         return "not installed"
+
+
+def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[str, Any]:
+    """The grid as a grey PNG (first row: largest y), its place in the world frame (m), and the middles of the rooms."""
+    grey = np.full(grid.occupied.shape, FREE, np.uint8)
+    if grid.unknown is not None:
+        grey[grid.unknown] = UNKNOWN
+    grey[grid.occupied] = OCCUPIED
+    png = cv2.imencode(".png", np.ascontiguousarray(grey[::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes()
+    width_m, height_m = grid.size_m
+    return {
+        "world": world,
+        "frame_id": "world",
+        "resolution_m": grid.resolution_m,
+        "origin_m": {"x": grid.origin_m[0], "y": grid.origin_m[1]},
+        "size_m": {"x": width_m, "y": height_m},
+        "format": "png",
+        "data": base64.b64encode(png).decode(),
+        "places": [_label(name, place.polygon) for name, place in knowledge.places.items()],
+    }
+
+
+def _label(name: str, polygon: Sequence[tuple[float, float]]) -> dict[str, Any]:
+    x, y = np.mean(polygon, axis=0)
+    return {"name": name, "x": round(float(x), 3), "y": round(float(y), 3)}

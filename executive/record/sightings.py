@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from executive.record.messages import DETECT_TOPIC
 from executive.record.reader import Event
-from executive.record.schemas import TRACKS
+from executive.record.schemas import TO_DETECT, TRACKS
 from skills.api import ObjectObservation, Thing
 from skills.detect.words import told_apart
 from skills.perception.class_forms import THING
@@ -24,7 +23,7 @@ def seen_objects(events: Iterable[Event]) -> tuple[ObjectObservation, ...]:
     open_searches: dict[str, int] = {}
     for event in events:
         robot = str(event.data.get("robot_name", ""))
-        if event.topic == DETECT_TOPIC:
+        if event.topic == TO_DETECT:
             open_searches[robot] = len(searches)
             searches.append([])
         elif event.topic == TRACKS and robot in open_searches:

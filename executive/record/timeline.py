@@ -7,9 +7,22 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from executive.record.history import logged_activity, logged_state, robot_of
-from executive.record.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
 from executive.record.reader import Event
-from executive.record.schemas import ACTIVITY, CONTROL, ERRORS, MISSIONS, OUTCOME, RUN, SPEECH, TRANSITIONS, TREE, WALL
+from executive.record.schemas import (
+    ACTIVITY,
+    CONTROL,
+    DESTINATION,
+    ERRORS,
+    MISSIONS,
+    OUTCOME,
+    RUN,
+    SPEECH,
+    TASK,
+    TO_DETECT,
+    TRANSITIONS,
+    TREE,
+    WALL,
+)
 from executive.tree.snapshot import NodeState
 
 
@@ -49,7 +62,7 @@ def _entries(events: Iterable[Event], leaves_only: bool) -> Iterator[tuple[Event
         elif event.topic == ACTIVITY:
             state = logged_activity(event.data)
             yield event, Entry(event.data.get("t", event.stamp_s), event.data["node"], state.message, state)
-        elif event.topic == TASK_TOPIC:
+        elif event.topic == TASK:
             yield event, Entry(event.stamp_s, event.topic, _task(event.data, commands))
         elif event.topic in _TEXTS and not (leaves_only and event.topic == WALL and "wall_time_s" not in event.data):
             text = _TEXTS[event.topic](event.data)
@@ -109,8 +122,8 @@ _TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
     SPEECH: lambda data: f'{data.get("robot")} says: "{data.get("text")}"',
     MISSIONS: lambda data: "; ".join(_mission(each) for each in data.get("missions", ())),
     CONTROL: lambda data: f"{data.get('what')}: {data.get('message')}",
-    DETECT_TOPIC: lambda data: f"look for {', '.join(data.get('class_name', ()))}",
-    DESTINATION_TOPIC: _seen,
+    TO_DETECT: lambda data: f"look for {', '.join(data.get('class_name', ()))}",
+    DESTINATION: _seen,
     ERRORS: lambda data: str(data.get("traceback", "")).strip().splitlines()[-1:][0] if data else "",
     WALL: _ticks,
 }

@@ -1,21 +1,29 @@
-"""Renders the reports from the templates in `templates`: HTML files that need no script and no other file."""
+"""HTML files that need no other file: reports from the templates in `templates`, and the page with a log in it."""
 
 from __future__ import annotations
 
 import base64
+import json
+import re
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from executive.record.reader import Event
+from executive.view.feed import Feed
 from executive.view.text import printable
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-__all__ = ["render"]
+__all__ = ["PAGE_FOLDER", "clock_text", "feed_of", "log_page", "render"]
 
+PAGE_FOLDER: Final = Path(__file__).parent / "page"
 _TEMPLATES: Final = Path(__file__).parent / "templates"
+_STYLE: Final = re.compile(r'<link rel="stylesheet" href="page/([\w.]+)">')
+_SCRIPT: Final = re.compile(r'<script src="page/([\w.]+)" defer></script>\n?')
 
 
 def render(template: str, **values: Any) -> str:
@@ -26,6 +34,10 @@ def render(template: str, **values: Any) -> str:
 @cache
 def _environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    def picture(jpeg: bytes) -> Markup:
+        return Markup(_data_address("jpeg", jpeg))
 
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
@@ -36,7 +48,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(clock=clock_text, data_address=_data_address, percent="{:.1%}".format)
+    environment.filters.update(clock=clock_text, data_address=picture, percent="{:.1%}".format)
     return environment
 
 
@@ -51,7 +63,39 @@ def clock_text(t_s: float) -> str:
     return f"{int(minutes)}:{seconds:04.1f}"
 
 
-def _data_address(jpeg: bytes) -> Markup:
-    from markupsafe import Markup
+def feed_of(events: Sequence[Event]) -> Feed:
+    """A feed that holds a whole log."""
+    feed = Feed(most=None)
+    for event in events:
+        feed(event.topic, event.stamp_s, event.data)
+    return feed
 
-    return Markup(f"data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}")
+
+def log_page(events: Sequence[Event], recording: Path | None = None) -> str:
+    """The page with a log in it, and with the 3D recording when there is one."""
+    feed = feed_of(events)
+    _, texts = feed.since((0, 0))
+    pictures = [_data_address(*feed.picture(number)) for number in range(feed.pictures)]
+    scene = None if recording is None else recording.read_text(encoding="utf-8")
+    page = _file("index.html")
+    names = _SCRIPT.findall(page)
+    page = _STYLE.sub(lambda match: f"<style>\n{_file(match[1])}</style>", page)
+    page = _SCRIPT.sub("", page)
+    messages = [json.loads(text) for text in texts]
+    data = _inert({"messages": messages, "pictures": pictures, "scene": scene})
+    scripts = "\n".join(_file(name) for name in names)
+    body = f'<script id="recorded" type="application/json">{data}</script>\n<script>\n{scripts}</script>\n</body>'
+    return f"{page.rsplit('</body>', 1)[0]}{body}\n</html>\n"
+
+
+def _file(name: str) -> str:
+    return (PAGE_FOLDER / name).read_text(encoding="utf-8")
+
+
+def _data_address(form: str, data: bytes) -> str:
+    return f"data:image/{form};base64,{base64.b64encode(data).decode()}"
+
+
+def _inert(value: Any) -> str:
+    """JSON that cannot end the script element that it stands in, nor begin a comment."""
+    return json.dumps(value, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")

@@ -26,7 +26,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from executive.view.actions import Action, RefusedError
 from executive.view.feed import Feed
-from executive.view.page_files import PAGE_FOLDER
+from executive.view.html import PAGE_FOLDER
 from executive.view.serving import MAX_BODY, ServingThread, body_of
 from skills.files.errors import InputError
 from skills.files.texts import json_object
@@ -211,7 +211,7 @@ def _values(body: bytes | None) -> Mapping[str, Any]:
         raise RefusedError(str(error)) from error
 
 
-def served(content: PageContent, port: int) -> PageServer:
+def serve(content: PageContent, port: int) -> PageServer:
     """A server for the content. Raises InputError when the port is taken."""
     try:
         return PageServer(content, port=port)

@@ -1,13 +1,14 @@
 """What pytest loads with the package (entry point `errand` in the group `pytest11`).
 
-It gives fixtures for tests of skills and collects files named `*.skilltest.yaml`. What is heavy is loaded when a test
-asks for it, so that other people's tests start no slower.
+It gives fixtures for tests of skills and collects files named `*.skilltest.yaml`. Heavy modules are imported when a
+test asks for them, so that the tests of other projects start no slower.
 """
 
 from __future__ import annotations
 
+import logging
+import tempfile
 from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,53 +25,68 @@ if TYPE_CHECKING:
 
 SUFFIX = ".skilltest.yaml"
 _SETTINGS: pytest.StashKey[SkillTestSettings] = pytest.StashKey()
-_QUIET = "drake"
+
+
+class Hooks:
+    """Hooks that a conftest.py may implement."""
+
+    @staticmethod
+    def pytest_errand_skill_tests(settings: Any) -> None:
+        """Change what all skill tests of the session share, before the first is collected.
+
+        `settings` is an `executive.testing.collect.SkillTestSettings`: append to `fault_kinds`, add to `skills`, put
+        other benches into `makers`.
+        """
 
 
 def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
     """Let a conftest change what skill tests share."""
-    pluginmanager.add_hookspecs(import_module("executive.cli.testing.hooks"))
+    pluginmanager.add_hookspecs(Hooks)
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """Collect the tests of a `*.skilltest.yaml` file."""
     if not file_path.name.endswith(SUFFIX):
         return None
-    module: pytest.File = import_module("executive.testing.collect").SkillTestModule.from_parent(parent, path=file_path)
-    module.settings = _settings(parent.config)  # type: ignore[attr-defined]
+    from executive.testing.collect import SkillTestModule
+
+    module: SkillTestModule = SkillTestModule.from_parent(parent, path=file_path)
+    module.settings = _settings(parent.config)
     return module
 
 
 def _settings(config: pytest.Config) -> SkillTestSettings:
     """What the session's skill tests share, made when the first is collected."""
     if _SETTINGS not in config.stash:
+        from executive.testing.collect import SkillTestSettings
+        from executive.testing.trial import scripted_maker
+        from executive.tree.registry import installed_skills
+        from skills.files.errors import InputError
+
         capabilities = _spot()
-        makers = {
-            "scripted": import_module("executive.testing.trial").scripted_maker(capabilities),
-            "plant": _plant_maker,
-        }
+        makers = {"scripted": scripted_maker(capabilities), "plant": _plant_bench}
         try:
-            skills = import_module("executive.tree.registry").installed_skills()
-        except import_module("skills.files.errors").InputError as error:
+            settings = SkillTestSettings(installed_skills(), makers, capabilities)
+        except InputError as error:
             raise pytest.UsageError(str(error)) from error
-        settings = import_module("executive.testing.collect").SkillTestSettings(skills, makers, capabilities)
         config.stash[_SETTINGS] = settings
         config.hook.pytest_errand_skill_tests(settings=settings)
     return config.stash[_SETTINGS]
 
 
-def _plant_maker(robot: Any, world: Any) -> SkillBench:
-    """A bench in a small plant whose files are kept only as long as it is being built."""
-    folders = import_module("tempfile")
-    with folders.TemporaryDirectory() as folder:
-        bench: SkillBench = import_module("executive.cli.testing.small_plant").plant_maker(Path(folder))(robot, world)
-    return bench
+def _plant_bench(_robot: Any, world: Any) -> SkillBench:
+    """A bench in the small plant, whose files are deleted once it is built."""
+    from executive.cli.testing.small_plant import make_small_plant
+
+    with tempfile.TemporaryDirectory() as folder:
+        return make_small_plant(Path(folder), can=world.can).bench
 
 
 def _spot() -> Capabilities:
-    import_module("logging").getLogger(_QUIET).setLevel("WARNING")
-    capabilities: Capabilities = import_module("plant.spot.capabilities").spot_capabilities()
-    return capabilities
+    logging.getLogger("drake").setLevel("WARNING")
+    from plant.spot.capabilities import spot_capabilities
+
+    return spot_capabilities()
 
 
 @pytest.fixture(scope="session")
@@ -82,8 +98,9 @@ def robot_capabilities() -> Capabilities:
 @pytest.fixture
 def virtual_clock() -> VirtualClock:
     """Time that only `advance` moves."""
-    clock: VirtualClock = import_module("skills.testing.clock").VirtualClock()
-    return clock
+    from skills.testing.clock import VirtualClock
+
+    return VirtualClock()
 
 
 @pytest.fixture
@@ -92,12 +109,12 @@ def make_scripted_robot(virtual_clock: VirtualClock, robot_capabilities: Capabil
 
     Takes the options of `ScriptedRobot`: name, capabilities, blocks, start, seed.
     """
-    blocks = import_module("skills.testing.blocks")
+    from skills.testing.blocks import ROOM, TABLE_CAN
+    from skills.testing.robot import ScriptedRobot
 
     def make(**options: Any) -> ScriptedRobot:
-        given = {"capabilities": robot_capabilities, "blocks": (*blocks.ROOM, blocks.TABLE_CAN), **options}
-        robot: ScriptedRobot = import_module("skills.testing.robot").ScriptedRobot(virtual_clock, **given)
-        return robot
+        usual = {"capabilities": robot_capabilities, "blocks": (*ROOM, TABLE_CAN)}
+        return ScriptedRobot(virtual_clock, **{**usual, **options})
 
     return make
 
@@ -111,20 +128,19 @@ def scripted_robot(make_scripted_robot: Callable[..., ScriptedRobot]) -> Scripte
 @pytest.fixture
 def skill_bench(scripted_robot: ScriptedRobot, virtual_clock: VirtualClock) -> SkillBench:
     """Runs skills in their leaf with the scripted robot; `skill_bench.inject("camera freezes at 3 s")` adds faults."""
-    costmap = import_module("skills.testing.estimators").BlockCostmap(scripted_robot.blocks)
-    bench: SkillBench = import_module("executive.testing.bench").SkillBench(
-        scripted_robot, virtual_clock, costmap=costmap
-    )
-    return bench
+    from executive.testing.bench import SkillBench
+    from skills.testing.estimators import BlockCostmap
+
+    return SkillBench(scripted_robot, virtual_clock, costmap=BlockCostmap(scripted_robot.blocks))
 
 
 @pytest.fixture
 def skill_context(virtual_clock: VirtualClock) -> Callable[..., SkillContext]:
     """Make the context of a skill for a robot: `skill_context(robot)`; takes the options of `SkillBench` besides."""
+    from executive.testing.bench import SkillBench
 
     def make(robot: ScriptedRobot, **options: Any) -> SkillContext:
-        bench: SkillBench = import_module("executive.testing.bench").SkillBench(robot, virtual_clock, **options)
-        return bench.context()
+        return SkillBench(robot, virtual_clock, **options).context()
 
     return make
 
@@ -133,5 +149,6 @@ def skill_context(virtual_clock: VirtualClock) -> Callable[..., SkillContext]:
 def small_plant(tmp_path: Path) -> SmallPlant:
     """Spot in one room with a table and a can, simulated: contact, noisy sensors, scan matching."""
     _spot()
-    made: SmallPlant = import_module("executive.cli.testing.small_plant").make_small_plant(tmp_path / "small_room")
-    return made
+    from executive.cli.testing.small_plant import make_small_plant
+
+    return make_small_plant(tmp_path / "small_room")

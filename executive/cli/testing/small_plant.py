@@ -7,9 +7,7 @@ from pathlib import Path
 
 from executive.app.assembly import shared_detector
 from executive.testing.bench import SkillBench
-from executive.testing.skill_test import RobotSetup, WorldSetup
 from executive.testing.small_room import write_small_room
-from executive.testing.trial import BenchMaker
 from plant.simulation import Simulation
 from plant.worlds.world import World, load_world
 from skills.estimate.costmap import LayeredCostmap
@@ -41,12 +39,3 @@ def make_small_plant(folder: Path, *, seed: int = 1, can: bool = True) -> SmallP
         seed=seed,
     )
     return SmallPlant(world, simulation, bench)
-
-
-def plant_maker(folder: Path) -> BenchMaker:
-    """What makes benches in the small plant, for skill tests with `kind: plant`."""
-
-    def make(robot: RobotSetup, world: WorldSetup) -> SkillBench:
-        return make_small_plant(folder, can=world.can).bench
-
-    return make

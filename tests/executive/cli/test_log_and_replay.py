@@ -122,16 +122,16 @@ def test_a_served_replay_answers(log_path, monkeypatch):
     def look(limit_s: float | None) -> None:
         answers.append(limit_s)
 
-    served = replay_command.served
+    serve = replay_command.serve
 
     def noted(content, port):
-        server = served(content, port)
+        server = serve(content, port)
         with urllib.request.urlopen(server.url) as answer:
             answers.append(answer.status)
         return server
 
     monkeypatch.setattr(replay_command, "wait", look)
-    monkeypatch.setattr(replay_command, "served", noted)
+    monkeypatch.setattr(replay_command, "serve", noted)
     assert invoke("replay", log_path).exit_code == 0
     assert answers == [200, None]
 

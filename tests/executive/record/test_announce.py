@@ -4,17 +4,19 @@ import math
 
 import pytest
 
-from executive.record.announce import announce, goal_position
-from executive.words.command import parse_command
+from executive.record.announce import announce, command_type, goal_position
+from executive.words.command import Task, parse_command
 
 
 def test_run_and_commands_are_announced(compiled, make, knowledge, clock):
-    told = []
-    announce(lambda topic, m: told.append((topic, m)), clock, compiled(*make.FETCH), knowledge, world="flat", seed=4)
-    assert [topic for topic, _ in told] == ["run", "taskChannel", "taskChannel"]
-    assert (told[0][1]["seed"], told[0][1]["commands"]) == (4, list(make.FETCH))
-    assert told[1][1]["obj_type"] == (2, 1)
-    assert (told[2][1]["item_type"], told[2][1]["goal_x"]) == ((2, 1), 0.0)
+    logged = []
+    announce(lambda topic, m: logged.append((topic, m)), clock, compiled(*make.FETCH), knowledge, world="flat", seed=4)
+    assert [topic for topic, _ in logged] == ["run", "taskChannel", "taskChannel"]
+    (_, run), (_, first), (_, second) = logged
+    assert (run["seed"], run["commands"]) == (4, list(make.FETCH))
+    assert (first["sequence"], first["mission_count"], first["task_count"], first["cmd_type"]) == (0, 2, 1, 1)
+    assert (first["item_type"], first["item_count"], first["obj_type"]) == ((0,), (0,), (2, 1))
+    assert (second["sequence"], second["item_type"], second["goal_x"], second["cmd_type"]) == (1, (2, 1), 0.0, 0)
 
 
 @pytest.mark.parametrize(
@@ -34,3 +36,7 @@ def test_goal_positions(knowledge, text, position):
 def test_an_open_goal_has_no_position(knowledge):
     command = parse_command("Take [Nothing] to [Nothing] and do [grasp] to [coke]")
     assert all(math.isnan(value) for value in goal_position(knowledge, command))
+
+
+def test_the_tasks_have_their_numbers():
+    assert [command_type(task) for task in (None, Task.GRASP, Task.FIND, Task.PLACE)] == [0, 1, 2, 3]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
+from executive.record.announce import map_message
 from executive.record.drawable import boxes, drawable, with_picture
 from executive.record.event_log import EventLog
 from executive.record.reader import read_events
-from executive.record.surroundings import map_message
 from skills.estimate.grid_map import GridMap
 
 SEEN = {"class_name": "coke", "score": 0.9, "box": [10, 20, 30, 40]}

@@ -12,8 +12,8 @@ from executive.tree.node_view import NodeView, to_json
 from executive.tree.ports import Port
 from executive.tree.snapshot import NodeState
 from executive.view.btcpp import to_btcpp
+from executive.view.html import log_page
 from executive.view.mermaid import to_mermaid
-from executive.view.replay import to_html
 from executive.view.svg import to_svg
 from executive.view.text import printable, to_text
 from skills.api import Cause
@@ -89,7 +89,7 @@ def test_json_keeps_the_name_as_it_is(name):
 @pytest.mark.parametrize("name", NASTY)
 def test_a_page_of_one_file_keeps_names_within_its_data(name):
     events = (Event("tree", 0.0, {"robot": "Alice", "root": tree_named(name).structure()}),)
-    page = to_html(events)
+    page = log_page(events)
     data = re.search(r'<script id="recorded" type="application/json">(.*?)</script>', page, re.DOTALL)
     assert data is not None
     assert json.loads(data[1])["messages"][0]["data"]["root"]["name"] == name

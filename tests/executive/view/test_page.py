@@ -17,9 +17,9 @@ from executive.app.report_file import ReportPage, ReportPart, StepRow
 from executive.conversation import Conversation, Speech
 from executive.language.questions import ClarifyingQuestion, Slot
 from executive.language.understand import Status, Understanding
+from executive.record.announce import map_message
 from executive.record.event_log import EventLog
 from executive.record.history import read_history
-from executive.record.surroundings import map_message
 from executive.run.control import Control, Mode
 from executive.run.outcome import RobotStatus
 from executive.run.runner import Progress
@@ -27,8 +27,7 @@ from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
 from executive.view.actions import RefusedError, asked_json, control_actions
 from executive.view.feed import Feed
-from executive.view.html import render
-from executive.view.replay import fed, to_html
+from executive.view.html import feed_of, log_page, render
 from executive.view.server import PageContent, PageServer
 from executive.view.styles import Styles
 from executive.view.watch import SEND_LIMIT_S, ControlWatch
@@ -372,7 +371,7 @@ def test_the_page_goes_on_as_a_replay_when_the_run_has_ended(page, live, control
 
 
 def test_a_log_is_served_with_map_picture_and_events(page, log_path):
-    with PageServer(PageContent(fed(read_history(log_path).events))) as server:
+    with PageServer(PageContent(feed_of(read_history(log_path).events))) as server:
         page.goto(server.url)
         playwright_api.expect(page.locator("#mode-text")).to_have_text("failure (EXECUTION)")
         assert page.locator("#controls").is_hidden()
@@ -436,7 +435,7 @@ def test_the_steps_of_the_mission_stand_above_the_tree(page, live):
 
 
 def test_the_leaf_that_decided_a_failure_is_in_view_and_its_sentence_stands_on_top(page, log_path):
-    with PageServer(PageContent(fed(read_history(log_path).events))) as server:
+    with PageServer(PageContent(feed_of(read_history(log_path).events))) as server:
         page.goto(server.url)
         playwright_api.expect(page.locator("#why")).to_contain_text("it slipped")
         leaf = page.locator(".row.decisive")
@@ -484,14 +483,14 @@ def test_a_run_that_goes_well_has_no_failure_on_top(page, live):
 
 
 def test_events_name_what_was_done_and_not_path_ids(page, log_path):
-    with PageServer(PageContent(fed(read_history(log_path).events))) as server:
+    with PageServer(PageContent(feed_of(read_history(log_path).events))) as server:
         page.goto(server.url)
         playwright_api.expect(page.locator("#events")).to_contain_text("go to the")
         assert "/" not in "".join(page.locator("#events .what").all_inner_texts()).replace("</", "")
 
 
 def test_the_scene_says_that_it_loads_until_it_is_there(page, log_path, recording):
-    with PageServer(PageContent(fed(read_history(log_path).events), recording=recording)) as server:
+    with PageServer(PageContent(feed_of(read_history(log_path).events), recording=recording)) as server:
         page.goto(server.url)
         playwright_api.expect(page.locator("#scene .loading")).to_be_visible()
         playwright_api.expect(page.locator("#scene .loading")).to_have_count(0)
@@ -499,7 +498,7 @@ def test_the_scene_says_that_it_loads_until_it_is_there(page, log_path, recordin
 
 def test_a_replay_of_one_file_works_without_a_server(page, log_path, tmp_path):
     html = tmp_path / "replay.html"
-    html.write_text(to_html(read_history(log_path).events), encoding="utf-8")
+    html.write_text(log_page(read_history(log_path).events), encoding="utf-8")
     page.goto(html.as_uri())
     playwright_api.expect(page.locator("#mode-text")).to_have_text("failure (EXECUTION)")
     playwright_api.expect(page.locator("#tree")).to_contain_text("it slipped </script><b>bold</b>")
@@ -529,21 +528,21 @@ def expect_scene_follows_slider(page) -> None:
 
 def test_the_recording_in_a_replay_of_one_file_follows_the_slider(page, log_path, recording, tmp_path):
     html = tmp_path / "replay.html"
-    html.write_text(to_html(read_history(log_path).events, recording), encoding="utf-8")
+    html.write_text(log_page(read_history(log_path).events, recording), encoding="utf-8")
     page.goto(html.as_uri())
     expect_scene_follows_slider(page)
 
 
 @pytest.mark.nightly
 def test_the_recording_in_a_served_replay_follows_the_slider(page, log_path, recording):
-    with PageServer(PageContent(fed(read_history(log_path).events), recording=recording)) as server:
+    with PageServer(PageContent(feed_of(read_history(log_path).events), recording=recording)) as server:
         page.goto(server.url)
         expect_scene_follows_slider(page)
 
 
 @pytest.mark.nightly
 def test_the_recording_that_is_there_when_a_run_has_ended_follows_the_slider(page, log_path, recording):
-    with PageServer(PageContent(fed(read_history(log_path).events))) as server:
+    with PageServer(PageContent(feed_of(read_history(log_path).events))) as server:
         page.goto(server.url)
         playwright_api.expect(page.locator("#mode-text")).to_have_text("failure (EXECUTION)")
         server.offer_recording(recording)

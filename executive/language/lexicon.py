@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
@@ -11,7 +12,7 @@ from typing import Any, Final
 
 import yaml
 
-__all__ = ["Lexicon", "PrepositionRole", "VerbKind", "lexicon", "read_table"]
+__all__ = ["Lexicon", "Patterns", "PrepositionRole", "VerbKind", "lexicon", "read_table"]
 
 Phrase = tuple[str, ...]
 
@@ -163,3 +164,39 @@ _KINDS: Final[Mapping[Any, Callable[[Iterable[str]], object]]] = {
     "tuple[str, ...]": _longest_first,
 }
 """How the fields are read that are plain lists in the files, by their types."""
+
+
+class Patterns:
+    """The regular expressions of a table, or of its section, without regard to case; each is compiled when it is used.
+
+    {name} in one stands for another one of the section, of the table, or of `words`.
+    """
+
+    def __init__(self, table: str, section: str | None = None, words: Mapping[str, str] | None = None) -> None:
+        self._table, self._section, self._words = table, section, dict(words or {})
+
+    def __getattr__(self, name: str) -> re.Pattern[str]:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        found = re.compile(self.text(name), re.IGNORECASE)
+        setattr(self, name, found)
+        return found
+
+    def each(self, name: str) -> tuple[re.Pattern[str], ...]:
+        """The expressions of a list."""
+        return tuple(re.compile(self._filled(text), re.IGNORECASE) for text in self._entry(name))
+
+    def text(self, name: str) -> str:
+        """An expression as it is written, those that it names filled in."""
+        return self._words[name] if name in self._words else self._filled(self._entry(name))
+
+    def filled(self, **words: str) -> Patterns:
+        """The same with more words to fill in."""
+        return Patterns(self._table, self._section, {**self._words, **words})
+
+    def _entry(self, name: str) -> Any:
+        table = read_table(self._table)
+        return {**table, **(table[self._section] if self._section else {})}[name]
+
+    def _filled(self, text: str) -> str:
+        return re.sub(r"\{([a-z_]+)\}", lambda match: self.text(match[1]), text)

@@ -9,7 +9,18 @@ from typing import Final
 
 from executive.language.lexicon import lexicon
 
-__all__ = ["SHARE", "SPAN", "TIMES", "TimeOfDay", "count_of", "seconds_of", "share_of", "time_of", "times_of"]
+__all__ = [
+    "AMOUNTS",
+    "SHARE",
+    "SPAN",
+    "TIMES",
+    "TimeOfDay",
+    "count_of",
+    "seconds_of",
+    "share_of",
+    "time_of",
+    "times_of",
+]
 
 
 @cache
@@ -37,6 +48,8 @@ _FULL: Final = re.compile(
 )
 _NAMED: Final = {"noon": 12, "midday": 12, "midnight": 0}
 SHARE: Final = rf"(?:(?:{_NUMBER}|fifty) ?percent|half(?: full| charge| of its charge)?)"
+AMOUNTS: Final = {"span": SPAN, "times": TIMES, "share": SHARE}
+"""What stands for them in the tables."""
 _UNITS_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 

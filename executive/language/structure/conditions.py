@@ -8,24 +8,27 @@ from dataclasses import replace
 from typing import Final
 
 from executive.language.items import Chunk, Item
-from executive.language.questions import RefusalError
+from executive.language.lexicon import Patterns
+from executive.language.questions import RefusalError, RefusalKind, Slot, which
 from executive.language.roles import HERE
-from executive.language.structure.amounts import SHARE, SPAN, seconds_of, share_of, time_of
-from executive.language.structure.cutting import pattern
-from executive.language.structure.doors import door_condition
+from executive.language.spelling import synonyms_of
+from executive.language.structure.amounts import AMOUNTS, seconds_of, share_of, time_of
+from executive.language.structure.cutting import CLAUSES
 from executive.language.structure.leaves import Leaves, State, Supposed, negated, placed, verb
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Not, ValueIs
 from executive.words.expression import Expression
+from executive.words.knowledge import Knowledge
+from skills.files.errors import listing
 
-__all__ = ["meeting", "pressed", "reading", "suppose"]
+__all__ = ["door_condition", "meeting", "pressed", "reading", "suppose"]
 
 
 def suppose(text: str, state: State, leaves: Leaves) -> Supposed:
     """The condition that `text` tells. Raises RefusalError: it tells none that can be looked at or read."""
-    words = _TAIL.sub("", " ".join(text.replace(" o' clock", " o'clock").split()).strip(" ,."))
+    words = _P.tail.sub("", " ".join(text.replace(" o' clock", " o'clock").split()).strip(" ,."))
     if (found := reading(words, state, leaves)) is not None:
         return found
-    if (unreal := pattern("unreal").search(words)) is not None:
+    if (unreal := CLAUSES.unreal.search(words)) is not None:
         raise RefusalError(f"I can only decide by how things are now, not by '{words}'", [unreal[0]])
     joined, left_open = _joined(words, state, leaves)
     if joined is not None:
@@ -39,9 +42,6 @@ def suppose(text: str, state: State, leaves: Leaves) -> Supposed:
 def reading(words: str, state: State, leaves: Leaves) -> Supposed | None:
     """The condition of a usual form: of battery, hand, place, clock, button, door, or somebody who comes or leaves."""
     return next((found for read in _READERS if (found := read(words, state, leaves)) is not None), None)
-
-
-_TAIL: Final = re.compile(r"(?: (?:left|any more|anymore|any longer|again|already|yet|now|at all))+$", re.IGNORECASE)
 
 
 def _plain(condition: Condition, said: str, state: State, *notes: str) -> Supposed:
@@ -64,34 +64,18 @@ _SIGNS: Final = {
     "": ">=",
 }
 _COMPARED: Final = "|".join(sorted(filter(None, _SIGNS), key=len, reverse=True))
-_CHARGE: Final = (
-    r"(?:the |your )?(?:battery(?:'s)?|charge|battery level|battery charge|charge level|charge of (?:the|your) battery)"
-    r"(?: level| charge)?"
-)
-_IS: Final = r"(?: is| 's|'s| has| drops| falls| goes| gets| rises| reaches)(?: still| already| only| again| charged)*"
-_BATTERY: Final = re.compile(
-    rf"(?:{_CHARGE}{_IS}|you (?:have|are at|are charged)|you're at)(?: charged)?(?: to)? ?(?P<how>{_COMPARED})? ?"
-    rf"(?P<share>{SHARE})(?: charge| charged| full| battery| of (?:the |your )?(?:battery|charge))?(?: left)?",
-    re.IGNORECASE,
-)
-_CHARGED: Final = re.compile(
-    rf"(?:{_CHARGE}|you){_IS.removesuffix('*')}*(?: are)?(?: (?P<not>not))? (?P<how>low|nearly empty"
-    rf"|almost empty|running low|full|fully charged|charged)"
-    r"(?: on (?:battery|charge|power))?|(?:you|the battery|your battery) (?:are|is) (?P<low>running low)"
-    r"(?: on (?:battery|power))?",
-    re.IGNORECASE,
-)
+_P: Final = Patterns("structures.yaml", "conditions", {**AMOUNTS, "compared": _COMPARED})
 _FULL: Final = 0.99
 
 
 def _battery(words: str, state: State, leaves: Leaves) -> Supposed | None:
-    match = _BATTERY.fullmatch(words)
+    match = _P.battery.fullmatch(words)
     if match is not None:
         share = share_of(match["share"])
         if share is None:
             raise RefusalError(f"'{match['share']}' is no charge; say it in percent", [match["share"]])
         return _plain(_value(f"battery {_SIGNS[(match['how'] or '').lower()]} {share:g}"), words, state)
-    match = _CHARGED.fullmatch(re.sub(r"^you are", "you is", words))
+    match = _P.charged.fullmatch(re.sub(r"^you are", "you is", words))
     if match is None:
         return None
     facts, how = leaves.knowledge.battery, (match["how"] or match["low"] or "").lower()
@@ -100,59 +84,27 @@ def _battery(words: str, state: State, leaves: Leaves) -> Supposed | None:
     return _plain(negated(found) if match["not"] else found, words, state)
 
 
-_HAND: Final = r"(?:your|the) (?:hand|gripper|hands|arm)"
-_HOLDS: Final = re.compile(
-    rf"you(?: are|'re| do)?(?P<not> not| n't)? (?:hold|holding|carry|carrying|have|got)(?: got)? "
-    rf"(?P<what>something|anything|nothing|an object|a thing)(?: in {_HAND})?",
-    re.IGNORECASE,
-)
-_IN_HAND: Final = re.compile(
-    rf"(?:there is|there's) (?P<what>something|anything|nothing) in {_HAND}|{_HAND} (?:is"
-    rf"|are) (?P<not>not )?(?P<how>empty|free|full)",
-    re.IGNORECASE,
-)
-
-
 def _holding(words: str, state: State, leaves: Leaves) -> Supposed | None:
     words = re.sub(r"n't\b", " not", words)
-    match = _HOLDS.fullmatch(words) or _IN_HAND.fullmatch(words)
+    match = _P.holds.fullmatch(words) or _P.in_hand.fullmatch(words)
     if match is None:
         return None
     empty = (match["what"] or "").lower() == "nothing" or match.groupdict().get("how") in ("empty", "free")
     return _plain(_value("not holding" if empty != bool(match["not"]) else "holding"), words, state)
 
 
-_KNOWS: Final = re.compile(r"you (?:know|still know) where you are|you are localised", re.IGNORECASE)
-_LOST: Final = re.compile(
-    r"you (?:don't|do not) know where you are|you are (?:lost|not localised)|you (?:have )?lost your way|you get lost",
-    re.IGNORECASE,
-)
-
-
 def _place(words: str, state: State, leaves: Leaves) -> Supposed | None:
-    if _KNOWS.fullmatch(words):
+    if _P.knows.fullmatch(words):
         return _plain(_value("localised"), words, state)
-    return _plain(_value("not localised"), words, state) if _LOST.fullmatch(words) else None
-
-
-_CLOCK: Final = re.compile(
-    r"(?:it is|it's|it gets|the time is|it becomes|it has gone)(?: already| not yet)? "
-    r"(?P<how>after|past|later than|before|earlier than|not yet)? ?(?P<time>.+)",
-    re.IGNORECASE,
-)
-_PASSED: Final = re.compile(
-    rf"(?:more than |at least )?(?P<span>{SPAN}) (?:have|has) (?:passed|gone by|elapsed)"
-    rf"|you have been (?:working|running|going|at it) (?:for )?(?:more than |longer than |at least )?(?P<since>{SPAN})",
-    re.IGNORECASE,
-)
+    return _plain(_value("not localised"), words, state) if _P.lost.fullmatch(words) else None
 
 
 def _clock(words: str, state: State, leaves: Leaves) -> Supposed | None:
-    match = _PASSED.fullmatch(words)
+    match = _P.passed.fullmatch(words)
     if match is not None:
         seconds = seconds_of(match["span"] or match["since"])
         return None if seconds is None else _plain(_value(f"elapsed >= {seconds:g}"), words, state)
-    match = _CLOCK.fullmatch(words)
+    match = _P.clock.fullmatch(words)
     time = None if match is None else time_of(match["time"])
     if match is None or time is None:
         return None
@@ -161,18 +113,11 @@ def _clock(words: str, state: State, leaves: Leaves) -> Supposed | None:
     return _plain(_value(f'clock {"<" if early else ">="} "{time.text}"'), words, state, *notes)
 
 
-_PRESSED: Final = re.compile(
-    r"(?:i|we|me|us|somebody|someone|the operator|anybody) (?:have |has |to )?(?:press|presses|pressed|push|pushes"
-    r"|pushed|hit|hits|click|clicks)"
-    r"(?: on)? (?P<one>(?:the|a|any) (?:[\w-]+ ){0,2}?)button"
-    r"|(?P<other>(?:the|a) (?:[\w-]+ ){0,2}?)button (?:is|was|gets|has been|is being|to be) (?:pressed|pushed|hit)",
-    re.IGNORECASE,
-)
 _BUTTON: Final = "button"
 
 
 def _button(words: str, state: State, leaves: Leaves) -> Supposed | None:
-    match = _PRESSED.fullmatch(words)
+    match = _P.pressed.fullmatch(words)
     if match is None:
         return None
     return pressed(match["one"] or match["other"], words, state)
@@ -194,40 +139,23 @@ def _door(words: str, state: State, leaves: Leaves) -> Supposed | None:
     return Supposed(found, words, known, known)
 
 
-_COMES: Final = re.compile(
-    r"(?P<who>[\w' ]+?) (?:(?:comes|arrives|shows up|appears|gets|is|'s|turns up|walks in|steps in|enters"
-    r"|returns|goes|are|come|arrive|has come|has arrived|is coming|gets back"
-    r"|to (?:come|arrive|show up|appear|get|return|be|enter|turn up))"
-    r"(?: back| in| up| over| here| home| by| along| again| there)*)"
-    r"(?: (?:in|into|to|at|inside) (?P<place>the .+|here|there)| (?P<room>the .+))?",
-    re.IGNORECASE,
-)
-_GOES: Final = re.compile(
-    r"(?P<who>[\w' ]+?) (?:leaves|has left|is gone|goes away|has gone|is away|is not there|isn't there"
-    r"|is no longer there|is not here|isn't here|is no longer here|is there no more|to leave|to go away)"
-    r"(?: (?P<room>the .+))?",
-    re.IGNORECASE,
-)
-_NOBODY: Final = re.compile(r"(?:nobody|no one|no-one|no people|none)", re.IGNORECASE)
-
-
 def _meeting(words: str, state: State, leaves: Leaves) -> Supposed | None:
     """Somebody comes to where the robot is, or leaves it."""
-    gone = _GOES.fullmatch(words)
-    match = gone or _COMES.fullmatch(words)
-    if match is None or pattern("unreal").search(words):
+    gone = _P.goes.fullmatch(words)
+    match = gone or _P.comes.fullmatch(words)
+    if match is None or CLAUSES.unreal.search(words):
         return None
     who = re.sub(r"\b(?:if|until)\b", "", match["who"]).strip()
     where = match.groupdict().get("place") or match["room"]
     where = "there" if where is None and re.search(r"\bthere(?: any more)?$", words, re.IGNORECASE) else where
-    if not (_NOBODY.fullmatch(who) or leaves.somebody(who, state)) or re.search(r"\b(?:or|and)\b", where or ""):
+    if not (_P.nobody.fullmatch(who) or leaves.somebody(who, state)) or re.search(r"\b(?:or|and)\b", where or ""):
         return None
     return meeting(who, where, words, state, leaves, gone=gone is not None)
 
 
 def meeting(who: str, where: str | None, words: str, state: State, leaves: Leaves, *, gone: bool = False) -> Supposed:
     """Whether somebody, or nobody, is where the robot is, or in a room; `words` say it. Raises RefusalError."""
-    nobody = _NOBODY.fullmatch(who) is not None
+    nobody = _P.nobody.fullmatch(who) is not None
     room = _where(where, state, leaves)
     if room is None:
         raise RefusalError(f"in which room is '{words}' to be seen? Name it", [words])
@@ -248,24 +176,14 @@ def _where(where: str | None, state: State, leaves: Leaves) -> str | None:
 _ANY: Final = frozenset(
     {"somebody", "someone", "anyone", "anybody", "a person", "people", "any person", "they", "a guest"}
 )
-_SEES: Final = re.compile(
-    r"you (?:can |do |could )?(?P<not>(?:can ?not|can't|don't|do not|did not|fail to) )?(?:still |manage to )?"
-    r"(?:find|see|spot|discover|notice|have found|found)(?: that)? (?P<what>.+)",
-    re.IGNORECASE,
-)
-_FILLED: Final = re.compile(
-    r"(?:there is|there's) (?P<some>something|anything) (?:left )?(?:in|on|at) (?P<on>the .+)"
-    r"|(?P<what>the .+?) is (?P<not>not )?(?P<how>empty|free|bare|clear|full|occupied)",
-    re.IGNORECASE,
-)
 
 
 def _look(words: str, state: State, leaves: Leaves) -> Supposed:
     """Something to be seen, or not to be seen. Raises RefusalError."""
-    match = _SEES.fullmatch(words)
+    match = _P.sees.fullmatch(words)
     if match is not None:
         return _seen(match, words, state, leaves)
-    match = _FILLED.fullmatch(re.sub(r"n't\b", " not", words))
+    match = _P.fullness.fullmatch(re.sub(r"n't\b", " not", words))
     if match is not None:
         found = leaves.anything_on(match["on"] or match["what"], words, state)
         empty = (match["how"] or "").lower() in ("empty", "free", "bare", "clear")
@@ -329,12 +247,12 @@ def _halves(words: str, word: str) -> Iterator[tuple[str, str]]:
 def _both(before: str, after: str, state: State, leaves: Leaves) -> tuple[Supposed, Supposed]:
     """Two conditions, where the second may leave out what the first has said, or the first the place of both."""
     first = suppose(before, state, leaves)
-    if _THERE.match(before) and _BARE.match(after):
+    if _P.there.match(before) and _P.bare.match(after):
         place = next((item for item in leaves.read(after) if _is_place(item)), None)
-        if place is not None and not _PLACED.search(before):
+        if place is not None and not _P.placed.search(before):
             first = _looked_again(first, (*first.items, place), before, state, leaves)
         return first, leaves.exists(after, after, first.holds)
-    if _AT.fullmatch(before) and re.match(r"(?:in|on|at|the) ", after, re.IGNORECASE) and " is " not in after:
+    if _P.at.fullmatch(before) and re.match(r"(?:in|on|at|the) ", after, re.IGNORECASE) and " is " not in after:
         return first, _looked_again(first, _moved(first.items, leaves.read(after)), after, first.holds, leaves)
     return first, suppose(after, first.holds, leaves)
 
@@ -356,9 +274,52 @@ def _is_place(item: Item) -> bool:
     return isinstance(item, Chunk) and item.role is not None
 
 
-_THERE: Final = re.compile(r"there(?: is|'s| are)\b|you (?:find|see)\b", re.IGNORECASE)
-_PLACED: Final = re.compile(r" (?:in|on|at) (?:the|my) .+", re.IGNORECASE)
-_AT: Final = re.compile(r"(?:.+? is|(?:there (?:is|are)|you (?:find|see)) .+?) (?:in|on|at) the [\w ]+", re.IGNORECASE)
-_BARE: Final = re.compile(r"(?:a|an|some|any|two|three|no) ", re.IGNORECASE)
 _Reader = Callable[[str, State, Leaves], Supposed | None]
 _READERS: Final[tuple[_Reader, ...]] = (_battery, _holding, _place, _clock, _button, _door, _meeting)
+
+
+_OPEN: Final = frozenset({"open", "opened", "opens", "to open", "is opening", "has opened"})
+
+
+def door_condition(words: str, last: DoorOpen | None, knowledge: Knowledge) -> Condition | None:
+    """That a door is open or not, where the words tell that; "it" is the door that was spoken of `last`.
+
+    Raises:
+        RefusalError: there is no such door, or several, with a question then.
+    """
+    match = _P.stands.fullmatch(words) or _P.turns.fullmatch(words)
+    if match is None or (match["it"] and last is None):
+        return None
+    found = last if match["it"] and last is not None else DoorOpen(_between(match, knowledge))
+    is_open = (match["how"].lower() in _OPEN) != bool(match.groupdict().get("not"))
+    return found if is_open else Not(found)
+
+
+def _between(match: re.Match[str], knowledge: Knowledge) -> tuple[str, str]:
+    """The rooms on the two sides of the door that is meant."""
+    said = match["door"]
+    bare = re.sub(r"^(?:the|that|this|a) ", "", said, flags=re.IGNORECASE)
+    if not knowledge.doors:
+        what = f"I know no door here, so '{said}' cannot be looked at"
+        raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
+    named = [match[name] for name in ("room", "one", "other", "from", "to", "of") if match[name]]
+    rooms = {_room(name.strip(), knowledge) for name in named}
+    fitting = [door.between for door in knowledge.doors if rooms <= {*door.between}]
+    if not fitting:
+        known = listing(f"{one} and {other}" for one, other in (door.between for door in knowledge.doors))
+        what = f"I know no such door as '{said}'; there are doors between {known}"
+        raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
+    if len(fitting) > 1:
+        question = which(Slot.PLACE, bare, tuple(f"door between {one} and {other}" for one, other in fitting))
+        raise RefusalError(question.text, [bare], question=question)
+    return fitting[0]
+
+
+def _room(name: str, knowledge: Knowledge) -> str:
+    bare = re.sub(r"^(?:the|my|our|your) ", "", name, flags=re.IGNORECASE)
+    known = {spelling.lower(): room for room in knowledge.places for spelling in knowledge.spellings([room])}
+    found = knowledge.place(bare) or next(iter(synonyms_of(bare.lower(), known)), None)
+    if found is None:
+        what = f"I know no room '{bare}'; known are {listing(knowledge.places)}"
+        raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
+    return knowledge.room(found)

@@ -10,10 +10,26 @@ from functools import cache
 from typing import Any, Final
 
 from executive.language.items import Item
-from executive.language.lexicon import lexicon, read_table
-from executive.language.structure.amounts import SPAN, TIMES
+from executive.language.lexicon import Patterns, lexicon, read_table
+from executive.language.structure.amounts import AMOUNTS, SPAN, TIMES
 
-__all__ = ["Behind", "Clause", "Kind", "behind", "cut", "opens", "pattern", "reworded", "spoken", "verb_positions"]
+__all__ = [
+    "ACTS",
+    "CLAUSES",
+    "Behind",
+    "Clause",
+    "Kind",
+    "behind",
+    "cut",
+    "opens",
+    "reworded",
+    "spoken",
+    "verb_positions",
+]
+
+
+CLAUSES: Final = Patterns("structures.yaml", words=AMOUNTS)
+ACTS: Final = Patterns("structures.yaml", "acts", AMOUNTS)
 
 
 class Kind(enum.Enum):
@@ -53,12 +69,12 @@ class Clause:
     @property
     def outer(self) -> bool:
         """Whether it is done after all of the clauses before."""
-        return pattern("outer").search(self.joint) is not None
+        return CLAUSES.outer.search(self.joint) is not None
 
     @property
     def anyway(self) -> bool:
         """Whether it is done at the end whatever happens."""
-        return pattern("whatever").search(self.joint) is not None
+        return CLAUSES.whatever.search(self.joint) is not None
 
     @property
     def then(self) -> bool:
@@ -79,12 +95,6 @@ class Behind:
 @cache
 def _table() -> Mapping[str, Any]:
     return read_table("structures.yaml")
-
-
-@cache
-def pattern(name: str) -> re.Pattern[str]:
-    """A pattern of the table by its name."""
-    return re.compile(_filled(_table()[name]), re.IGNORECASE)
 
 
 def _filled(text: str) -> str:

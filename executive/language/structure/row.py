@@ -5,15 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
 
 from executive.language.lexicon import VerbKind
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE
-from executive.language.structure.cutting import Behind, Clause, Kind, pattern
+from executive.language.structure.cutting import ACTS, CLAUSES, Behind, Clause, Kind, spoken
 from executive.language.structure.leaves import Leaf, Leaves, State, Supposed, negated
-from executive.language.structure.telling import template
-from executive.words.blocks import Repeat, Speak
+from executive.language.structure.requests import Done, template
+from executive.words.blocks import Block, Repeat, Speak
 from executive.words.command import Command, Task
 from executive.words.condition import AllOf, Condition, Look, Not
 from executive.words.expression import Template
@@ -58,12 +57,6 @@ class Rounds:
     state: State
 
 
-SPEAKS: Final = re.compile(r"(?:say|tell|announce|greet|inform|remind|let|ask)\b", re.IGNORECASE)
-
-
-_PRONOUN: Final = re.compile(r"(?:it|he|she|they|that|there is one|so)\b", re.IGNORECASE)
-
-
 def end_of(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: bool = False) -> int:
     """Where the clauses end that belong to a condition or to rounds which begin before `at`.
 
@@ -74,7 +67,7 @@ def end_of(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: 
     for n in range(at, len(clauses)):
         one = clauses[n]
         if rounds:
-            goes_on = one.kind in attached or (one.kind is Kind.IF and _PRONOUN.match(one.text) is not None)
+            goes_on = one.kind in attached or (one.kind is Kind.IF and ACTS.pronoun.match(one.text) is not None)
             if (one.begins and n > at and not goes_on) or (n > at and (_after_all(one, first) or one.anyway)):
                 return n
             continue
@@ -106,7 +99,7 @@ def sentence_of(supposed: Supposed) -> str | None:
     """What was found, as it is told; None where it was said otherwise."""
     said = supposed.said
     plain = (
-        not said.startswith("not ") and not pattern("deictic").search(said) and not re.match(r"it\b|there is one", said)
+        not said.startswith("not ") and not CLAUSES.deictic.search(said) and not re.match(r"it\b|there is one", said)
     )
     return said if said and plain else None
 
@@ -167,16 +160,9 @@ def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
     return replace(supposed, condition=Not(there) if isinstance(condition, Not) else there)
 
 
-_CHECKED: Final = re.compile(
-    r"(?:(?P<verb>{checks})(?: if| whether| that) )(?P<what>.+)|(?:is|are) (?P<asked>(?:the|your|that) .+"
-    r"|you .+|it .+)",
-    re.IGNORECASE,
-)
-
-
 def checked(text: str) -> str | None:
     """What is checked, as a statement: "is the door open" becomes "the door is open"."""
-    match = re.fullmatch(_CHECKED.pattern.replace("{checks}", pattern("checks").pattern), text, re.IGNORECASE)
+    match = ACTS.checked.fullmatch(text)
     if match is None:
         return None
     if match["what"] is not None:
@@ -210,3 +196,63 @@ def unclear(found: Behind) -> RefusalError:
 def was_not(clauses: Sequence[Clause], at: int) -> bool:
     """Whether "if not" stood before."""
     return any(one.kind is Kind.NOT for one in clauses[:at])
+
+
+class Base:
+    """Puts the steps of one sentence together. Its methods raise RefusalError.
+
+    `told` is what "tell Robin" tells, `verb` the last verb by which something was to be brought, `notes` say what was
+    taken for what; `special` says that it is more than a list of commands, also where it has no block.
+    """
+
+    told: str | None = None
+    verb: str | None = None
+
+    def __init__(self, leaves: Leaves) -> None:
+        self.leaves = leaves
+        self.notes: list[str] = []
+        self.special = False
+
+    def sequence(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
+        """The steps of clauses, one after the other."""
+        raise NotImplementedError
+
+    def flush(self, row: Row) -> None:
+        """Understand the clauses that are still to be understood."""
+        if not row.plain:
+            return
+        last = row.plain[-1].text
+        leaf, row.plain = self.plain_leaf(row.plain, row.state), []
+        self.add(row, leaf)
+        if row.asked is not None and row.asked.looked:
+            there = re.sub(r"^(?:is|are) there ", "there is ", last, flags=re.IGNORECASE)
+            said = checked(last) or (there if there != last else "")
+            row.asked = replace(row.asked, supposed=replace(row.asked.supposed, said=said))
+
+    def plain_leaf(self, clauses: Sequence[Clause], state: State) -> Leaf:
+        """What clauses that are plain commands ask for together."""
+        return self.leaves.leaf(spoken([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead)
+
+    def add(self, row: Row, leaf: Leaf) -> None:
+        """Put what a plain part asks for."""
+        self.notes += leaf.trace.notes
+        row.steps += [MissionStep(leaf.commands)] if leaf.commands else []
+        before, row.state = row.state, leaf.state
+        row.asked = asked_by(leaf, before, self.leaves)
+
+    def put(self, row: Row, block: Block, state: State) -> None:
+        """Put a block; `state` is what is known behind it."""
+        row.steps.append(MissionStep(block=block))
+        row.state, row.asked = state, None
+
+    def put_done(self, row: Row, done: Done) -> None:
+        """Put steps with what is known behind them, and notes."""
+        steps, row.state, notes = done
+        row.steps += steps
+        row.asked = None
+        self.notes += notes
+
+    def settle(self, row: Row) -> None:
+        """A new sentence begins: what was said before stands for itself, where it is a request."""
+        self.flush(row)
+        row.begun = len(row.steps)

@@ -2,24 +2,318 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from executive.language.cleaning import smoothed
+from executive.language.items import Adverb, Chunk
+from executive.language.lexicon import PrepositionRole
+from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
-from executive.language.questions import RefusalError
+from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
-from executive.language.structure.acts import Acts
-from executive.language.structure.branches import ends_anyway
-from executive.language.structure.cutting import Clause, Kind, behind, cut, reworded
-from executive.language.structure.leaves import Leaves, State, at_start
-from executive.language.structure.row import Row, Steps
-from executive.words.blocks import Ask, Choose, Repeat, Together, Try, steps_of
+from executive.language.roles import Location
+from executive.language.structure.branches import Repeats, ends_anyway
+from executive.language.structure.conditions import suppose
+from executive.language.structure.cutting import ACTS, CLAUSES, Behind, Clause, Kind, behind, cut, reworded
+from executive.language.structure.leaves import Leaves, State, at_start, named, placed, verb
+from executive.language.structure.requests import (
+    Asked,
+    Listener,
+    asked_of,
+    bare,
+    charged,
+    everywhere,
+    for_everyone,
+    look_for,
+    said_by,
+    said_to,
+    serves_all,
+    template,
+    waited,
+)
+from executive.language.structure.row import LookedAt, Row, Steps, checked, end_of, sentence_of
+from executive.words.blocks import Ask, Check, Choose, Repeat, Speak, Together, Try, Wait, steps_of
+from executive.words.command import Task
+from executive.words.condition import Look
+from executive.words.expression import Template
 from executive.words.knowledge import Knowledge
 from executive.words.steps import MissionStep
 
 __all__ = ["Structured", "structured"]
+
+
+class Acts(Repeats):
+    """Reads one clause. Its methods raise RefusalError."""
+
+    def one_clause(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
+        """Take the clause at `at`, which begins with what is to be done; the index of the one behind."""
+        clause = clauses[at]
+        if clause.begins and not _tells_only(row.plain):
+            self.settle(row)
+        if self.verb is not None and at == 0 and ACTS.no_verb.match(clause.text):
+            clause = replace(clause, lead=self.leaves.read(self.verb))
+            clauses = [clause, *clauses[1:]]
+        text = clause.text
+        self.verb = match[0] if (match := ACTS.giving.match(text)) is not None else self.verb
+        if _is_reported(text) and self._reported(row):
+            return at + 1
+        if ACTS.idle.fullmatch(text) is not None:
+            self.flush(row)
+            return at + 1
+        for act in (self._waits, self._asks, self._says, self._checks):
+            if (end := act(row, clauses, at)) is not None:
+                return end
+        found = behind(text)
+        if found is not None and not ACTS.every_room.search(text):
+            self.modified(row, clause, found)
+            return at + 1
+        for act in (self._everyone, self._rooms):
+            if (end := act(row, clauses, at)) is not None:
+                return end
+        row.plain.append(clause)
+        return at + 1
+
+    def _reported(self, row: Row) -> bool:
+        """Whether what was looked at before is answered anyway."""
+        self.flush(row)
+        last = row.steps[-1] if row.steps else None
+        looked = last is not None and (
+            isinstance(last.block, Check) or (bool(last.commands) and last.commands[-1].task is Task.FIND)
+        )
+        self.special = self.special or looked
+        return looked
+
+    def _waits(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        text = clauses[at].text
+        if not re.match(r"(?:wait|stay|remain|pause|hold|stand|linger|go|charge|recharge|dock)\b", text, re.IGNORECASE):
+            return None
+        if row.plain and not re.search(r"\b(?:until|till|for|while|as long as|to)\b", text, re.IGNORECASE):
+            return None
+        state = self.known(row)
+        done = charged(text, state) or waited(text, state, self.leaves)
+        if done is None:
+            return None
+        self.flush(row)
+        self.put_done(row, done)
+        return at + 1
+
+    def known(self, row: Row) -> State:
+        """What is known behind the clauses that are still to be understood."""
+        if not row.plain:
+            return row.state
+        return self.plain_leaf(row.plain, row.state).state
+
+    def _says(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        clause = clauses[at]
+        if (match := ACTS.tells_when.fullmatch(clause.text)) is not None:
+            return self._tells_when(row, match, at)
+        if not ACTS.speaks.match(clause.text) or _asks_back(clause.text, self.leaves):
+            return None
+        if (everywhere_said := ACTS.says_everywhere.fullmatch(clause.text)) is not None:
+            self._in_each(row, replace(clause, joint="", text=everywhere_said[1]))
+            return at + 1
+        found = behind(clause.text)
+        if found is not None and not _spoken_of(found, clause.text):
+            self.modified(row, clause, found)
+            return at + 1
+        said = said_by(clause.text, self.leaves.knowledge, self.leaves.parser)
+        if said is None:
+            return None
+        text = said.text if said.text is not None else self.told
+        if text is None:
+            raise RefusalError(f"what am I to say in '{clause.text}'?", [clause.text])
+        self.flush(row)
+        self._to(row, said.to)
+        self.put(row, Speak(Template(template(text))), row.state)
+        return at + 1
+
+    def _tells_when(self, row: Row, match: re.Match[str], at: int) -> int:
+        """ "Tell me when Robin comes" waits for that, and then tells it."""
+        self.flush(row)
+        supposed = suppose(match["what"], row.state, self.leaves)
+        told = sentence_of(supposed)
+        if told is None:
+            raise RefusalError(f"what am I to say in '{match[0]}'?", [match[0]])
+        self.put(row, Wait(supposed.condition), supposed.holds)
+        said = said_to(match["who"], told, self.leaves.knowledge)
+        self._to(row, said.to)
+        self.put(row, Speak(Template(template(said.text or told))), row.state)
+        return at + 1
+
+    def _to(self, row: Row, listener: Listener | None) -> None:
+        """Go to whom something is said."""
+        if listener is None or not (listener.who or listener.where):
+            return
+        if listener.speaker:
+            leaf = self.leaves.done((verb("come"), Adverb(here=True)), row.state)
+        else:
+            who = placed(self.leaves.read(listener.who), "to") if listener.who else ()
+            where = self.leaves.read(listener.where) if listener.where else ()
+            leaf = self.leaves.done((verb("go"), *who, *placed(where, "in" if who else "to")), row.state)
+        if leaf.commands[-1].goal != row.state.goal or leaf.commands[-1].goal_at is not None:
+            self.add(row, leaf)
+
+    def _asks(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        asked = asked_of(_of_whom(clauses[at].text, row.state), self.leaves.knowledge)
+        if asked is None:
+            return None
+        self.flush(row)
+        self._to(row, asked.of)
+        choices: dict[str, Steps]
+        if asked.yes_or_no:
+            choices, end = self._agreed(asked, row.state, clauses, at + 1)
+        else:
+            choices, end = self._chosen(asked, row.state, clauses, at + 1)
+        self.put(row, Ask(Template(template(asked.text)), choices), replace(row.state, goal=None, at=None))
+        return end
+
+    def _agreed(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
+        """What is done where the answer is yes, and where it is no."""
+        found: dict[str, Steps] = {"yes": (), "no": ()}
+        while at < len(clauses):
+            clause = clauses[at]
+            match = ACTS.answers.match(clause.text) if clause.kind is Kind.IF else None
+            answer = "yes" if clause.kind is Kind.SO else "no" if clause.kind in (Kind.NOT, Kind.OTHERWISE) else None
+            rest = clause.text
+            if match is not None:
+                answer = "no" if match["no"] else "yes"
+                rest = clause.text[match.end() :].strip(" ,")
+            if answer is None or found[answer]:
+                break
+            end = end_of(clauses, at + 1, branch=True)
+            body = [*cut(rest), *clauses[at + 1 : end]]
+            if not body:
+                raise RefusalError(f"what am I to do {clause.cue} {clause.text}?", [clause.cue])
+            found[answer], _ = self.sequence([replace(body[0], joint=""), *body[1:]], self._choosing(asked, 0, state))
+            at = end
+        if at < len(clauses) and not found["yes"] and _brings(clauses[at]):
+            raise RefusalError("say 'if yes' before what is to be done then", [clauses[at].text])
+        return found, at
+
+    def _chosen(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
+        """What is done for each of the choices: it is brought, where that was said."""
+        names = [bare(choice) for choice in asked.choices]
+        if at >= len(clauses) or clauses[at].kind is not None or not _brings(clauses[at]):
+            return dict.fromkeys(names, ()), at
+        brings = replace(clauses[at], joint="")
+        found = [self.sequence([brings], self._choosing(asked, n, state))[0] for n in range(len(names))]
+        return dict(zip(names, found, strict=True)), at + 1
+
+    def _choosing(self, asked: Asked, number: int, state: State) -> State:
+        """What is known behind the answer: "it" is what was chosen, and is given to who was asked."""
+        things = tuple(item.phrase for item in self.leaves.read(asked.choices[number]) if isinstance(item, Chunk))
+        person = Location(named(asked.of.name or "", NounKind.PERSON), "to")
+        memory = replace(state.memory, things=things, gathered=things, where=None, person=person)
+        return replace(state, memory=memory, recipient=person)
+
+    def _checks(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        """ "Look whether the door is open", "is the battery low": what only blocks can check."""
+        text = checked(clauses[at].text)
+        if text is None:
+            return None
+        state = self.known(row)
+        found = behind(text)
+        try:
+            self.leaves.leaf(clauses[at].text, state)
+        except RefusalError as refusal:
+            plain = refusal
+        else:
+            return None
+        if found is not None:
+            return None
+        try:
+            supposed = suppose(text, state, self.leaves)
+        except RefusalError as refusal:
+            said = refusal.question is not None or refusal.kind is RefusalKind.NO_SUCH_DOOR
+            raise (refusal if said else plain) from None
+        self.flush(row)
+        self.notes += supposed.notes
+        look = supposed.condition.command if isinstance(supposed.condition, Look) else None
+        row.steps.append(MissionStep(block=Check(supposed.condition)) if look is None else MissionStep((look,)))
+        row.state, row.asked = supposed.holds, LookedAt(supposed, looked=True)
+        return at + 1
+
+    def _everyone(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        if not serves_all(clauses[at].text):
+            return None
+        done = for_everyone(clauses[at].text, self.known(row), self.leaves)
+        if done is None:
+            return None
+        self.flush(row)
+        row.steps += done[0]
+        row.state, row.asked, self.special = done[1], None, True
+        return at + 1
+
+    def _rooms(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+        text = clauses[at].text
+        if not ACTS.every_room.search(text):
+            return None
+        leaf, end = everywhere(text, self.known(row), self.leaves), at + 1
+        follow = clauses[at + 1].text if at + 1 < len(clauses) and clauses[at + 1].kind is None else ""
+        if leaf is None and ACTS.goes_everywhere.fullmatch(text) is not None:
+            if (match := ACTS.what_there.fullmatch(follow)) is not None:
+                what = next(filter(None, match.groups()))
+                leaf, end = look_for(what, self.known(row), self.leaves), at + 2
+            elif ACTS.speaks.match(follow) and behind(follow) is None:
+                self._in_each(row, replace(clauses[at + 1], joint=""))
+                return at + 2
+        if leaf is None:
+            return None
+        self.flush(row)
+        self.add(row, leaf)
+        self.special = True
+        return end
+
+    def _in_each(self, row: Row, says: Clause) -> None:
+        """Say something in every room."""
+        self.flush(row)
+        for room in self.leaves.knowledge.places:
+            there = Chunk(named(room, NounKind.PLACE), "to", PrepositionRole.GOAL)
+            leaf = self.leaves.done((verb("go"), there), replace(row.state, goal=None))
+            said, row.state = self.sequence([says], leaf.state)
+            row.steps += [MissionStep(leaf.commands), *said]
+        row.asked = None
+
+
+def _tells_only(plain: Sequence[Clause]) -> bool:
+    """Whether it is a statement before a request: "there is a hammer on the bench. bring it"."""
+    return bool(plain) and all(re.match(r"(?:there|the|my|i|it|he|she)\b", one.text, re.IGNORECASE) for one in plain)
+
+
+def _is_reported(text: str) -> bool:
+    more = (
+        r"|tell me how many(?: (?:there are|of them|you (?:see|find)))*"
+        r"|tell me where (?:it|he|she|they) (?:is|are)|tell me (?:if|whether) (?:it|he|she) is"
+    )
+    return re.fullmatch(CLAUSES.reported.pattern + more, text, re.IGNORECASE) is not None
+
+
+def _asks_back(text: str, leaves: Leaves) -> bool:
+    """Whether it asks the robot for something: "tell me where the hammer is", "let me know whether ..."."""
+    return (
+        re.match(
+            r"(?:tell|let) (?:me|us) (?:know )?(?:where|if|whether|what|how|who|which|when)\b", text, re.IGNORECASE
+        )
+        is not None
+    )
+
+
+def _spoken_of(found: Behind, text: str) -> bool:
+    """Whether what would stand behind a clause is a part of what is said."""
+    return found.kind in (Kind.TIMES, Kind.EVERY) and bool(found.text) and not re.match(r"for|until|every", found.text)
+
+
+def _of_whom(text: str, state: State) -> str:
+    """The clause with the name of who is asked, where that is "him"."""
+    person = state.memory.person
+    return text if person is None else re.sub(r"^(ask) (?:him|her)\b", rf"\1 {person.name}", text, flags=re.IGNORECASE)
+
+
+def _brings(clause: Clause) -> bool:
+    return re.match(r"(?:bring|get|fetch|give|take|hand|serve)\b", clause.text, re.IGNORECASE) is not None
 
 
 MOST_NESTED: Final = 2

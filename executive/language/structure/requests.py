@@ -1,0 +1,366 @@
+"""What is waited for, charged to, said and asked, and what is done for everyone and in every room."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+from executive.language.lexicon import Patterns
+from executive.language.nouns import NounKind
+from executive.language.parser import DependencyParser
+from executive.language.questions import RefusalError
+from executive.language.roles import Location
+from executive.language.structure.amounts import AMOUNTS, SPAN, seconds_of, share_of, time_of
+from executive.language.structure.conditions import meeting, pressed, reading, suppose
+from executive.language.structure.cutting import ACTS, CLAUSES
+from executive.language.structure.leaves import Leaf, Leaves, State, Supposed, named, negated, verb
+from executive.words.blocks import Dock, Wait
+from executive.words.command import Task
+from executive.words.knowledge import Knowledge
+from executive.words.steps import MissionStep
+from skills.files.errors import listing
+
+__all__ = [
+    "Asked",
+    "Done",
+    "Listener",
+    "Said",
+    "asked_of",
+    "bare",
+    "charged",
+    "everywhere",
+    "for_everyone",
+    "look_for",
+    "said_by",
+    "said_to",
+    "serves_all",
+    "template",
+    "wait",
+    "waited",
+]
+
+_WAITING: Final = Patterns("structures.yaml", "waiting", AMOUNTS)
+
+Done = tuple[tuple[MissionStep, ...], State, tuple[str, ...]]
+"""Steps, what is known behind them, and notes."""
+
+
+def waited(text: str, state: State, leaves: Leaves) -> Done | None:
+    """A wait for something to be so; None where it is none, or only for some time. Raises RefusalError."""
+    match = _WAITING.wait.fullmatch(text)
+    if match is None or re.fullmatch(rf"(?:about |another )?{SPAN}", match["what"], re.IGNORECASE):
+        return None
+    return wait(match["where"].strip(), match["how"].lower(), match["what"], state, leaves)
+
+
+def wait(where: str, how: str, what: str, state: State, leaves: Leaves) -> Done:
+    """A wait in a place: until something is so, for somebody ("for"), or as long as something is so.
+
+    Raises RefusalError.
+    """
+    steps, there = _gone(where, state, leaves)
+    if how in ("until", "till"):
+        if (passed := _WAITING.passed.fullmatch(what)) is not None and (span := seconds_of(passed["span"])) is not None:
+            return (*steps, MissionStep(block=Wait(seconds=span))), there, ()
+        if (time := time_of(_WAITING.time.sub(r"\g<time>", what))) is not None:
+            notes = (f"I take '{what}' as {time.text}",) if time.taken else ()
+            return ((*steps, MissionStep(block=Wait(until_clock_s=time.seconds))), there, notes)
+        return _until(suppose(what, there, leaves), steps, there)
+    if how == "for":
+        more, there, found = _awaited(what, there, leaves)
+        return _until(found, (*steps, *more), there)
+    found = suppose(what, there, leaves)
+    return _until(replace(found, condition=negated(found.condition), holds=found.fails), steps, there)
+
+
+def _until(found: Supposed, steps: tuple[MissionStep, ...], there: State) -> Done:
+    after = replace(found.holds, goal=found.holds.goal or there.goal)
+    return (*steps, MissionStep(block=Wait(found.condition))), after, found.notes
+
+
+def _gone(where: str, state: State, leaves: Leaves) -> tuple[tuple[MissionStep, ...], State]:
+    """Where it is to be waited, and going there."""
+    if _WAITING.here.fullmatch(where):
+        return (), state
+    match = _WAITING.place.fullmatch(where)
+    if match is None:
+        raise RefusalError(f"I do not understand where to wait: '{where}'", [where])
+    if match["there"] and state.goal is not None and state.at is not None:
+        return (), state
+    leaf = leaves.going(match["place"] or match["there"], state)
+    return (MissionStep(leaf.commands),), leaf.state
+
+
+def _awaited(what: str, state: State, leaves: Leaves) -> tuple[tuple[MissionStep, ...], State, Supposed]:
+    """What "wait for ..." waits for, and going there where a place is said."""
+    if (match := _WAITING.button.fullmatch(what)) is not None:
+        return (), state, pressed(match["button"] or match["of"], what, state)
+    if " to " in what and (found := reading(what, state, leaves)) is not None:
+        return (), state, found
+    if (match := _WAITING.person_at.fullmatch(what)) is not None and leaves.somebody(match["who"], state):
+        leaf = leaves.going(match["where"], state)
+        found = meeting(match["who"], None, what, leaf.state, leaves)
+        return (MissionStep(leaf.commands),), leaf.state, found
+    if leaves.somebody(what, state):
+        return (), state, meeting(what, None, what, state, leaves)
+    raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
+
+
+_FULL: Final = 0.99
+
+
+def charged(text: str, state: State) -> Done | None:
+    """Charging up to a level; None where no level is said."""
+    match = _WAITING.charge.fullmatch(text)
+    if match is None:
+        return None
+    level = _FULL if match["level"].lower().startswith("full") else share_of(match["level"])
+    if level is None:
+        raise RefusalError(f"'{match['level']}' is no charge; say it in percent", [match["level"]])
+    return (MissionStep(block=Dock(level)),), replace(state, goal=None, at=None), ()
+
+
+@dataclass(frozen=True)
+class Listener:
+    """To whom something is said: the speaker, or somebody to go to, by words (`who`), and where they are.
+
+    `name` is that of a known person. Without `who` and `where` it is said on the spot.
+    """
+
+    who: str | None = None
+    where: str | None = None
+    name: str | None = None
+    speaker: bool = False
+
+
+@dataclass(frozen=True)
+class Said:
+    """What is to be said, and to whom; `text` is None where that was not said ("tell Robin")."""
+
+    text: str | None
+    to: Listener | None
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A question to somebody, the things to choose from (with their articles), and whether it is yes or no."""
+
+    text: str
+    of: Listener
+    choices: tuple[str, ...]
+    yes_or_no: bool = False
+
+
+def said_by(text: str, knowledge: Knowledge, parser: DependencyParser) -> Said | None:
+    """What a clause asks to say; None where it asks for nothing of that kind.
+
+    Raises RefusalError: what it asks to say cannot be said for somebody else, or to nobody who is known.
+    """
+    forms = _of_world(knowledge)
+    if (match := forms.say_to.fullmatch(text) or forms.say_whom.fullmatch(text)) is not None:
+        return Said(_words(match["text"], parser), _listener(match))
+    if forms.says_inside.match(text) is not None:
+        raise RefusalError(f"I do not understand to whom to say '{text}'; name one person at the end", [text])
+    if (match := ACTS.say.fullmatch(text)) is not None:
+        return Said(_words(match["text"], parser), None)
+    if (match := forms.greet.fullmatch(text)) is not None:
+        return Said("hello", _listener(match))
+    if (match := forms.announce_to.fullmatch(text)) is not None:
+        return Said(_told(match["text"]), _listener(match))
+    if (match := ACTS.announce.fullmatch(text)) is not None:
+        return Said(_told(match["text"]), None if match["place"] is None else Listener(where=match["place"]))
+    return _relayed(text, forms, parser)
+
+
+def said_to(who: str, text: str, knowledge: Knowledge) -> Said:
+    """Telling somebody something. Raises RefusalError: nobody of that name is known, or it cannot be said for them."""
+    match = _of_world(knowledge).who.fullmatch(who)
+    if match is None:
+        raise RefusalError(f"I do not know to whom to say it: '{who}'", [who])
+    return Said(_told(text), _listener(match))
+
+
+def _relayed(text: str, forms: Patterns, parser: DependencyParser) -> Said | None:
+    """ "Tell Robin that dinner is ready", "let Robin know it", "ask Robin to come"."""
+    match = forms.tell_that.fullmatch(text) or forms.let_know_that.fullmatch(text)
+    if match is not None and not ACTS.question.match(match["text"]):
+        return Said(_told(match["text"]), _listener(match))
+    if (match := forms.tell_to.fullmatch(text)) is not None:
+        return Said(_told(f"please {match['act']}"), _listener(match))
+    match = forms.tell.fullmatch(text) or forms.let_know.fullmatch(text)
+    if match is None:
+        return None
+    said = match["text"]
+    if said is not None and re.match(r"(?:and|or)\b", said, re.IGNORECASE):
+        raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
+    if said is None or re.fullmatch(r"so|it|that|about it|about that", said, re.IGNORECASE):
+        return Said(None, _listener(match))
+    if CLAUSES.greetings.fullmatch(said) or (not ACTS.question.match(said) and _clause(said, parser)):
+        return Said(_told(said), _listener(match))
+    raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
+
+
+def _clause(text: str, parser: DependencyParser) -> bool:
+    """Whether it is a whole statement: a finite verb with its subject before it."""
+    tokens = parser.parse(text)
+    verbs = {t.index for t in tokens if t.tag in ("VBZ", "VBP", "VBD", "MD") or t.relation == "root"}
+    finite = any(t.tag in ("VBZ", "VBP", "VBD", "MD") for t in tokens)
+    return finite and any(t.relation in ("nsubj", "nsubjpass", "expl") and t.head in verbs for t in tokens)
+
+
+def _words(text: str, parser: DependencyParser) -> str:
+    """Words that are to be said. Raises RefusalError: they name what to say, or somebody who is not known."""
+    clause = _clause(text, parser)
+    whom = re.search(r" to (?:the|a|an|my|our|all|every|each|some|any|somebody|someone)\b.*$", text, re.IGNORECASE)
+    if whom is not None and not clause:
+        raise RefusalError(f"I do not know to whom to say it: '{whom[0].strip()}'", [whom[0].strip()])
+    if ACTS.named.match(text) and not clause:
+        raise RefusalError(f"what are the words of '{text}'?", [text])
+    return _literal(text)
+
+
+def _literal(text: str) -> str:
+    """Words that are said as they are. Raises RefusalError: they only stand for some."""
+    if ACTS.nothing.fullmatch(text) or ACTS.question.match(text) or re.match(r"to\b", text, re.IGNORECASE):
+        raise RefusalError(f"what am I to say? '{text}' says nothing", [text])
+    return text.strip(" ,.'\"")
+
+
+def _told(text: str) -> str:
+    """What is told in the speaker's name. Raises RefusalError: another voice would change what it means."""
+    word = CLAUSES.deictic.search(text) or ACTS.inner.search(text)
+    if word is not None:
+        raise RefusalError(f"I cannot say '{text}' for you: '{word[0]}' would mean somebody or something else", [text])
+    return _literal(text)
+
+
+def template(text: str) -> str:
+    """The text with its braces kept."""
+    return text.replace("{", "{{").replace("}", "}}")
+
+
+def _of_world(knowledge: Knowledge) -> Patterns:
+    """The forms of speaking to somebody in a world."""
+    people, places = knowledge.spellings(knowledge.people), knowledge.spellings(knowledge.place_names())
+    return _with_names(tuple(people), tuple(places))
+
+
+@lru_cache(maxsize=16)
+def _with_names(people: tuple[str, ...], places: tuple[str, ...]) -> Patterns:
+    longest = [sorted(map(re.escape, names), key=len, reverse=True) for names in (people, places)]
+    names, around = ("|".join(spelled) or "(?!)" for spelled in longest)
+    return ACTS.filled(names=names, around=around)
+
+
+_SPEAKER: Final = frozenset({"me", "us"})
+_SOMEBODY: Final = frozenset({"him", "her"})
+
+
+def _listener(match: re.Match[str]) -> Listener:
+    who, where = match["who"], match["where"]
+    word = who.lower()
+    if word in _SPEAKER:
+        return Listener(who, speaker=True)
+    if word in _SOMEBODY:
+        return Listener(who)
+    if word in ("them", "the others", "everyone", "everybody") or " " in word:
+        return Listener(where=where)
+    return Listener(who, where, name=who)
+
+
+def asked_of(text: str, knowledge: Knowledge) -> Asked | None:
+    """The question that a clause asks to put to somebody; None where it is none.
+
+    Raises RefusalError: it is none that the robot can put.
+    """
+    forms = _of_world(knowledge)
+    if not re.match(r"ask\b", text, re.IGNORECASE) or forms.ask_to.fullmatch(text):
+        return None
+    text = re.sub(r" or not$", "", text, flags=re.IGNORECASE)
+    match, open_one = forms.wants_one.fullmatch(text), forms.wants_what.fullmatch(text)
+    found = match or open_one
+    if found is None or _listener(found).name is None:
+        raise RefusalError(
+            f"I do not understand the question in '{text}'; I can ask somebody by name whether they want this or that",
+            [text],
+        )
+    if match is None and open_one is not None:
+        return _what(open_one, text, knowledge)
+    assert match is not None
+    if (word := CLAUSES.deictic.search(match["what"])) is not None:
+        raise RefusalError(f"I cannot ask that for you: '{word[0]}' would mean somebody else", [text])
+    choices = tuple(re.split(r",? or |, ", match["what"], flags=re.IGNORECASE))
+    return Asked(f"Do you want {match['what']}?", _listener(match), choices, yes_or_no=len(choices) == 1)
+
+
+def _what(match: re.Match[str], text: str, knowledge: Knowledge) -> Asked:
+    """ "What he wants to drink": all that is known of that kind."""
+    kind = (match["kind"] or ("drink" if "drink" in text.lower() else "")).lower()
+    names = knowledge.classes(kind.removesuffix("s")) if kind else ()
+    if not names:
+        raise RefusalError(f"I do not know what there is to choose from in '{text}'; name it", [text])
+    spoken = f"What {'do you want to drink' if match['kind'] is None else f'{kind} do you want'}?"
+    if match["kind"] is not None:
+        spoken = f"Which {kind} do you want?"
+    return Asked(spoken, _listener(match), tuple(f"a {name}" for name in names))
+
+
+def bare(choice: str) -> str:
+    """The choice without its article."""
+    return re.sub(r"^(?:a|an|some|the|any|another) ", "", choice, flags=re.IGNORECASE)
+
+
+def serves_all(text: str) -> bool:
+    """Whether something is brought to several people at once."""
+    return ACTS.gives.match(text) is not None and ACTS.everyone.search(text) is not None
+
+
+def for_everyone(text: str, state: State, leaves: Leaves) -> tuple[tuple[MissionStep, ...], State] | None:
+    """A step for each person to whom something is brought; None where it is brought to nobody of that kind.
+
+    Raises RefusalError: it does not say in which room, nobody is known to be there, or there is only one of the thing.
+    """
+    trace = leaves.actions(text, state)
+    to = next((one.goal for one in trace.actions if one.goal is not None and _all_people(one.goal)), None)
+    if to is None or to.phrase is None:
+        return None
+    who = to.phrase.spoken
+    if to.within is None:
+        raise RefusalError(f"I bring things to one person at a time, not to {who}; name one, or a room", [who])
+    room, knowledge = leaves.room_of(to.within, state), leaves.knowledge
+    people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
+    if not people:
+        raise RefusalError(f"I know nobody in the {room} to bring anything to: {who}", [who])
+    steps: list[MissionStep] = []
+    begun = state
+    for name in people:
+        person = Location(named(name, NounKind.PERSON), "to", to.within)
+        actions = [replace(one, goal=person) if one.goal == to else one for one in trace.actions]
+        leaf = leaves.acted(trace, actions, begun)
+        if any(action.target is not None and not action.target.indefinite for action in leaf.trace.resolved):
+            raise RefusalError(f"there is one of it, and I cannot bring it to {who}", [who])
+        steps.append(MissionStep(leaf.commands))
+        begun = replace(leaf.state, memory=state.memory)
+    return tuple(steps), begun
+
+
+def _all_people(goal: Location) -> bool:
+    return goal.phrase is not None and ACTS.everyone.fullmatch(goal.phrase.spoken) is not None
+
+
+def everywhere(text: str, state: State, leaves: Leaves) -> Leaf | None:
+    """A look over all rooms; None where the text asks for none. Raises RefusalError: for what is unclear."""
+    match = next((found for form in ACTS.each("looks") if (found := form.fullmatch(text)) is not None), None)
+    return None if match is None else look_for(match["what"], state, leaves)
+
+
+def look_for(what: str, state: State, leaves: Leaves) -> Leaf:
+    """Looking for something or somebody wherever they may be. Raises RefusalError."""
+    leaf = leaves.leaf(what, state, (verb("find"),))
+    finds = [command for command in leaf.commands if command.task is Task.FIND]
+    if len(finds) != len(leaf.commands) or re.search(r"\b(?:in|on|at|near)\b", what):
+        raise RefusalError(f"I cannot look for {listing([what])} in every room", [what])
+    commands = tuple(replace(command, goal=None, goal_at=None) for command in finds)
+    return replace(leaf, commands=commands, state=replace(leaf.state, goal=None, at=None))

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 from executive.app.prepare import Setting, instead, prepare
 from executive.app.prepared import Prepared, compiled_request
-from executive.app.report import RunReport
 from executive.language.questions import Answerer
 from executive.mission.request import Request
 from executive.record.reader import Event, read_events
 from executive.record.schemas import RUN
-from executive.store.database import STORE_FILE
 from executive.store.journal import StoreJournal
 from executive.store.memory import Recollection
-from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.store.missions import MissionStore, StoredMission
 from executive.store.resuming import ended_tree, resumed_tree
 from executive.words.slug import slug
-from skills.files.errors import InputError, disk_is_full
+from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 STORE: Final = "missions.sqlite"
@@ -201,40 +199,3 @@ def _text(file: Path) -> str | None:
         return file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         return None
-
-
-@contextmanager
-def kept(store: MissionStore, mission: StoredMission) -> Iterator[Callable[[RunReport], None]]:
-    """Note in the store that a mission is under way, and, when told the report, how it ended.
-
-    A run that could not begin leaves things as they were; of one that is killed, or breaks off since the disk is full,
-    nobody notes anything. Raises InputError, which names the way on: the disk is full.
-    """
-    store.begin(mission.id)
-    over = False
-
-    def ended(report: RunReport) -> None:
-        nonlocal over
-        over = True
-        store.finish(mission.id, MissionState(report.outcome), report.message)
-
-    try:
-        yield ended
-    except OSError as error:
-        raise STORE_FILE.full_disk(store.path) if disk_is_full(error) else error from error
-    except InputError:
-        if over:
-            raise
-        if mission.queued or mission.starts:
-            store.never_began(mission)
-        else:
-            store.remove(mission.id)
-        raise
-
-
-def give_up_broken(store: MissionStore, mission: StoredMission) -> Sequence[StoredMission]:
-    """Missions that were broken off can no longer be taken up once another begins in a fresh world."""
-    broken = store.missions(MissionState.RUNNING)
-    for each in broken:
-        store.finish(each.id, MissionState.CANCELLED, f"broken off, and given up for mission {mission.id}")
-    return broken

@@ -124,7 +124,7 @@ def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
         if each.id in wholes:
             continue
         if each.id not in known:
-            from executive.cli.queue_run import broken_off
+            from executive.app.runs import broken_off
 
             raise broken_off(missions, each)
         if known[each.id].blocked is not None:

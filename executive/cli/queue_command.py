@@ -124,21 +124,23 @@ def run(
     as_json: AS_JSON = False,
 ) -> None:
     """Run all that is queued, each mission in the world as the one before has left it."""
-    from executive.cli.queue_run import resumable_line, run_queue
+    from executive.app.runs import MissionRuns, queued, resumable_line, run_in_turn
+    from executive.cli.shown import ConsoleScreen
 
     console = console_for(as_json)
     with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
-        results = run_queue(missions, console, quiet=quiet)
+        runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
+        ended = run_in_turn(queued(missions), runs)
         resumable = resumable_line(missions)
-    if results:
-        console.print(f"{sum(result['achieved'] for result in results)} of {len(results)} missions achieved")
+    if ended:
+        console.print(f"{sum(each.achieved for each in ended)} of {len(ended)} missions achieved")
     else:
         console.print("Nothing is queued; `errand queue add` queues a mission, `errand queue list` shows all.")
     if resumable is not None:
         console.print(resumable, markup=False)
     if as_json:
-        print_json({"missions": results})
-    if not all(result["achieved"] for result in results):
+        print_json({"missions": [each.to_json() for each in ended]})
+    if not all(each.achieved for each in ended):
         raise typer.Exit(NOT_ACHIEVED)
 
 

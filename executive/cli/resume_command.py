@@ -11,7 +11,7 @@ from executive.app.durable import STORE as STORE_NAME
 from executive.cli.number_options import quantity_option
 from executive.cli.options import AS_JSON, QUIET
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
-from executive.cli.queue_run import go_on, run_or_set_aside, run_queue
+from executive.cli.terminal import terminal_answerer
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from skills.files.errors import InputError, listing
 from skills.quantities import Count
@@ -32,15 +32,15 @@ def resume(
     """Go on with the mission that was broken off or cancelled, from its last finished step; then with its queue."""
     console = console_for(as_json)
     with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
+        from executive.app.runs import MissionRuns, queued, run_in_turn
+        from executive.cli.shown import ConsoleScreen
+
         chosen = _broken_off(missions, mission)
-        if chosen.queued:
-            results = [run_or_set_aside(go_on, missions, chosen, console, quiet=quiet)]
-            results += run_queue(missions, console, quiet=quiet)
-        else:
-            results = [go_on(missions, chosen, console, quiet=quiet)]
+        runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
+        ended = [runs.run(chosen), *(run_in_turn(queued(missions), runs) if chosen.queued else ())]
     if as_json:
-        print_json({**results[0], "then": results[1:]})
-    if not all(result["achieved"] for result in results):
+        print_json({**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]})
+    if not all(each.achieved for each in ended):
         raise typer.Exit(NOT_ACHIEVED)
 
 

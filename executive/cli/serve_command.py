@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from datetime import timedelta
 from pathlib import Path
 from typing import Annotated, Final
@@ -14,6 +13,7 @@ from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_option
 from executive.cli.options import AS_JSON, QUIET, STORE
 from executive.cli.output import console_for, print_json, refusals
+from executive.cli.terminal import terminal_answerer
 from executive.store.missions import MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.wakeup import WakeupPipe
@@ -44,8 +44,8 @@ def serve(
 ) -> None:
     """Wait for triggers and run what is queued, until Ctrl-C: at times, on a full battery, calls and messages."""
     from executive.app.listeners import CallAddress, Listeners
-    from executive.cli.queue_run import resumable_line
-    from executive.cli.queue_serve import MissionRunner, QueueServer
+    from executive.app.runs import MissionRuns, QueueServer, resumable_line
+    from executive.cli.shown import ConsoleScreen
 
     console = console_for(as_json)
     limit = None if for_s is None else timedelta(seconds=min(for_s, _LONGEST_S))
@@ -57,7 +57,10 @@ def serve(
         end = None if limit is None else missions.now() + limit
         address = CallAddress(host, port, token)
         with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
-            standing, runner = StandingMissions(missions), MissionRunner(missions, console, quiet=quiet)
+            standing, runner = (
+                StandingMissions(missions),
+                MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer()),
+            )
             server = QueueServer(missions, standing, wakeup, runner, follow=listeners.follow, tell=tell)
             with ended_by_signals(server.stop):
                 tell(f"Standing missions: {len(standing.missions())} ({missions.path}). Ctrl-C ends.")
@@ -67,4 +70,4 @@ def serve(
     if resumable is not None:
         tell(resumable)
     if as_json:
-        print_json({"missions": [asdict(each) for each in ended]})
+        print_json({"missions": [{"mission": e.mission, "outcome": e.outcome, "achieved": e.achieved} for e in ended]})

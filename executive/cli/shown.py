@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -13,11 +14,13 @@ from rich.text import Text
 
 from executive.app.durable import STORE
 from executive.app.mission_run import Finished, both
+from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.talk import Talk, load_ahead
 from executive.cli.live import live_view
 from executive.language.parser import load_parser
 from executive.record.event_log import Listener
+from executive.record.profile import Profile
 from executive.record.schemas import SPEECH
 from executive.run.control import Control
 from executive.run.runner import Observer
@@ -111,7 +114,53 @@ def show_run(
     return finished
 
 
-def show_files(out: Path, console: Console) -> None:
-    """Name what was left in a folder, but for what the store keeps there."""
-    names = sorted(path.name for path in out.iterdir() if not path.name.startswith(Path(STORE).stem))
-    console.print(f"Written to {out}: {', '.join(names)}", markup=False)
+class ConsoleScreen:
+    """Shows runs on the console, and has them controlled from there (`executive.app.runs.Screen`).
+
+    `page` makes the live page of a run, where one is wanted; `shown_page` is the last one. With `whole_tree` all nodes
+    of a tree are shown in the end, and `profile` times the subsystems.
+    """
+
+    def __init__(
+        self,
+        console: Console,
+        *,
+        quiet: bool,
+        whole_tree: bool = False,
+        voice: Voice = SILENCE,
+        page: Callable[[Prepared], PageView] | None = None,
+        profile: Profile | None = None,
+    ) -> None:
+        self._console, self._quiet, self._whole_tree, self._voice = console, quiet, whole_tree, voice
+        self._page, self._profile = page, profile
+        self.shown_page: PageView | None = None
+
+    def tell(self, line: str, *, title: bool = False) -> None:
+        """Show a line."""
+        self._console.print(line, markup=False, style="bold" if title else None)
+
+    def control(self, prepared: Prepared) -> Control:
+        """The control of a run: its page's, else the console's."""
+        if self._page is None:
+            return control_for(self._console, quiet=self._quiet)
+        self.shown_page = self._page(prepared)
+        return self.shown_page.control
+
+    def show(self, prepared: Prepared, control: Control, start: Callable[..., Finished]) -> Finished:
+        """Show a run from its beginning to its end."""
+        page = self.shown_page
+        return show_run(
+            partial(start, page=page, profile=self._profile),
+            prepared,
+            self._console,
+            control=control,
+            quiet=self._quiet,
+            whole_tree=self._whole_tree,
+            talk=None if page is None else page.talk,
+            voice=self._voice,
+        )
+
+    def name_files(self, out: Path) -> None:
+        """Name what was left in a folder, but for what the store keeps there."""
+        names = sorted(path.name for path in out.iterdir() if not path.name.startswith(Path(STORE).stem))
+        self.tell(f"Written to {out}: {', '.join(names)}")

@@ -33,7 +33,7 @@ RUN = """
     from scripted_backend import ScriptedBackend
     from executive.cli import (shown)
     from executive.app import prepare as preparing
-    from executive.app.durable import kept
+    from executive.app.runs import noted
     from executive.app.mission_run import run_request
     from executive.app.prepare import prepare
     from executive.mission.request import Request
@@ -54,7 +54,7 @@ RUN = """
 
     with MissionStore(out / "missions.sqlite") as store:
         mission = store.add(prepared.request, queued=False)
-        with kept(store, mission) as ended:
+        with noted(store, mission) as ended:
             console = Console()
             control = shown.control_for(console, quiet=False)
             finished = shown.show_run(start, prepared, console, control=control, quiet=False)

@@ -11,10 +11,9 @@ import pytest
 from py_trees.common import Status
 from typer.testing import CliRunner
 
-from executive.app import simulated
 from executive.app.mission_run import Finished
 from executive.app.report import RefereeReport, RunReport
-from executive.cli import entry, queue_run
+from executive.cli import entry
 from executive.mission.mission import mission_from_commands
 from executive.run.journal import TickNote
 from executive.store.missions import MissionStore
@@ -26,6 +25,8 @@ from executive.tree.snapshot import Change, NodeState
 from executive.words.command import Command
 from skills.files.errors import InputError
 from skills.robot import Pose2D
+
+RUN_SIMULATED = "executive.app.runs.run_simulated"
 
 
 class GoneError(BaseException):
@@ -86,8 +87,7 @@ def change(store, **values):
 @pytest.fixture
 def plant(monkeypatch):
     stand_in = Plant()
-    for module in (simulated, queue_run):
-        monkeypatch.setattr(module, "run_simulated", stand_in)
+    monkeypatch.setattr(RUN_SIMULATED, stand_in)
     monkeypatch.setattr("executive.app.prepare.load_parser", lambda: None)  # no step here is a sentence
     return stand_in
 
@@ -198,7 +198,7 @@ def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(erra
         raise GoneError
 
     with monkeypatch.context() as patch, pytest.raises(GoneError):
-        patch.setattr(simulated, "run_simulated", corrected)
+        patch.setattr(RUN_SIMULATED, corrected)
         errand("run", mission("first"), "--quiet")
     result = errand("resume", "--quiet")
     assert result.exit_code == 0, result.output
@@ -240,7 +240,7 @@ def test_what_took_the_place_of_one_robots_part_is_resumed_beside_the_others(err
         raise GoneError
 
     with monkeypatch.context() as patch, pytest.raises(GoneError):
-        patch.setattr(simulated, "run_simulated", corrected)
+        patch.setattr(RUN_SIMULATED, corrected)
         errand("run", two, "--quiet")
     result = errand("resume", "--quiet")
     assert result.exit_code == 0, result.output
@@ -349,7 +349,7 @@ def test_a_run_that_cannot_begin_leaves_no_mission_behind(errand, mission, monke
     def refuse(*_, **__):
         raise InputError("the world is full")
 
-    monkeypatch.setattr(simulated, "run_simulated", refuse)
+    monkeypatch.setattr(RUN_SIMULATED, refuse)
     assert errand("run", mission("alone"), "--quiet").exit_code == 2
     assert states() == []
 
@@ -499,7 +499,7 @@ def test_a_signal_during_a_mission_ends_the_server_and_keeps_the_queue(errand, m
         return Plant.__call__(plant, prepared, **options)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(queue_run, "run_simulated", signalled)
+        patch.setattr(RUN_SIMULATED, signalled)
         errand("queue", "add", mission("first"))
         errand("queue", "add", mission("second"))
         result = errand("queue", "serve", "--quiet")
@@ -596,7 +596,7 @@ def test_a_defect_in_a_run_sets_its_mission_aside_and_keeps_the_traceback(errand
     errand("queue", "add", mission("first"))
     errand("queue", "add", mission("second"))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(queue_run, "run_simulated", broken)
+        patch.setattr(RUN_SIMULATED, broken)
         result = errand("queue", "run", "--quiet")
     assert (result.exit_code, states()) == (1, ["error", "success"])
     assert "(ZeroDivisionError: by a plug-in)" in ended(errand)[0][1]
@@ -637,7 +637,7 @@ def test_a_mission_that_could_not_begin_does_not_give_the_next_one_a_fresh_world
     for name in ("first", "second", "third"):
         errand("queue", "add", mission(name))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(queue_run, "run_simulated", refuse_second)
+        patch.setattr(RUN_SIMULATED, refuse_second)
         errand("queue", "run", "--quiet")
     assert [run[3].take_up for run in plant.runs] == [False, True]
 

@@ -1,4 +1,4 @@
-"""`errand queue serve`: what it runs and when, on a clock that the test drives and with missions that a stub runs."""
+"""Missions of a store in their turn, on a clock that the test drives and with missions that a stub runs."""
 
 import http.client
 import json
@@ -9,18 +9,20 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 from typer.testing import CliRunner
 
-from executive.cli import queue_serve
+from executive.app.mission_run import Finished
+from executive.app.report import RefereeReport, RunReport
+from executive.app.runs import MOST_STARTS, Ended, MissionRuns, QueueServer
 from executive.cli.entry import app
-from executive.cli.queue_serve import MOST_STARTS, Ended, MissionRunner, QueueServer
 from executive.mission.request import Request
+from executive.run.control import Control
 from executive.run.journal import TickNote
 from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.triggers import Missed, OnCall, trigger_of
+from executive.tree.node_view import node_view
 from skills.files.errors import InputError
 
 REQUEST = Request("go to the kitchen", name="go kitchen", world_name="flat", robot="Alice", commands=("Take",))
@@ -254,57 +256,80 @@ def test_what_cannot_be_listened_to_ends_it_at_the_beginning_and_is_told_once_la
         server.serve()
 
 
-class TestMissionRunner:
-    """The runner of the simulated world, its runs stubbed."""
+GO = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
+
+
+class Screen:
+    """Remembers what it is told, and shows nothing."""
+
+    def __init__(self):
+        self.lines = []
+
+    def tell(self, line, *, title=False):
+        self.lines.append(line)
+
+    def control(self, prepared):
+        return Control(pace=None)
+
+    def show(self, prepared, control, start):
+        return start(control=control)
+
+    def name_files(self, out):
+        self.lines.append(f"files in {out.name}")
+
+
+class TestMissionRuns:
+    """Missions of a store, run by what stands in for the simulated world."""
 
     @pytest.fixture
-    def runner(self, store):
-        return MissionRunner(store, Console(quiet=True), quiet=True)
+    def mission(self, store, tmp_path):
+        return store.add(
+            Request(commands=(GO,), name="go", world_name="flat", robot="Alice", out=tmp_path), queued=True
+        )
 
     @pytest.fixture
-    def mission(self, store):
-        return store.add(REQUEST, queued=True)
+    def runs(self, store):
+        def of(run):
+            return MissionRuns(store, Screen(), run=run)
 
-    def test_a_mission_that_cannot_begin_ends_with_an_error_and_the_queue_goes_on(
-        self, runner, store, mission, monkeypatch
-    ):
-        def refuse(*_, **__):
+        return of
+
+    def test_a_mission_that_cannot_begin_ends_with_an_error_and_the_queue_goes_on(self, runs, store, mission):
+        def refuse(prepared, **_):
             raise InputError("the world is full", hint="take another")
 
-        monkeypatch.setattr(queue_serve, "start_of", refuse)
-        assert runner.run(mission) == Ended(1, "error", False)
+        ended = runs(refuse).run(mission)
+        assert (ended.outcome, ended.achieved, ended.report) == ("error", False, None)
         assert store.mission(1).message == "the world is full; take another"
         assert store.mission(1).state is MissionState.ERROR
 
-    def test_a_full_disk_ends_the_server(self, runner, store, mission, monkeypatch):
-        def refuse(*_, **__):
-            store.begin(1)
+    def test_a_full_disk_ends_the_queue(self, runs, store, mission):
+        def fill(prepared, **_):
             raise STORE_FILE.full_disk(store.path)
 
-        monkeypatch.setattr(queue_serve, "start_of", refuse)
         with pytest.raises(InputError, match="the disk is full"):
-            runner.run(mission)
-        assert store.mission(1).state is MissionState.RUNNING
+            runs(fill).run(mission)
 
-    def test_what_is_cancelled_before_it_begins_begins_cancelled(self, runner, mission, monkeypatch):
-        controls = []
+    def test_what_is_cancelled_before_it_begins_begins_cancelled(self, runs, mission):
+        begun = runs(cancelled_by_control)
+        begun.cancel("cancelled by SIGTERM")
+        assert begun.run(mission).message == "cancelled by SIGTERM"
 
-        def start(*_, control, **__):
-            controls.append(control)
-            return {"outcome": "cancelled", "achieved": False}
+    def test_a_mission_under_way_is_cancelled(self, runs, mission):
+        def start(prepared, *, control, **_):
+            begun.cancel("cancelled by SIGINT")
+            return cancelled_by_control(prepared, control=control)
 
-        monkeypatch.setattr(queue_serve, "start_of", start)
-        runner.cancel("cancelled by SIGTERM")
-        assert runner.run(mission) == Ended(1, "cancelled", False)
-        assert controls[0].poll().cancel == "cancelled by SIGTERM"
+        begun = runs(start)
+        assert begun.run(mission).message == "cancelled by SIGINT"
 
-    def test_a_mission_under_way_is_cancelled(self, runner, mission, monkeypatch):
-        def start(*_, control, **__):
-            runner.cancel("cancelled by SIGINT")
-            return {"outcome": control.poll().cancel, "achieved": False}
 
-        monkeypatch.setattr(queue_serve, "start_of", start)
-        assert runner.run(mission).outcome == "cancelled by SIGINT"
+def cancelled_by_control(prepared, *, control, **_):
+    """The end of a run that somebody has cancelled."""
+    report = RunReport(
+        "cancelled", None, control.poll().cancel, RefereeReport(False, "", 0, 0), (), "flat", 1, 1.0, 1.0, 1.0, 1, "log"
+    )
+    return Finished(report, node_view(prepared.tree.root))
 
 
 @pytest.mark.mission

@@ -1,7 +1,7 @@
-# make env    the virtual environment .venv with all but what only training needs
+# make env    the virtual environment .venv with all but torch
 # make demo   one mission, end to end; look into out/ (sets up what missions need, and no more)
 # make test   a test of everything, and one mission of each kind; those that train networks only after `make train`
-# make train  adds the distribution errand-train (`errand dataset`) and torch, to train the detector and the speech adapter
+# make train  adds torch to it, to train the detector and the speech adapter
 # make check  lint, format and strict types
 # make bench  benchmarks, as ratios
 # make nightly  further missions, tutorials, seeds and worlds, and the smallest case of each measure
@@ -31,10 +31,11 @@ env: $(VENV)/.ready
 
 $(VENV)/.ready: $(VENV)/.run
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,objects,cluster,test,browser,bench,dev]'
+	$(BIN)/python -m pip install --quiet --no-deps --editable training
 	$(BIN)/errand warm-up
 	@touch $@
 
-$(VENV)/.run: pyproject.toml constraints.txt | debian
+$(VENV)/.run: pyproject.toml training/pyproject.toml constraints.txt | debian
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' \
 	  || { echo "Errand needs Python 3.11; set PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -43,7 +44,7 @@ $(VENV)/.run: pyproject.toml constraints.txt | debian
 
 train: $(VENV)/.train
 
-$(VENV)/.train: training/pyproject.toml $(VENV)/.ready
+$(VENV)/.train: $(VENV)/.ready
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[speech]' --editable training
 	@touch $@
 

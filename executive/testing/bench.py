@@ -17,9 +17,12 @@ from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
 from skills.faults.faulty_robot import with_faults
 from skills.faults.kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.words import Fault, parse_fault
-from skills.robot import Clock, Robot
+from skills.robot import Capabilities, Clock, Robot
+from skills.testing.blocks import ROOM, TABLE_CAN, Block
+from skills.testing.clock import VirtualClock
 from skills.testing.detector import PlainColours
 from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.robot import ScriptedRobot, Start
 
 TICK_S = 0.05
 HOLDER = "test"
@@ -149,3 +152,18 @@ class SkillBench:
             context.publish("errors", {"node": "estimators", "traceback": repr(defect)})
         finally:
             self.sensing = False
+
+
+def scripted_bench(
+    capabilities: Capabilities,
+    start: Start = Start(),  # noqa: B008 - frozen
+    blocks: Sequence[Block] = (*ROOM, TABLE_CAN),
+    *,
+    localised: bool = True,
+) -> tuple[SkillBench, ScriptedRobot]:
+    """A bench with a scripted robot, and that robot; it stands in the room with a table and a can unless said."""
+    clock = VirtualClock()
+    robot = ScriptedRobot(clock, capabilities=capabilities, blocks=blocks, start=start)
+    place = KnownPlace(start.pose)
+    place.localised = localised
+    return SkillBench(robot, clock, localiser=place, costmap=BlockCostmap(blocks)), robot

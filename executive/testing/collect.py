@@ -11,7 +11,7 @@ import pytest
 
 from executive.testing.skill_test import SkillTestFile, load_skill_tests
 from executive.testing.suite import PARTS, SuiteCase
-from executive.testing.trial import BenchMakers, carry_out, scripted
+from executive.testing.trial import BenchMakers, bench_of_setup, carry_out
 from skills.api import Skill
 from skills.faults.kinds import STANDARD_FAULTS, FaultKind
 from skills.files.errors import InputError
@@ -49,7 +49,7 @@ class SkillTestModule(pytest.File):
     def _suite(self, tests: SkillTestFile, index: int) -> Iterator[pytest.Item]:
         """One item for each part; they share the run in which nothing goes wrong."""
         test, skill = tests.tests[index], self.settings.skills[tests.skill]
-        make = partial(scripted, self.settings.capabilities, test.robot or tests.robot, test.world or tests.world)
+        make = partial(bench_of_setup, self.settings.capabilities, test.robot or tests.robot, test.world or tests.world)
         case = SuiteCase(skill, tests.inputs(index, skill), make)
         for name, part in PARTS.items():
             yield SuiteItem.from_parent(

@@ -12,22 +12,19 @@ Write a class in a test file and pytest runs all of it:
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-from executive.testing.bench import SkillBench, SkillRun
+from executive.testing.bench import SkillBench, SkillRun, scripted_bench
 from skills.api import Cause, Skill
 from skills.faults.kinds import SENSE_VERBS, VERBS, Call, Effect, InjectedFault
 from skills.faults.words import Fault
 from skills.robot import Capabilities
-from skills.testing.blocks import ROOM, TABLE_CAN, Block
-from skills.testing.clock import VirtualClock
-from skills.testing.estimators import BlockCostmap, KnownPlace
-from skills.testing.robot import ScriptedRobot, Start
+from skills.testing.robot import ScriptedRobot
 
 STILL_WITHIN_S = 0.2
 _OWN_VERBS = ("acquire_lease", "take_lease", "return_lease", "lease_holder")
@@ -66,21 +63,6 @@ class SuiteCase:
             return list(range(1, ticks))
         step = (ticks - 2) / (self.samples - 1)
         return sorted({round(1 + n * step) for n in range(self.samples)})
-
-
-def scripted_bench(
-    capabilities: Capabilities, start: Start | None = None, blocks: Sequence[Block] = (*ROOM, TABLE_CAN)
-) -> Callable[[], tuple[SkillBench, ScriptedRobot]]:
-    """What makes benches with a scripted robot, in the room with a table and a can unless said."""
-    start = start or Start()
-
-    def make() -> tuple[SkillBench, ScriptedRobot]:
-        clock = VirtualClock()
-        robot = ScriptedRobot(clock, capabilities=capabilities, blocks=blocks, start=start)
-        bench = SkillBench(robot, clock, localiser=KnownPlace(start.pose), costmap=BlockCostmap(blocks))
-        return bench, robot
-
-    return make
 
 
 def cancelled_at_every_tick(case: SuiteCase) -> Iterator[str]:
@@ -193,7 +175,7 @@ class SkillSuite:
 
     def bench(self, capabilities: Capabilities) -> tuple[SkillBench, ScriptedRobot]:
         """A new bench; by default the scripted Spot stands at the origin of the room, before the table."""
-        return scripted_bench(capabilities)()
+        return scripted_bench(capabilities)
 
     def test_it_can_be_cancelled_at_every_tick(self, robot_capabilities: Capabilities) -> None:
         """Motion ends within 0.2 s and nothing raises."""

@@ -8,14 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from executive.testing.bench import SkillBench, SkillRun
+from executive.testing.bench import SkillBench, SkillRun, scripted_bench
 from executive.testing.skill_test import BlockSetup, RobotSetup, SkillTest, SkillTestFile, WorldSetup
 from skills.api import Skill
 from skills.faults.kinds import STANDARD_FAULTS, FaultKind
 from skills.robot import Capabilities, Pose2D
 from skills.testing.blocks import ROOM, TABLE_CAN, Block
-from skills.testing.clock import VirtualClock
-from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot, Start
 
 BenchMaker = Callable[[RobotSetup, WorldSetup], SkillBench]
@@ -44,25 +42,19 @@ class Trial:
         return "\n".join(lines)
 
 
-def scripted_maker(capabilities: Capabilities) -> Callable[[RobotSetup, WorldSetup], SkillBench]:
+def scripted_maker(capabilities: Capabilities) -> BenchMaker:
     """What makes benches with a scripted robot of these capabilities."""
 
-    def make(robot_setup: RobotSetup, world: WorldSetup) -> SkillBench:
-        bench, _ = scripted(capabilities, robot_setup, world)
-        return bench
-
-    return make
+    return lambda setup, world: bench_of_setup(capabilities, setup, world)[0]
 
 
-def scripted(capabilities: Capabilities, setup: RobotSetup, world: WorldSetup) -> tuple[SkillBench, ScriptedRobot]:
-    """A bench with a scripted robot, and that robot."""
-    clock, blocks = VirtualClock(), blocks_of(world)
+def bench_of_setup(
+    capabilities: Capabilities, setup: RobotSetup, world: WorldSetup
+) -> tuple[SkillBench, ScriptedRobot]:
+    """A bench with the scripted robot and the world that a file describes, and that robot."""
     pose = Pose2D(setup.pose.x, setup.pose.y, setup.pose.yaw)
     start = Start(pose, setup.arm, setup.in_gripper, setup.holding, setup.charge, setup.docked, setup.pulled_at_s)
-    robot = ScriptedRobot(clock, capabilities=capabilities, blocks=blocks, start=start)
-    place = KnownPlace(pose)
-    place.localised = not setup.lost
-    return SkillBench(robot, clock, localiser=place, costmap=BlockCostmap(blocks)), robot
+    return scripted_bench(capabilities, start, blocks_of(world), localised=not setup.lost)
 
 
 def blocks_of(world: WorldSetup) -> tuple[Block, ...]:

@@ -9,7 +9,7 @@ from wheeled_toy import TOY
 
 from executive.testing.skill_test import load_skill_tests
 from executive.testing.suite import PARTS, SuiteCase
-from executive.testing.trial import carry_out, scripted, scripted_maker
+from executive.testing.trial import bench_of_setup, carry_out, scripted_maker
 from executive.tree.registry import built_in_skills
 from skills.faults.kinds import STANDARD_FAULTS
 from skills.robot import BaseKind
@@ -49,7 +49,7 @@ def case_of(name):
     """The suite's case of a skill on the toy; what goes well is run once for all parts."""
     file, (n, *_) = well(name)
     test = file.tests[n]
-    make = functools.partial(scripted, TOY, test.robot or file.robot, test.world or file.world)
+    make = functools.partial(bench_of_setup, TOY, test.robot or file.robot, test.world or file.world)
     return SuiteCase(SKILLS[name], file.inputs(n, SKILLS[name]), make, samples=4)
 
 

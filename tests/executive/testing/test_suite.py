@@ -2,17 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import pytest
 
+from executive.testing.bench import scripted_bench
 from executive.testing.suite import (
     PARTS,
     SkillSuite,
     SuiteCase,
     cancelled_at_every_tick,
     exception_in_every_verb,
-    scripted_bench,
     stale_sensors,
 )
 from skills.api import Cause, Failed, Running, Skill, Succeeded
@@ -96,7 +97,7 @@ class Lost(Creep):
 
 
 def case_of(skill):
-    return SuiteCase(skill, CreepInputs(), scripted_bench(BASE_ONLY))
+    return SuiteCase(skill, CreepInputs(), partial(scripted_bench, BASE_ONLY))
 
 
 class TestCreep(SkillSuite):
@@ -135,7 +136,7 @@ def test_a_success_on_frozen_sensors_is_found_when_the_leaf_does_not_catch_it(mo
 
 
 def test_the_leaf_refuses_a_success_on_data_older_than_declared():
-    bench, _ = scripted_bench(BASE_ONLY)()
+    bench, _ = scripted_bench(BASE_ONLY)
     bench.inject("odometry freezes at 0.2 s")
     run = bench.run(Creep, CreepInputs())
     assert (run.outcome, run.cause) == ("failure", Cause.POSTCONDITION)
@@ -143,7 +144,7 @@ def test_the_leaf_refuses_a_success_on_data_older_than_declared():
 
 
 def test_data_as_old_as_declared_is_good_enough():
-    bench, _ = scripted_bench(BASE_ONLY)()
+    bench, _ = scripted_bench(BASE_ONLY)
     bench.inject("odometry freezes at 0.2 s")
     assert bench.run(Generous, CreepInputs()).outcome == "success"
 

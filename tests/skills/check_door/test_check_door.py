@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.testing.suite import scripted_bench
+from executive.testing.bench import scripted_bench
 from skills.api import Running, Succeeded
 from skills.check_door.skill import CheckDoor, CheckDoorInputs
 from skills.testing.blocks import Block
@@ -13,7 +13,7 @@ SOMEBODY = Block(1.35, -0.2, 1.65, 0.2, 0.0, 1.7)
 
 
 def test_it_looks_again_once_somebody_has_gone_on():
-    bench, robot = scripted_bench(BASE_ONLY, blocks=(*WALL, SOMEBODY))()
+    bench, robot = scripted_bench(BASE_ONLY, blocks=(*WALL, SOMEBODY))
     said = []
     skill = CheckDoor(bench.context())
     skill.begin(CheckDoorInputs((1.5, 0.0), 0.9, 0.0, "kitchen door"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -12,11 +11,11 @@ from executive.app.feasibility import refuse_impossible
 from executive.app.prepared import Prepared
 from executive.conversation import Conversation, Reply, ReplyKind, Speech
 from executive.conversation.parts import Waiting
+from executive.language.addressees import Whom, addressees
 from executive.language.followups import remark_of
 from executive.language.parser import load_parser
 from executive.language.questions import RefusalError
 from executive.language.reference import Memory
-from executive.language.robots.calls import GREETING, Whom, calls_of
 from executive.language.understand import Understanding, understand
 from executive.language.wake import addressed_to
 from executive.mission.mission import mission_from_steps
@@ -76,14 +75,12 @@ class Talk:
         names = tuple(self._each)
         if len(names) == 1:
             return names, text
-        calls = calls_of(names)
-        several = re.match(rf"\W*(?:{GREETING}[\s,]+)?({calls.called_together})[\s,:!.]+(?=\w)", text, re.IGNORECASE)
+        try:
+            several = addressees(names).called_in_talk(text)
+        except RefusalError:
+            return names, text
         if several is not None:
-            try:
-                meant = calls.meant(several[1])
-            except RefusalError:
-                meant = Whom.ALL
-            return names if isinstance(meant, Whom) else meant, text[several.end() :]
+            return names if isinstance(several[0], Whom) else several[0], several[1]
         called = addressed_to(text, names)
         if called.name is not None:
             return (called.name,), text

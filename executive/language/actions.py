@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from itertools import takewhile, zip_longest
 from typing import Final
 
-from executive.language.clauses import Clause
 from executive.language.items import (
     Adverb,
     Being,
     Chunk,
     Item,
     Outside,
+    Predicate,
     Separator,
     Unknown,
     Verb,
@@ -68,7 +68,7 @@ _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
 
 def read_actions(
-    clauses: Sequence[Clause], words: Lexicon, *, told: bool = False, recipient: Location | None = None
+    clauses: Sequence[Predicate], words: Lexicon, *, told: bool = False, recipient: Location | None = None
 ) -> tuple[Action, ...]:
     """The actions of all clauses, in order.
 
@@ -86,7 +86,7 @@ def read_actions(
     return tuple(action for action in found[:-1] if not _goes_nowhere(action)) + tuple(last)
 
 
-def _given(actions: Iterator[Action], clause: Clause, recipient: Location | None) -> Iterator[Action]:
+def _given(actions: Iterator[Action], clause: Predicate, recipient: Location | None) -> Iterator[Action]:
     """The actions, things being given to the recipient where the clause does not say to whom."""
     whom = (PrepositionRole.GOAL, PrepositionRole.FOR)
     chunks = [item for item in clause.items if isinstance(item, Chunk)]
@@ -108,13 +108,13 @@ def _with_elided(actions: Sequence[Action], things: bool) -> Iterator[Action]:
         yield action
 
 
-def _ends_with_then(clause: Clause) -> bool:
+def _ends_with_then(clause: Predicate) -> bool:
     """Whether "then" or "after that" stands at its end, before the next verb."""
     end = takewhile(lambda item: isinstance(item, Separator), reversed(clause.items))
     return any(isinstance(item, Separator) and item.word in _THEN for item in end)
 
 
-def _said(clause: Clause) -> str:
+def _said(clause: Predicate) -> str:
     before = [clause.subject] if clause.subject is not None else []
     verb = [clause.verb] if clause.verb is not None else []
     return spoken_words([*before, *verb, *clause.items])
@@ -125,7 +125,7 @@ def _goes_nowhere(action: Action) -> bool:
     return action.kind is VerbKind.GO and action.goal is None and action.unknown == (action.verb,)
 
 
-def _with_verb(clauses: Sequence[Clause], words: Lexicon) -> Sequence[Clause]:
+def _with_verb(clauses: Sequence[Predicate], words: Lexicon) -> Sequence[Predicate]:
     """Say "take" where there is no verb at all: "hammer to the kitchen, please"."""
     items = [item for clause in clauses for item in clause.items if not isinstance(item, Separator)]
     chunks = [item for item in items if isinstance(item, Chunk)]
@@ -135,7 +135,7 @@ def _with_verb(clauses: Sequence[Clause], words: Lexicon) -> Sequence[Clause]:
     return (replace(clauses[0], verb=Verb(_TAKE, words.verbs[(_TAKE,)])),)
 
 
-def _with_fronted(clauses: Sequence[Clause]) -> Sequence[Clause]:
+def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
     """Put a place that stands before the first verb behind it: "from the kitchen bring me a spoon"."""
     if len(clauses) < 2 or clauses[0].verb is not None or not isinstance(clauses[1].verb, Verb | Being):
         return clauses
@@ -147,7 +147,7 @@ def _with_fronted(clauses: Sequence[Clause]) -> Sequence[Clause]:
     return (first, *clauses[2:]) if places else clauses
 
 
-def _named_first(fronted: Sequence[Item], clause: Clause) -> bool:
+def _named_first(fronted: Sequence[Item], clause: Predicate) -> bool:
     """Whether a thing is only named, and then meant by "it": "that vase on the shelf, bring it here"."""
     chunks = [item for item in fronted if isinstance(item, Chunk)]
     named = len(chunks) == len(fronted) and bool(chunks) and chunks[0].role is None and not chunks[0].phrase.pronoun
@@ -156,7 +156,7 @@ def _named_first(fronted: Sequence[Item], clause: Clause) -> bool:
     return placed and any(phrase.pronoun or phrase.text == chunks[0].phrase.text for phrase in meant)
 
 
-def _without_reasons(clauses: Sequence[Clause]) -> Sequence[Clause]:
+def _without_reasons(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
     """Leave out what the speakers say that they are about to do themselves, before or after what is to be done."""
     if len(clauses) > 1 and _own_affair(clauses[-1].verb) and isinstance(clauses[-2].verb, Verb):
         items = clauses[-2].items
@@ -178,7 +178,7 @@ def _own_affair(verb: Verb | Being | Outside | None) -> bool:
     return isinstance(verb, Outside) and verb.word.lower() not in lexicon().asks
 
 
-def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
+def _without_checks(clauses: Sequence[Predicate]) -> Iterator[Predicate]:
     """Leave out "see" and "check" before "if there is": the question stands alone."""
     asks = False
     for clause, after in zip_longest(clauses, clauses[1:]):
@@ -190,17 +190,17 @@ def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
             yield clause
 
 
-def _checks(clause: Clause | None) -> bool:
+def _checks(clause: Predicate | None) -> bool:
     """Whether its verb asks how things stand."""
     return clause is not None and isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
 
 
-def _only_whether(clause: Clause) -> bool:
+def _only_whether(clause: Predicate) -> bool:
     """Whether nothing but "if" stands behind its verb, as in "see if you can find it"."""
     return all(isinstance(item, Separator | Whether) for item in clause.items)
 
 
-def _actions(clause: Clause, words: Lexicon) -> Iterator[Action]:
+def _actions(clause: Predicate, words: Lexicon) -> Iterator[Action]:
     if clause.verb is None:
         yield Action(None, "", unknown=(spoken_words(clause.items),))
     elif isinstance(clause.verb, Outside):
@@ -211,7 +211,7 @@ def _actions(clause: Clause, words: Lexicon) -> Iterator[Action]:
         yield from _acting(clause, clause.verb, words)
 
 
-def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
+def _being(clause: Predicate, being: Being, words: Lexicon) -> Action:
     """A status check ("is there a hammer in the workshop"), or a statement ("there is a hammer in the workshop")."""
     if being.narrated:
         return _narrated(clause, being, words)
@@ -239,7 +239,7 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     return Action(kind, "be", tuple(objects[:1]), place, unknown=unknown, choices=choices, teller=being.teller)
 
 
-def _narrated(clause: Clause, being: Being, words: Lexicon) -> Action:
+def _narrated(clause: Predicate, being: Being, words: Lexicon) -> Action:
     """What happened or goes on, with the thing that it happens to; nothing to do by itself."""
     roles = read_roles(clause.items, words, describes=False)
     lacked = [place.phrase for place in roles.sources if place.preposition == _OUT_OF and place.phrase is not None]
@@ -264,7 +264,7 @@ def _departs(verb: Verb, roles: Roles, words: Lexicon) -> bool:
     return places and not (roles.goals or roles.ats or roles.recipient or roles.unknown or roles.searched)
 
 
-def _lacking(clause: Clause, being: Being, words: Lexicon) -> Action:
+def _lacking(clause: Predicate, being: Being, words: Lexicon) -> Action:
     """What the speaker lacks ("we are out of napkins"), or where they are ("I am in the hall")."""
     roles = read_roles(clause.items, words, describes=False)
     lacked = [place.phrase for place in roles.sources if place.phrase is not None]
@@ -272,7 +272,7 @@ def _lacking(clause: Clause, being: Being, words: Lexicon) -> Action:
     return Action(None, being.text, tuple(lacked), place, unknown=(*roles.unknown, *(p.spoken for p in roles.objects)))
 
 
-def _is_state(clause: Clause, being: Being) -> bool:
+def _is_state(clause: Predicate, being: Being) -> bool:
     """Whether it only tells how things are ("I'm thirsty", "the baby is crying"): a reason, and nothing to do."""
     if clause.subject is None or clause.whether or (being.asked and _asks(clause.subject.phrase)):
         return False
@@ -288,7 +288,7 @@ def _asks(phrase: Phrase) -> bool:
     return any(token.tag in _QUESTION_TAGS for token in phrase.tokens)
 
 
-def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
+def _acting(clause: Predicate, verb: Verb, words: Lexicon) -> Iterator[Action]:
     going = verb.kinds == {VerbKind.GO}
     roles = read_roles(clause.items, words, describes=not going, puts=VerbKind.PLACE in verb.kinds)
     if verb.text in words.gives and len(roles.objects) > 1 and not roles.recipient and not roles.listed:

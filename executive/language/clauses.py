@@ -1,103 +1,208 @@
-"""The sentence's clauses: a verb with what stands behind it."""
+"""The one splitter: a sentence in clauses, each with its addressee, the cue by which it goes on, and its words."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+import enum
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Final
 
-from executive.language.items import Being, Chunk, Item, Outside, Separator, Verb, Whether
+from executive.language.addressees import Saying, Who, addressees
+from executive.language.amounts import AMOUNTS
+from executive.language.cleaning import smoothed
+from executive.language.items import Item
+from executive.language.lexicon import Patterns, lexicon, read_table
 
-__all__ = ["Clause", "split_clauses", "without_name"]
+__all__ = ["ACTS", "CLAUSES", "Behind", "Clause", "Cue", "Split", "behind", "cut", "split", "spoken", "verb_positions"]
+
+CLAUSES: Final = Patterns("structures.yaml", words=AMOUNTS)
+ACTS: Final = Patterns("structures.yaml", "acts", AMOUNTS)
+
+
+class Cue(enum.Enum):
+    """How a clause goes on from the one before."""
+
+    FAILED = "failed"  # "if that fails"
+    SO = "so"  # "if so"
+    NOT = "not"  # "if not"
+    OTHERWISE = "otherwise"
+    UNLESS = "unless"
+    SOON = "soon"  # "as soon as"
+    IF = "if"
+    EVERY = "every"  # "every ten minutes"
+    TIMES = "times"  # "three times"
+    WHILE = "while"  # "as long as"
+    UNTIL = "until"
 
 
 @dataclass(frozen=True)
 class Clause:
-    """A verb, or a form of "to be", with the items behind it; a verb may be one that the robot does not know.
+    """A clause: what joins it to the one before, its cue (`kind`, and `cue` in words), and the other words.
 
-    `verb` is None for what stands before the first verb; `subject` stood before a form of "to be"; `whether` says that
-    "if" or "whether" did.
+    `part` is the part of the sentence for one addressee that it belongs to. `lead` are items that were left out before
+    it, its verb among them.
     """
 
-    verb: Verb | Being | Outside | None
-    items: tuple[Item, ...] = ()
-    subject: Chunk | None = None
-    whether: bool = False
+    joint: str
+    text: str
+    kind: Cue | None = None
+    cue: str = ""
+    lead: tuple[Item, ...] = ()
+    part: Saying | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def begins(self) -> bool:
+        """Whether a sentence begins with it."""
+        return re.search(r"[.!?;]", self.joint) is not None
+
+    @property
+    def outer(self) -> bool:
+        """Whether it is done after all of the clauses before."""
+        return CLAUSES.outer.search(self.joint) is not None
+
+    @property
+    def anyway(self) -> bool:
+        """Whether it is done at the end whatever happens."""
+        return CLAUSES.whatever.search(self.joint) is not None
+
+    @property
+    def then(self) -> bool:
+        """Whether "then" stands before it."""
+        return re.search(r"\bthen\b", self.joint, re.IGNORECASE) is not None
 
 
-def split_clauses(items: Iterable[Item]) -> tuple[Clause, ...]:
-    """Cut the row of items at its verbs."""
-    found: list[Clause] = [Clause(None)]
-    for item in items:
-        if isinstance(item, Being):
-            found = [*found[:-1], *_begin_being(found[-1], item)]
-        elif isinstance(item, Verb | Outside):
-            found.append(Clause(item))
-        else:
-            found[-1] = replace(found[-1], items=(*found[-1].items, item))
-    whole = (clause for clause in found if clause.verb is not None or _content(clause.items))
-    return tuple(part for clause in whole for part in _ungapped(clause))
+@dataclass(frozen=True)
+class Behind:
+    """What stands behind what is to be done (`before`): its kind, its first words and the others."""
+
+    before: str
+    kind: Cue
+    cue: str
+    text: str
 
 
-def _ungapped(clause: Clause) -> Iterator[Clause]:
-    """Say the verb again where it was left out: "a beer to Robin and a coke to Charlie"."""
-    given = next((n for n in range(1, len(clause.items) - 1) if _gives_another(clause.items, n)), None)
-    if given is not None and isinstance(clause.verb, Verb):
-        yield replace(clause, items=clause.items[:given])
-        yield from _ungapped(Clause(clause.verb, clause.items[given + 1 :]))
-        return
-    cut = next((n for n in range(1, len(clause.items) - 1) if _gap(clause.items, n)), None)
-    if cut is None or not isinstance(clause.verb, Verb):
-        yield clause
-        return
-    yield replace(clause, items=clause.items[:cut])
-    first = clause.items[0]
-    recipient = (first,) if isinstance(first, Chunk) and first.role is None and first.phrase.speaker else ()
-    yield from _ungapped(Clause(clause.verb, (*recipient, *clause.items[cut + 1 :])))
+@dataclass(frozen=True)
+class Split:
+    """The clauses of a sentence, and the robot or robots that it is said to first."""
+
+    clauses: tuple[Clause, ...]
+    listener: Who | None = None
 
 
-def _gives_another(items: Sequence[Item], at: int) -> bool:
-    """Whether somebody else and what they are given stand behind a separator: "me the book and Anna the pen"."""
-    joint, who, what = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
-    if not (isinstance(joint, Separator) and isinstance(who, Chunk) and isinstance(what, Chunk)):
-        return False
-    bare = who.role is None and what.role is None and isinstance(items[at - 1], Chunk)
-    return bare and (who.phrase.person or who.phrase.speaker) and not (what.phrase.person or what.phrase.speaker)
+def split(text: str, robots: tuple[str, ...] = ()) -> Split:
+    """Cuts a sentence, or several, into clauses, each with the part for one of the `robots` that it is of.
+
+    Raises RefusalError: it is not clear which of the robots are meant, or it says what one is not to do.
+    """
+    listener, parts = addressees(robots).parts(text) if len(robots) > 1 else (None, (Saying(None, text),))
+    found = (replace(clause, part=part) for part in parts for clause in _by_cues(part.text))
+    return Split(tuple(found), listener)
 
 
-def _gap(items: Sequence[Item], at: int) -> bool:
-    """Whether a separator stands between two things that each have a place of the same role."""
-    joint, thing, place = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
-    if not (isinstance(joint, Separator) and isinstance(thing, Chunk) and isinstance(place, Chunk)):
-        return False
-    bare = [item for item in items[:at] if isinstance(item, Chunk) and item.role is None and not item.phrase.speaker]
-    roles = [item.role for item in items[:at] if isinstance(item, Chunk) and item.role is not None]
-    return thing.role is None and place.role is not None and bool(bare) and place.role in roles
+def _by_cues(text: str) -> tuple[Clause, ...]:
+    """The clauses of a text for one addressee, by the words that join them and their cues."""
+    text = smoothed(text)
+    for said, meant in read_table("structures.yaml")["reworded"]:
+        text = CLAUSES.compiled(said).sub(meant, text)
+    return cut(text)
 
 
-def _content(items: Sequence[Item]) -> bool:
-    return any(not isinstance(item, Separator) for item in items)
+def cut(text: str) -> tuple[Clause, ...]:
+    """The same of a text as it stands."""
+    cuts = list(_cuts(text))
+    ends = [*(start for start, _ in cuts[1:]), len(text)]
+    found = [_clause(text, joint, end) for joint, end in zip(cuts, ends, strict=True)]
+    return tuple(clause for clause in found if clause.text or clause.cue)
 
 
-def _begin_being(last: Clause, being: Being) -> list[Clause]:
-    """Begin a clause of "to be", which takes its subject, and the "if" before it, from the clause before."""
-    rest = last.items
-    subject = rest[-1] if rest and isinstance(rest[-1], Chunk) and not being.existential else None
-    if subject is None or subject.role is not None:
-        subject = None
-    else:
-        rest = rest[:-1]
-    whether = bool(rest) and isinstance(rest[-1], Whether)
-    asked = being.asked and subject is None
-    before = replace(last, items=rest[: len(rest) - whether])
-    return [before, Clause(replace(being, asked=asked), (), subject, whether)]
+def _cuts(text: str) -> Iterator[tuple[int, int]]:
+    """Where what joins two clauses begins and ends."""
+    first = _joint().match(text)
+    yield (0, first.end() if first is not None else 0)
+    for match in _joint().finditer(text, first.end() if first is not None else 0):
+        joined = match[0].strip() != "" or (_ELSE.match(text, match.end()) and not _SOME.search(text[: match.start()]))
+        sentence = re.search(r"[.!?;](?:\s|$)", match[0]) is not None
+        if match[0].strip().lower() in ("and", "please") and _ONE_VERB.search(text[: match.start()]):
+            continue
+        if joined and (sentence or _opens(text[match.end() :])):
+            yield match.span()
 
 
-def without_name(clauses: Sequence[Clause]) -> tuple[Clause, ...]:
-    """Leave out a bare name before the first verb: it calls somebody ("Michael go to the kitchen")."""
-    first, *rest = clauses or [Clause(None)]
-    content = [item for item in first.items if not isinstance(item, Separator)]
-    name = content[0] if len(content) == 1 and isinstance(content[0], Chunk) and content[0].role is None else None
-    joined = any(isinstance(item, Separator) and item.word in ("and", "or") for item in first.items)
-    comma = isinstance(first.items[-1], Separator) and first.items[-1].word == "," if first.items else False
-    called = name is not None and not joined and (name.phrase.named_person or (comma and name.phrase.proper))
-    return tuple(rest if first.verb is None and called and rest else clauses)
+def _clause(text: str, joint: tuple[int, int], end: int) -> Clause:
+    start = joint[1]
+    clause = Clause(text[joint[0] : start], text[start:end].strip(" ,;.!?:"))
+    kind = _kind(clause.text)
+    if kind is None:
+        return clause
+    rest = clause.text[len(kind[1]) :].strip(" ,;:")
+    return replace(clause, kind=kind[0], cue=kind[1], text=re.sub(r"^then\s+", "", rest, flags=re.IGNORECASE))
+
+
+def _opens(text: str) -> bool:
+    """Whether a clause begins with these words."""
+    word = re.match(r"[\w']+", text)
+    return word is not None and (word[0].lower() in _verbs() or _kind(text) is not None)
+
+
+def _kind(text: str) -> tuple[Cue, str] | None:
+    found = ((kind, match) for kind, each in _kinds() if (match := each.match(text)) is not None)
+    return next(((kind, match[0]) for kind, match in found), None)
+
+
+def behind(text: str) -> Behind | None:
+    """The first thing that stands behind what is to be done in a clause, so that it decides or repeats that."""
+    found = [(match.start(), Cue(kind), match) for kind, each in _behind() for match in each.finditer(text, 1)]
+    found = [one for one in found if one[1] is not Cue.IF or not CLAUSES.asks_before.search(text[: one[0]])]
+    if not found:
+        return None
+    start, kind, match = min(found, key=lambda one: one[0])
+    return Behind(text[:start].strip(" ,"), kind, match[0], text[match.end() :].strip(" ,"))
+
+
+def verb_positions(text: str) -> Iterator[int]:
+    """Where, behind its first words, a clause may begin without a comma before it."""
+    for match in re.finditer(r"[\w']+", text):
+        if match.start() and match[0].lower() in _verbs():
+            yield match.start()
+
+
+def spoken(clauses: Iterable[Clause]) -> str:
+    """The clauses as one text."""
+    return " ".join(f"{clause.joint}{clause.cue} {clause.text}".strip() for clause in clauses).strip(" ,;.")
+
+
+@cache
+def _joint() -> re.Pattern[str]:
+    polite = "|".join(map(re.escape, lexicon().openers))
+    words = "|".join((CLAUSES.text("outer"), CLAUSES.text("whatever"), CLAUSES.text("joints"), polite))
+    return re.compile(rf"(?:[\s,;.!?:]+|(?<![\w'])(?:{words})(?![\w']))+", re.IGNORECASE)
+
+
+@cache
+def _verbs() -> frozenset[str]:
+    return frozenset({first for first, *_ in lexicon().verbs} | set(read_table("structures.yaml")["openers"]))
+
+
+@cache
+def _kinds() -> tuple[tuple[Cue, re.Pattern[str]], ...]:
+    verbs = "|".join(sorted(_verbs(), key=len, reverse=True))
+    ends = rf"(?=\s*(?:$|[,;:]|\b(?:then|please|just|{verbs})\b))"
+    closed, table = {Cue.FAILED, Cue.SO, Cue.NOT}, read_table("structures.yaml")["kinds"]
+    return tuple(
+        (kind, CLAUSES.compiled(rf"{text}(?![\w']){ends if kind in closed else ''}"))
+        for kind in Cue
+        for text in table[kind.value]
+    )
+
+
+@cache
+def _behind() -> tuple[tuple[str, re.Pattern[str]], ...]:
+    return CLAUSES.mapping("behind")
+
+
+_ONE_VERB: Final = re.compile(r"(?:^|[\s,])(?:go|come|run|say)$", re.IGNORECASE)
+"""Behind these "and" and "please" join no other clause: "go and charge"."""
+_ELSE: Final = re.compile(r"(?:or )?(?:else|otherwise)\b", re.IGNORECASE)
+_SOME: Final = re.compile(r"(?:some|any|every|no|body|thing|one|where|what|who)$", re.IGNORECASE)

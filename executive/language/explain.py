@@ -7,9 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from executive.language.actions import Action
-from executive.language.clauses import Clause
 from executive.language.command_frames import spoken_command
-from executive.language.items import spoken_words
+from executive.language.items import Predicate, spoken_words
 from executive.language.roles import Location
 from executive.language.steps import Trace
 from executive.language.tokens import Token
@@ -115,14 +114,14 @@ def _token_row(token: Token) -> TokenRow:
     )
 
 
-def _part(clause: Clause) -> str:
+def _part(clause: Predicate) -> str:
     """The words of a clause, its verb in front."""
     verb = [] if clause.verb is None else [spoken_words([clause.verb])]
     subject = [clause.subject.phrase.spoken] if clause.subject is not None else []
     return " | ".join([*verb, *subject, *_pieces(clause)])
 
 
-def _pieces(clause: Clause) -> Iterator[str]:
+def _pieces(clause: Predicate) -> Iterator[str]:
     yield from filter(None, (spoken_words([item]) for item in clause.items))
 
 

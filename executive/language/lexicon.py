@@ -182,9 +182,17 @@ class Patterns:
         setattr(self, name, found)
         return found
 
+    def compiled(self, text: str) -> re.Pattern[str]:
+        """An expression that stands in no table."""
+        return re.compile(self._filled(text), re.IGNORECASE)
+
     def each(self, name: str) -> tuple[re.Pattern[str], ...]:
         """The expressions of a list."""
-        return tuple(re.compile(self._filled(text), re.IGNORECASE) for text in self._entry(name))
+        return tuple(self.compiled(text) for text in self._entry(name))
+
+    def mapping(self, name: str) -> tuple[tuple[str, re.Pattern[str]], ...]:
+        """The expressions of a mapping, each with its name."""
+        return tuple((key, self.compiled(text)) for key, text in self._entry(name).items())
 
     def text(self, name: str) -> str:
         """An expression as it is written, those that it names filled in."""

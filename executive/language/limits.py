@@ -8,8 +8,7 @@ from functools import cache
 from typing import Any, Final
 
 from executive.language.actions import Action
-from executive.language.clauses import Clause
-from executive.language.items import Chunk, Outside, Verb, spoken_words
+from executive.language.items import Chunk, Outside, Predicate, Verb, spoken_words
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, read_table
 from executive.language.nouns import NounKind, noun_examples
 from executive.language.phrases import Phrase
@@ -193,14 +192,14 @@ _MOVES: Final = frozenset(VerbKind) - {VerbKind.FIND, VerbKind.CHECK}
 _OVER: Final = "over"
 
 
-def refuse_harm(clauses: Sequence[Clause]) -> None:
+def refuse_harm(clauses: Sequence[Predicate]) -> None:
     """Refuse what does harm. Raises RefusalError, which names the clauses that do."""
     harmful = [spoken_words((clause.verb, *clause.items)) for clause in clauses if clause.verb and _does_harm(clause)]
     if harmful:
         raise RefusalError(f"{', '.join(map(repr, harmful))} could hurt somebody or break something", harmful)
 
 
-def _does_harm(clause: Clause) -> bool:
+def _does_harm(clause: Predicate) -> bool:
     words = _harmful()
     if not isinstance(verb := clause.verb, Verb | Outside):
         return False
@@ -233,7 +232,7 @@ _GO: Final = frozenset({VerbKind.GO})
 _ON_TOP: Final = ("in", "out")
 
 
-def check_ways_and_speaker(clauses: Sequence[Clause], actions: Sequence[Action]) -> None:
+def check_ways_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Action]) -> None:
     """Refuse a way that is to be taken, and relations to the speaker but "to me". Raises RefusalError."""
     for action in actions:
         for place in action.ways:

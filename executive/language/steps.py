@@ -7,12 +7,11 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.language.actions import Action, read_actions
-from executive.language.clauses import Clause, split_clauses, without_name
 from executive.language.cleaning import MAX_CHARACTERS, MAX_WORDS, rephrased
 from executive.language.command_frames import CommandFrame, command_frames, spoken_command
 from executive.language.disfluency import repair_disfluencies, unwanted_things
 from executive.language.grounding import check_unwanted, ground_noted
-from executive.language.items import Being, Item
+from executive.language.items import Being, Item, Predicate, predicates, without_name
 from executive.language.lexicon import VerbKind, lexicon
 from executive.language.limits import check_feasible, check_ways_and_speaker, not_understood, refuse_harm
 from executive.language.nouns import NounKind
@@ -47,7 +46,7 @@ class Trace:
     tokens: tuple[Token, ...] = ()
     items: tuple[Item, ...] = ()
     unwanted: tuple[Phrase, ...] = ()
-    clauses: tuple[Clause, ...] = ()
+    clauses: tuple[Predicate, ...] = ()
     actions: tuple[Action, ...] = ()
     resolved: tuple[ResolvedAction, ...] = ()
     frames: tuple[CommandFrame, ...] = ()
@@ -148,7 +147,7 @@ def _read(trace: Trace, context: _Context) -> Trace:
 
 
 def _split(trace: Trace, context: _Context) -> Trace:
-    clauses = split_clauses(trace.items)
+    clauses = predicates(trace.items)
     if not clauses:
         raise RefusalError(f"nothing was said; {ABLE}")
     refuse_harm(clauses)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 from executive.language.cleaning import clean, foreign_reason, placeholder
 from executive.language.parser import DependencyParser
@@ -13,7 +14,6 @@ from executive.language.questions import Answerer, ClarifyingQuestion, RefusalEr
 from executive.language.reference import Memory
 from executive.language.spelling import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
-from executive.language.structure.mention import mentions_structure
 from executive.language.wake import strip_wake
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
@@ -21,9 +21,19 @@ from executive.words.steps import MissionStep
 from executive.words.written import written
 
 if TYPE_CHECKING:
+    from executive.language.clauses import Clause
     from executive.language.structure.sentence import Structured
 
-__all__ = ["Status", "Understanding", "parse_lines", "understand", "understand_asking"]
+__all__ = [
+    "Status",
+    "Understanding",
+    "asked_until_clear",
+    "meaning",
+    "parse_lines",
+    "spelled",
+    "understand",
+    "understand_asking",
+]
 
 
 class Status(enum.Enum):
@@ -107,33 +117,54 @@ def understand(
         odd = RefusalError(f"{blank!r} is no word; say it in words", [blank])
         trace = Trace(sentence, refusal=odd, refused_at="cleaning")
         return Understanding(sentence, Status.REFUSED, (), odd.reason, odd.unknown, trace=trace)
-    facts = parser if isinstance(parser, WordFacts) else None
-    corrected = Corrected(wake.text)
-    if correct and knowledge is not None and facts is not None:
-        corrected = correct_spelling(wake.text, knowledge, facts)
-    trace = trace_sentence(corrected.text, parser=parser, knowledge=knowledge, memory=memory)
-    if knowledge is not None:
-        trace = _with_structure(trace, corrected.text, parser, knowledge, memory)
-    refusal, notes = trace.refusal, (*corrected.notes, *trace.notes)
+    corrected = spelled(wake.text, parser, knowledge) if correct else Corrected(wake.text)
+    return meaning(sentence, corrected, parser=parser, knowledge=knowledge, memory=memory)
+
+
+def spelled(text: str, parser: DependencyParser, knowledge: Knowledge | None) -> Corrected:
+    """The text with the world's names in place of misspelled ones, where words can be judged."""
+    if knowledge is None or not isinstance(parser, WordFacts):
+        return Corrected(text)
+    return correct_spelling(text, knowledge, parser)
+
+
+def meaning(
+    sentence: str,
+    said: Corrected,
+    *,
+    parser: DependencyParser,
+    knowledge: Knowledge | None,
+    memory: Memory | None,
+    clauses: Sequence[Clause] | None = None,
+) -> Understanding:
+    """What a text for one robot means, the text being `said` of the sentence; its clauses where they are known."""
+    trace = trace_sentence(said.text, parser=parser, knowledge=knowledge, memory=memory)
+    if knowledge is not None and _MENTIONED.search(said.text) is not None:
+        trace = _with_structure(trace, said.text, clauses, parser, knowledge, memory)
+    refusal, notes = trace.refusal, (*said.notes, *trace.notes)
     if refusal is None:
         found = Understanding(sentence, Status.OK, trace.commands, notes=notes, memory=trace.memory, trace=trace)
         return replace(found, steps=trace.steps)
     status = Status.QUESTION if refusal.question else Status.REFUSED
-    reason = foreign_reason(wake.text) or refusal.reason
+    reason = foreign_reason(said.text) or refusal.reason
     return Understanding(sentence, status, (), reason, refusal.unknown, refusal.question, notes, trace=trace)
 
 
 def _with_structure(
-    plain: Trace, text: str, parser: DependencyParser, knowledge: Knowledge, memory: Memory | None
+    plain: Trace,
+    text: str,
+    clauses: Sequence[Clause] | None,
+    parser: DependencyParser,
+    knowledge: Knowledge,
+    memory: Memory | None,
 ) -> Trace:
     """What a sentence that is no list of plain commands means, if it decides, repeats, waits, says or asks."""
-    if not mentions_structure(text):
-        return plain
+    from executive.language.clauses import split
     from executive.language.structure.sentence import structured
 
     try:
-        read = plain.refusal is None
-        found = structured(text, parser=parser, knowledge=knowledge, memory=memory, plain=read)
+        said, read = split(text).clauses if clauses is None else clauses, plain.refusal is None
+        found = structured(said, parser=parser, knowledge=knowledge, memory=memory, plain=read)
     except RefusalError as refusal:
         return replace(plain, refusal=refusal, refused_at="structure")
     return plain if found is None else _traced(plain, found)
@@ -170,19 +201,40 @@ def understand_asking(
     comes back.
     """
 
-    def meaning(text: str) -> Understanding:
+    def meant(text: str) -> Understanding:
         return understand(
             text, parser=parser, knowledge=knowledge, require_wake=require_wake, robot_name=robot_name, correct=correct
         )
 
-    meant = meaning(sentence)
+    return asked_until_clear(sentence, meant, answer)
+
+
+class _Asking(Protocol):
+    @property
+    def question(self) -> ClarifyingQuestion | None: ...
+
+
+Meant = TypeVar("Meant", bound=_Asking)
+
+
+def asked_until_clear(sentence: str, meant: Callable[[str], Meant], answer: Answerer) -> Meant:
+    """What a sentence means with the answers to its questions in their places, at most three."""
+    found = meant(sentence)
     for _ in range(_MOST_QUESTIONS):
-        said = None if meant.question is None else answer(meant.question)
-        if meant.question is None or said is None:
+        said = None if found.question is None else answer(found.question)
+        if found.question is None or said is None:
             break
-        sentence = with_answer(sentence, meant.question, said)
-        meant = meaning(sentence)
-    return meant
+        sentence = with_answer(sentence, found.question, said)
+        found = meant(sentence)
+    return found
 
 
 _MOST_QUESTIONS: Final = 3
+_MENTIONED: Final = re.compile(
+    r"\b(?:is it|are you|house|whole|everywhere|all over|move|if|unless|in case|otherwise|else|every|each|all"
+    r"|everyone|everybody|twice|times|once|while|as long as|until"
+    r"|till|soon|when|wait|stay|say|tell|announce|ask|greet|know|inform|remind|whatever|matter|regardless|failing|fail"
+    r"|fails|door|battery|charge|percent|repeat|holding|report|provided)\b",
+    re.IGNORECASE,
+)
+"""Where none of this is said, it is a sentence of plain commands, and the rest of the language is not loaded."""

@@ -7,12 +7,12 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
+from executive.language.clauses import split
 from executive.language.cleaning import clean
 from executive.language.lexicon import lexicon
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.robots import Part, understand_for_robots
-from executive.language.robots.cutting import cut_by_robot
 from executive.language.roles import HERE
 from executive.language.spelling import SoundAlikes, sound_distance
 from executive.language.understand import Status, Understanding, understand
@@ -147,7 +147,7 @@ class TeamReader:
     def calls(self, text: str) -> bool:
         """Whether robots are called in `text`, a name perhaps misspelled."""
         try:
-            return cut_by_robot(clean(self._as_called(text)), self.robots).listener is not None
+            return split(clean(self._as_called(text)), self.robots).listener is not None
         except RefusalError:
             return True
 

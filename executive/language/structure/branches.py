@@ -6,10 +6,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
+from executive.language.amounts import SPAN, seconds_of, time_of, times_of
+from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cut, spoken, verb_positions
 from executive.language.questions import RefusalError
-from executive.language.structure.amounts import SPAN, seconds_of, time_of, times_of
 from executive.language.structure.conditions import suppose
-from executive.language.structure.cutting import ACTS, CLAUSES, Behind, Clause, Kind, cut, spoken, verb_positions
 from executive.language.structure.leaves import State, Supposed, negated, verb
 from executive.language.structure.requests import said_by, wait
 from executive.language.structure.row import (
@@ -75,7 +75,7 @@ class Branches(Base):
         if asked is not None and same(supposed.condition, asked.supposed.condition):
             row.steps[-1:] = asked.before
         body = [*cut(rest), *follows]
-        if clause.kind is Kind.UNLESS:
+        if clause.kind is Cue.UNLESS:
             supposed = turned(supposed)
         return self.choose(row, supposed, body, clauses, end)
 
@@ -123,13 +123,13 @@ class Branches(Base):
         then, after = self.branch(body, supposed, supposed.holds)
         otherwise: Steps = ()
         other_state = supposed.fails
-        if end < len(clauses) and clauses[end].kind in (Kind.OTHERWISE, Kind.NOT, Kind.SO):
+        if end < len(clauses) and clauses[end].kind in (Cue.OTHERWISE, Cue.NOT, Cue.SO):
             first = clauses[end]
-            if first.kind is Kind.SO and not was_not(clauses, end):
+            if first.kind is Cue.SO and not was_not(clauses, end):
                 raise RefusalError(f"I do not understand '{first.cue}' here", [first.cue])
             stop = end_of(clauses, end + 1, branch=True)
             rest = [*cut(first.text), *clauses[end + 1 : stop]]
-            if rest and rest[0].kind is Kind.IF:
+            if rest and rest[0].kind is Cue.IF:
                 stop = len(clauses)
                 rest = [rest[0], *rest[1 : len(cut(first.text))], *clauses[end + 1 : stop]]
             if not rest:
@@ -160,7 +160,7 @@ class Branches(Base):
         clause, end = clauses[at], end_of(clauses, at + 1, branch=True)
         self.flush(row)
         asked = row.asked
-        if clause.kind in (Kind.SO, Kind.NOT) and asked is None and ACTS.somebody.search(clause.cue):
+        if clause.kind in (Cue.SO, Cue.NOT) and asked is None and ACTS.somebody.search(clause.cue):
             supposed = suppose(re.sub(r"^if ", "", clause.cue, flags=re.IGNORECASE), row.state, self.leaves)
             return self.choose(
                 row,
@@ -172,22 +172,22 @@ class Branches(Base):
         if not row.steps[row.begun :] and not (asked and row.steps):
             raise RefusalError(f"'{clause.cue}' goes on from nothing that was said before", [clause.cue])
         body = [*cut(clause.text), *clauses[at + 1 : end]]
-        if asked is not None and asked.looked and clause.kind is not Kind.FAILED:
+        if asked is not None and asked.looked and clause.kind is not Cue.FAILED:
             row.steps[-1:] = asked.before
-            supposed = asked.supposed if clause.kind is Kind.SO else turned(asked.supposed)
+            supposed = asked.supposed if clause.kind is Cue.SO else turned(asked.supposed)
             end = end_of(clauses, at + 1)
             body = [*cut(clause.text), *clauses[at + 1 : end]]
             return self.choose(row, supposed, body, clauses, end)
         last = row.steps[-1].block if row.steps else None
-        if asked is not None and asked.decided and isinstance(last, Choose) and clause.kind is not Kind.SO:
+        if asked is not None and asked.decided and isinstance(last, Choose) and clause.kind is not Cue.SO:
             return self._else_of(row, last, asked.supposed, body, end)
-        if isinstance(last, Choose | Repeat) and clause.kind is not Kind.FAILED:
+        if isinstance(last, Choose | Repeat) and clause.kind is not Cue.FAILED:
             raise RefusalError(f"I do not understand to what '{clause.cue}' belongs", [clause.cue])
-        if clause.kind is Kind.SO:
+        if clause.kind is Cue.SO:
             raise RefusalError(f"'{clause.cue}' goes on from nothing that was looked at", [clause.cue])
         if not body:
             raise RefusalError(f"what am I to do {clause.cue.lower()}?", [clause.cue])
-        missing = clause.kind is Kind.NOT and clause.cue.lower() not in ("if not", "if no")
+        missing = clause.kind is Cue.NOT and clause.cue.lower() not in ("if not", "if no")
         if missing and asked is not None:
             otherwise, state = self.branch(body, turned(asked.supposed), asked.supposed.fails)
             done = tuple(row.steps[-1:])
@@ -228,7 +228,7 @@ class Branches(Base):
         if not row.plain:
             raise RefusalError(f"what is to be done {clause.cue} {clause.text}? Say the condition first", [clause.text])
         main = row.plain.pop()
-        self.modified(row, main, Behind(main.text, clause.kind or Kind.IF, clause.cue, clause.text))
+        self.modified(row, main, Behind(main.text, clause.kind or Cue.IF, clause.cue, clause.text))
         return at + 1
 
 
@@ -249,9 +249,9 @@ class Repeats(Branches):
             return end
         rounds, rest = self._how_often(row, clause, clauses[at + 1 : end])
         body = [*cut(rest), *clauses[at + 1 : end]]
-        if clause.kind in (Kind.WHILE, Kind.UNTIL) and len(body) == 1 and ACTS.stays.fullmatch(body[0].text):
+        if clause.kind in (Cue.WHILE, Cue.UNTIL) and len(body) == 1 and ACTS.stays.fullmatch(body[0].text):
             said = clause.text[: len(clause.text) - len(rest)].strip(" ,")
-            how = "until" if clause.kind is Kind.UNTIL else "while"
+            how = "until" if clause.kind is Cue.UNTIL else "while"
             self.put_done(row, wait(body[0].text.partition(" ")[2], how, said, row.state, self.leaves))
             return end
         if not body:
@@ -270,14 +270,14 @@ class Repeats(Branches):
     def _how_often(self, row: Row, clause: Clause, follows: Sequence[Clause]) -> tuple[Rounds, str]:
         """How often what is behind it is to be done, and the rest of the words."""
         state = row.state
-        if clause.kind is Kind.EVERY:
+        if clause.kind is Cue.EVERY:
             return self._every(_span(clause.cue), clause.text, state, bool(follows))
-        if clause.kind is Kind.TIMES:
+        if clause.kind is Cue.TIMES:
             return Rounds(Repeat((), times=_times(clause.cue)), state), clause.text
-        if clause.kind is Kind.UNTIL:
+        if clause.kind is Cue.UNTIL:
             for cut_at in (len(clause.text), *verb_positions(clause.text)):
                 if time_of(clause.text[:cut_at].strip(" ,")) is not None:
-                    found = Behind("", Kind.UNTIL, clause.cue, clause.text[:cut_at].strip(" ,"))
+                    found = Behind("", Cue.UNTIL, clause.cue, clause.text[:cut_at].strip(" ,"))
                     return self._rounds_behind(row, (), found) or Rounds(Repeat(()), state), clause.text[cut_at:]
         supposed, rest = self.split(clause.text, state, follows)
         return _rounds_by(clause.kind, supposed), rest
@@ -317,13 +317,13 @@ class Repeats(Branches):
             supposed = suppose(match["what"], state, self.leaves)
         except RefusalError:
             return None
-        kind = Kind.UNTIL if match["how"].lower() in ("until", "till") else Kind.WHILE
+        kind = Cue.UNTIL if match["how"].lower() in ("until", "till") else Cue.WHILE
         rounds = _rounds_by(kind, supposed)
         return replace(rounds, block=replace(rounds.block, every_s=every_s))
 
     def _on_the_way(self, row: Row, clause: Clause, follows: Sequence[Clause]) -> bool:
         """ "While driving to the kitchen, say ...": both at once, where that is simple."""
-        match = ACTS.under_way.match(clause.text) if clause.kind is Kind.WHILE else None
+        match = ACTS.under_way.match(clause.text) if clause.kind is Cue.WHILE else None
         if match is None:
             return False
         for cut_at in (*([len(clause.text)] if follows else []), *verb_positions(clause.text)):
@@ -346,15 +346,15 @@ class Repeats(Branches):
     def modified(self, row: Row, clause: Clause, found: Behind) -> None:
         """What is done only if something is so, or several times."""
         scope = self._scope(row, clause, found)
-        if found.kind in (Kind.IF, Kind.UNLESS):
+        if found.kind in (Cue.IF, Cue.UNLESS):
             self._guarded(row, scope, found)
             return
-        if found.kind is Kind.WHILE and (match := ACTS.under_way.match(found.text)) is not None:
+        if found.kind is Cue.WHILE and (match := ACTS.under_way.match(found.text)) is not None:
             self.beside(row, found.text[match.end() :].strip(), scope)
             return
-        if found.kind is Kind.EVERY:
+        if found.kind is Cue.EVERY:
             rounds = self.limited(_span(found.cue), found.text, row.state)
-        elif found.kind is Kind.TIMES:
+        elif found.kind is Cue.TIMES:
             rounds = Rounds(Repeat((), times=_times(found.cue)), row.state) if not found.text else None
         else:
             rounds = self._rounds_behind(row, scope, found)
@@ -366,7 +366,7 @@ class Repeats(Branches):
         """ "... until there are none left", "... until three o'clock"."""
         if not found.text:
             raise RefusalError(f"{found.cue.lower()} what?", [found.cue])
-        if found.kind is Kind.UNTIL and (time := time_of(found.text)) is not None:
+        if found.kind is Cue.UNTIL and (time := time_of(found.text)) is not None:
             self.notes += [f"I take '{found.text}' as {time.text}"] if time.taken else []
             return Rounds(Repeat((), until=ValueIs(Expression(f'clock >= "{time.text}"'))), row.state)
         _, state = type(self)(self.leaves).sequence(scope, row.state)
@@ -404,16 +404,16 @@ class Repeats(Branches):
         supposed = suppose(found.text, replace(state, goal=row.state.goal, at=row.state.at), self.leaves)
         supposed = where_it_is_taken(supposed, steps, found.text)
         begun = row.state
-        if found.kind is Kind.IF:
+        if found.kind is Cue.IF:
             told = supposed.holds.memory.told
             begun = replace(begun, memory=replace(begun.memory, told=told))
         again = type(self)(self.leaves)
         again.told = sentence_of(supposed)
         steps, state = again.sequence(scope, replace(begun, goal=supposed.holds.goal))
         self.notes += [*again.notes, *supposed.notes]
-        condition = negated(supposed.condition) if found.kind is Kind.UNLESS else supposed.condition
+        condition = negated(supposed.condition) if found.kind is Cue.UNLESS else supposed.condition
         both = Supposed(condition, supposed.said, supposed.holds, supposed.fails)
-        if found.kind is Kind.UNLESS:
+        if found.kind is Cue.UNLESS:
             both = replace(both, holds=supposed.fails, fails=supposed.holds)
         self.put(row, Choose(condition, steps), merged(state, row.state))
         row.asked = LookedAt(both, looked=False, decided=True)
@@ -437,8 +437,8 @@ def _one_repeat(block: Repeat) -> Repeat:
     return replace(inner, until=block.until, while_=block.while_)
 
 
-def _rounds_by(kind: Kind | None, supposed: Supposed) -> Rounds:
-    if kind is Kind.UNTIL:
+def _rounds_by(kind: Cue | None, supposed: Supposed) -> Rounds:
+    if kind is Cue.UNTIL:
         return Rounds(Repeat((), until=supposed.condition), supposed.fails)
     return Rounds(Repeat((), while_=supposed.condition), supposed.holds)
 

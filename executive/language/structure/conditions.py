@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
+from executive.language.amounts import AMOUNTS, seconds_of, share_of, time_of
+from executive.language.clauses import CLAUSES
 from executive.language.items import Chunk, Item
 from executive.language.lexicon import Patterns
 from executive.language.questions import RefusalError, RefusalKind, Slot, which
 from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
-from executive.language.structure.amounts import AMOUNTS, seconds_of, share_of, time_of
-from executive.language.structure.cutting import CLAUSES
 from executive.language.structure.leaves import Leaves, State, Supposed, negated, placed, verb
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Not, ValueIs
 from executive.words.expression import Expression

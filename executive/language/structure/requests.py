@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
+from executive.language.amounts import AMOUNTS, SPAN, seconds_of, share_of, time_of
+from executive.language.clauses import ACTS, CLAUSES
 from executive.language.lexicon import Patterns
 from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.roles import Location
-from executive.language.structure.amounts import AMOUNTS, SPAN, seconds_of, share_of, time_of
 from executive.language.structure.conditions import meeting, pressed, reading, suppose
-from executive.language.structure.cutting import ACTS, CLAUSES
 from executive.language.structure.leaves import Leaf, Leaves, State, Supposed, named, negated, verb
 from executive.words.blocks import Dock, Wait
 from executive.words.command import Task

@@ -6,10 +6,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, spoken
 from executive.language.lexicon import VerbKind
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE
-from executive.language.structure.cutting import ACTS, CLAUSES, Behind, Clause, Kind, spoken
 from executive.language.structure.leaves import Leaf, Leaves, State, Supposed, negated
 from executive.language.structure.requests import Done, template
 from executive.words.blocks import Block, Repeat, Speak
@@ -62,16 +62,16 @@ def end_of(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: 
 
     `branch` says that it is a second branch, behind which "then" goes on with what is done in either case.
     """
-    attached = (Kind.SO, Kind.NOT, Kind.OTHERWISE, Kind.FAILED)
+    attached = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)
     first = any(re.search(r"\bfirst\b", one.joint, re.IGNORECASE) for one in clauses[at : at + 1])
     for n in range(at, len(clauses)):
         one = clauses[n]
         if rounds:
-            goes_on = one.kind in attached or (one.kind is Kind.IF and ACTS.pronoun.match(one.text) is not None)
+            goes_on = one.kind in attached or (one.kind is Cue.IF and ACTS.pronoun.match(one.text) is not None)
             if (one.begins and n > at and not goes_on) or (n > at and (_after_all(one, first) or one.anyway)):
                 return n
             continue
-        if one.kind in attached or one.kind in (Kind.IF, Kind.UNLESS, Kind.SOON):
+        if one.kind in attached or one.kind in (Cue.IF, Cue.UNLESS, Cue.SOON):
             return n
         if n > at and (one.begins or _after_all(one, first) or one.anyway or (branch and one.then)):
             return n
@@ -195,7 +195,7 @@ def unclear(found: Behind) -> RefusalError:
 
 def was_not(clauses: Sequence[Clause], at: int) -> bool:
     """Whether "if not" stood before."""
-    return any(one.kind is Kind.NOT for one in clauses[:at])
+    return any(one.kind is Cue.NOT for one in clauses[:at])
 
 
 class Base:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from executive.language.cleaning import smoothed
+from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, behind, cut
 from executive.language.items import Adverb, Chunk
 from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
@@ -17,7 +17,6 @@ from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.structure.branches import Repeats, ends_anyway
 from executive.language.structure.conditions import suppose
-from executive.language.structure.cutting import ACTS, CLAUSES, Behind, Clause, Kind, behind, cut, reworded
 from executive.language.structure.leaves import Leaves, State, at_start, named, placed, verb
 from executive.language.structure.requests import (
     Asked,
@@ -175,8 +174,8 @@ class Acts(Repeats):
         found: dict[str, Steps] = {"yes": (), "no": ()}
         while at < len(clauses):
             clause = clauses[at]
-            match = ACTS.answers.match(clause.text) if clause.kind is Kind.IF else None
-            answer = "yes" if clause.kind is Kind.SO else "no" if clause.kind in (Kind.NOT, Kind.OTHERWISE) else None
+            match = ACTS.answers.match(clause.text) if clause.kind is Cue.IF else None
+            answer = "yes" if clause.kind is Cue.SO else "no" if clause.kind in (Cue.NOT, Cue.OTHERWISE) else None
             rest = clause.text
             if match is not None:
                 answer = "no" if match["no"] else "yes"
@@ -303,7 +302,7 @@ def _asks_back(text: str, leaves: Leaves) -> bool:
 
 def _spoken_of(found: Behind, text: str) -> bool:
     """Whether what would stand behind a clause is a part of what is said."""
-    return found.kind in (Kind.TIMES, Kind.EVERY) and bool(found.text) and not re.match(r"for|until|every", found.text)
+    return found.kind in (Cue.TIMES, Cue.EVERY) and bool(found.text) and not re.match(r"for|until|every", found.text)
 
 
 def _of_whom(text: str, state: State) -> str:
@@ -332,9 +331,14 @@ class Structured:
 
 
 def structured(
-    text: str, *, parser: DependencyParser, knowledge: Knowledge, memory: Memory | None, plain: bool = False
+    clauses: Sequence[Clause],
+    *,
+    parser: DependencyParser,
+    knowledge: Knowledge,
+    memory: Memory | None,
+    plain: bool = False,
 ) -> Structured | None:
-    """The steps of a sentence that `mentions_structure`; None where it lists plain commands nevertheless.
+    """The steps of a sentence's clauses; None where it lists plain commands nevertheless.
 
     `plain` says that it could be read as such a list, too: then only what certainly decides or repeats is read
     otherwise.
@@ -343,7 +347,6 @@ def structured(
         RefusalError: it decides, repeats, waits, says or asks something that is not surely understood; the message
             names the words.
     """
-    clauses = cut(reworded(smoothed(text)))
     if plain and not any(one.kind is not None or behind(one.text) is not None for one in clauses):
         return None
     if len(clauses) > MOST_CLAUSES:
@@ -386,11 +389,11 @@ class Builder(Acts):
         clause = clauses[at]
         if clause.anyway or ends_anyway(clause):
             return self.always(row, clauses, at)
-        if clause.kind in (Kind.IF, Kind.UNLESS):
+        if clause.kind in (Cue.IF, Cue.UNLESS):
             return self.decided(row, clauses, at)
-        if clause.kind in (Kind.SO, Kind.NOT, Kind.OTHERWISE, Kind.FAILED):
+        if clause.kind in (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED):
             return self.attached(row, clauses, at)
-        if clause.kind is Kind.SOON:
+        if clause.kind is Cue.SOON:
             return self.soon(row, clauses, at)
         if clause.kind is not None:
             return self.repeated(row, clauses, at)

@@ -1,6 +1,6 @@
 import pytest
 
-from executive.language.structure.amounts import seconds_of, share_of, time_of, times_of
+from executive.language.amounts import seconds_of, share_of, time_of, times_of
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 import pytest
 
-from executive.language.structure.cutting import Kind, behind, cut
+from executive.language.clauses import Cue, behind, cut
 
 
 def cues(text):
@@ -10,8 +10,8 @@ def cues(text):
 def test_clauses_begin_with_verbs_and_with_words_that_decide():
     assert cues("go to the hall, and if there is a beer bring it, otherwise get a coke") == [
         (None, "", "go to the hall"),
-        (Kind.IF, "if", "there is a beer bring it"),
-        (Kind.OTHERWISE, "otherwise", "get a coke"),
+        (Cue.IF, "if", "there is a beer bring it"),
+        (Cue.OTHERWISE, "otherwise", "get a coke"),
     ]
 
 
@@ -25,10 +25,10 @@ def test_what_is_one_clause_stays_whole(text):
 @pytest.mark.parametrize(
     ("text", "before", "kind", "rest"),
     [
-        ("bring a beer if there is one", "bring a beer", Kind.IF, "there is one"),
-        ("go to the hall every ten minutes for an hour", "go to the hall", Kind.EVERY, "for an hour"),
-        ("go to the hall three times", "go to the hall", Kind.TIMES, ""),
-        ("look for it until you find it", "look for it", Kind.UNTIL, "you find it"),
+        ("bring a beer if there is one", "bring a beer", Cue.IF, "there is one"),
+        ("go to the hall every ten minutes for an hour", "go to the hall", Cue.EVERY, "for an hour"),
+        ("go to the hall three times", "go to the hall", Cue.TIMES, ""),
+        ("look for it until you find it", "look for it", Cue.UNTIL, "you find it"),
     ],
 )
 def test_what_stands_behind_is_told_apart(text, before, kind, rest):

@@ -1,20 +1,23 @@
-"""What a sentence means for several robots: a part for each, and which parts wait for which."""
+"""What a sentence means for several robots: a part for each, which parts wait for which, and what changes hands."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from typing import Any, Final
 
+from executive.language.addressees import Saying, Who, Whom, addressees
+from executive.language.clauses import Clause, Split, split
 from executive.language.cleaning import clean
 from executive.language.parser import DependencyParser
-from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, with_answer
+from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind
 from executive.language.reference import Memory
-from executive.language.robots.calls import Whom, calls_of
-from executive.language.robots.cutting import Cut, Piece, Who, cut_by_robot, narrates
-from executive.language.robots.handing import handed_on, moved, takes_what_was_put, with_place
-from executive.language.understand import Status, Understanding, understand
+from executive.language.roles import Location
+from executive.language.spelling import Corrected
+from executive.language.understand import Status, Understanding, asked_until_clear, meaning, spelled, understand
+from executive.words.command import Task
 from executive.words.knowledge import Knowledge
 from executive.words.robots import display_name, robot_called
 from skills.files.errors import listing
@@ -89,24 +92,36 @@ def understand_for_robots(
     A part that nobody is named for is for any of them. `require_wake` says that one of the names, or a word that calls
     all, must be said. The other arguments are those of `understand`. Never raises on text.
     """
-    reader = _Reader(tuple(robots), parser, knowledge, correct)
     if len(robots) == 1:
-        meant = reader.meaning(sentence, robots[0], memory, require_wake)
-        return _of_one(meant, robots[0])
+        name = display_name(robots[0])
+        alone = understand(
+            sentence,
+            parser=parser,
+            knowledge=knowledge,
+            require_wake=require_wake,
+            robot_name=name,
+            memory=memory,
+            correct=correct,
+        )
+        return _of_one(alone, robots[0])
     text = clean(sentence)
+    names = tuple(map(display_name, robots))
     stranger = re.match(rf"\W*{_GREETING}\b[\s,]+(?P<name>[A-Z][\w'-]*)\s*,", text)
+    said = spelled(text, parser, knowledge) if correct else Corrected(text)
     try:
-        cut = cut_by_robot(text, tuple(map(display_name, robots)))
-        if cut.listener is None and stranger is not None and not _calls_all(stranger["name"], robots):
-            what = f"there is no robot called {stranger['name']}; there are {listing(map(display_name, robots))}"
+        cut = split(said.text, names)
+        everybody = stranger is not None and addressees(names).forms.called.fullmatch(stranger["name"]) is not None
+        if cut.listener is None and stranger is not None and not everybody:
+            what = f"there is no robot called {stranger['name']}; there are {listing(names)}"
             return Addressed(sentence, Status.NOT_ADDRESSED, reason=what, unknown_words=(stranger["name"],))
         if require_wake and cut.listener is None:
-            called = listing((f'"Hey {display_name(name)}"' for name in robots), last="or")
+            called = listing((f'"Hey {name}"' for name in names), last="or")
             reason = f"no robot's name was said; begin with {called}"
             return Addressed(sentence, Status.NOT_ADDRESSED, reason=reason)
-        return reader.addressed(sentence, cut, memory)
+        found = _Reader(tuple(robots), parser, knowledge).addressed(sentence, cut, memory)
     except RefusalError as refusal:
         return Addressed(sentence, Status.REFUSED, reason=refusal.reason, unknown_words=tuple(refusal.unknown))
+    return replace(found, notes=(*said.notes, *found.notes))
 
 
 def understand_for_robots_asking(
@@ -120,15 +135,13 @@ def understand_for_robots_asking(
     correct: bool = True,
 ) -> Addressed:
     """The same once its questions are answered; one that is left open is what comes back."""
-    for _ in range(_MOST_QUESTIONS + 1):
-        meant = understand_for_robots(
-            sentence, robots=robots, parser=parser, knowledge=knowledge, require_wake=require_wake, correct=correct
+
+    def meant(text: str) -> Addressed:
+        return understand_for_robots(
+            text, robots=robots, parser=parser, knowledge=knowledge, require_wake=require_wake, correct=correct
         )
-        said = None if meant.question is None else answer(meant.question)
-        if meant.question is None or said is None:
-            break
-        sentence = with_answer(sentence, meant.question, said)
-    return meant
+
+    return asked_until_clear(sentence, meant, answer)
 
 
 def _of_one(meant: Understanding, robot: str) -> Addressed:
@@ -138,15 +151,11 @@ def _of_one(meant: Understanding, robot: str) -> Addressed:
     return Addressed(meant.text, meant.status, parts, *rest)
 
 
-def _calls_all(name: str, robots: Sequence[str]) -> bool:
-    return re.fullmatch(calls_of(tuple(robots)).called, name, re.IGNORECASE) is not None
-
-
 @dataclass(frozen=True)
 class _Read:
-    """A piece with its meaning, and the numbers of the pieces that it waits for."""
+    """A part with its meaning, and the numbers of the parts that it waits for."""
 
-    piece: Piece
+    part: Saying
     meaning: Understanding
     after: frozenset[int] = frozenset()
 
@@ -156,36 +165,25 @@ class _Reader:
     robots: tuple[str, ...]
     parser: DependencyParser
     knowledge: Knowledge
-    correct: bool
 
-    def meaning(self, text: str, robot: str, memory: Memory | None, require_wake: bool = False) -> Understanding:
-        """What a text without other robots means."""
-        return understand(
-            text,
-            parser=self.parser,
-            knowledge=self.knowledge,
-            require_wake=require_wake,
-            robot_name=display_name(robot),
-            memory=memory,
-            correct=self.correct,
-        )
-
-    def addressed(self, sentence: str, cut: Cut, memory: Memory | None) -> Addressed:
+    def addressed(self, sentence: str, cut: Split, memory: Memory | None) -> Addressed:
         """The parts of a sentence that was cut."""
         read: list[_Read] = []
-        pieces, told = _joined(cut.pieces), ""
-        for number, piece in enumerate(pieces):
-            if piece.deed:
-                piece = replace(piece, text=self._to_do(piece.text))
-            text = f"{told}{piece.text}"
-            one = self._read(replace(piece, text=text), read, memory)
-            last = number == len(pieces) - 1
-            if _only_tells(one.meaning) and not last:
-                told = f"{text.rstrip(' .')}. "
+        told: tuple[Clause, ...] = ()
+        parts = [tuple(clauses) for _, clauses in groupby(cut.clauses, key=lambda clause: id(clause.part))]
+        for number, clauses in enumerate(parts):
+            part = clauses[0].part
+            assert part is not None
+            if told and told[0].part is not None:
+                part = replace(part, text=f"{told[0].part.text.rstrip(' .')}. {part.text}")
+                clauses = (*told, replace(clauses[0], joint=". "), *clauses[1:])
+            one = self._read(part, clauses, read, memory)
+            if one.meaning.refused_as is RefusalKind.NOTHING_TO_DO and number < len(parts) - 1:
+                told = (replace(clauses[0], part=part), *clauses[1:])
                 continue
             if (refused := self._refused(sentence, one)) is not None:
                 return refused
-            told, memory = "", one.meaning.memory
+            told, memory = (), one.meaning.memory
             read.append(one)
         if not read:
             names = listing(map(display_name, self.robots))
@@ -193,40 +191,42 @@ class _Reader:
         notes = tuple(dict.fromkeys(note for one in read for note in one.meaning.notes))
         return Addressed(sentence, Status.OK, tuple(self._parts(read, cut)), notes=notes, memory=memory)
 
-    def _read(self, piece: Piece, before: Sequence[_Read], memory: Memory | None) -> _Read:
-        """The meaning of a piece, and what it waits for. Raises RefusalError."""
-        if piece.otherwise and before and before[-1].piece.who != piece.who:
+    def _meaning(self, text: str, clauses: Sequence[Clause], memory: Memory | None) -> Understanding:
+        said = Corrected(text)
+        return meaning(text, said, parser=self.parser, knowledge=self.knowledge, memory=memory, clauses=clauses)
+
+    def _read(self, part: Saying, clauses: Sequence[Clause], before: Sequence[_Read], memory: Memory | None) -> _Read:
+        """The meaning of a part, and what it waits for. Raises RefusalError."""
+        if part.otherwise and before and before[-1].part.who != part.who:
             raise RefusalError("what one robot finds cannot decide what another does; say it as two requests")
-        robot = piece.who[0] if isinstance(piece.who, tuple) else self.robots[0]
-        changes_hands = bool(before) and before[-1].piece.who != piece.who
+        changes_hands = bool(before) and before[-1].part.who != part.who
         memory = handed_on(before[-1].meaning) if changes_hands else memory
-        text = (
-            re.sub(r"\s+from there\b", "", piece.text) if changes_hands and re.search(_IT, piece.text) else piece.text
-        )
-        piece = replace(piece, text=text)
-        meant = self.meaning(piece.text, robot, memory)
-        after = set(self._said_before(piece, before))
+        if changes_hands and re.search(_IT, part.text):
+            part = replace(part, text=re.sub(_FROM_THERE, "", part.text))
+            clauses = [replace(clause, text=re.sub(_FROM_THERE, "", clause.text)) for clause in clauses]
+        meant = self._meaning(part.text, clauses, memory)
+        after = set(self._said_before(part, before))
         for number, other in enumerate(before):
-            if other.piece.who == piece.who:
+            if other.part.who == part.who:
                 continue
             if (place := moved(other.meaning, meant)) is not None and memory is not None:
-                meant = self.meaning(piece.text, robot, with_place(memory, place))
+                meant = self._meaning(part.text, clauses, with_place(memory, place))
             if takes_what_was_put(other.meaning, meant):
                 after.add(number)
         if changes_hands:
-            self._check_in_hand(before[-1].meaning, meant, piece.who)
-        self._check_one_thing(piece, meant)
-        return _Read(piece, meant, frozenset(after))
+            self._check_in_hand(before[-1].meaning, meant, part.who)
+        self._check_one_thing(part, meant)
+        return _Read(part, meant, frozenset(after))
 
-    def _said_before(self, piece: Piece, before: Sequence[_Read]) -> Iterator[int]:
+    def _said_before(self, part: Saying, before: Sequence[_Read]) -> Iterator[int]:
         """The pieces that are said to come before one."""
-        if piece.then:
-            yield from (n for n in _side_by_side(before) if before[n].piece.who != piece.who)
-        if piece.behind is None or piece.behind == piece.who:
+        if part.then:
+            yield from (n for n in _side_by_side(before) if before[n].part.who != part.who)
+        if part.behind is None or part.behind == part.who:
             return
-        found = [n for n, other in enumerate(before) if _share(other.piece.who, piece.behind)]
+        found = [n for n, other in enumerate(before) if _share(other.part.who, part.behind)]
         if not found:
-            who = listing(map(display_name, piece.behind if isinstance(piece.behind, tuple) else self.robots))
+            who = listing(map(display_name, part.behind if isinstance(part.behind, tuple) else self.robots))
             raise RefusalError(f"nothing was said that {who} is to do before", [who])
         yield found[-1]
 
@@ -249,24 +249,24 @@ class _Reader:
                 [str(thing)],
             )
 
-    def _check_one_thing(self, piece: Piece, meant: Understanding) -> None:
+    def _check_one_thing(self, part: Saying, meant: Understanding) -> None:
         """Refuse to send several robots for the one thing."""
-        several = piece.who is Whom.ALL or (isinstance(piece.who, tuple) and len(piece.who) > 1)
+        several = part.who is Whom.ALL or (isinstance(part.who, tuple) and len(part.who) > 1)
         if not several or meant.trace is None:
             return
         grasps = {str(command.object) for command in meant.commands if command.task and command.task.value == "grasp"}
         targets = (one.target for one in meant.trace.resolved)
         definite = [target for target in targets if target is not None and not target.indefinite and not target.plural]
         if grasps and definite:
-            what = f"{self._named(piece.who)} cannot all take the one {definite[0].text}; say which of them"
+            what = f"{self._named(part.who)} cannot all take the one {definite[0].text}; say which of them"
             raise RefusalError(what, [definite[0].text])
 
     def _refused(self, sentence: str, one: _Read) -> Addressed | None:
         """The answer where a piece is not understood, or speaks of a robot as of a person."""
         meant = one.meaning
-        named = [name for name in self.robots if re.search(rf"\b{re.escape(name)}\b", one.piece.text, re.IGNORECASE)]
+        named = [name for name in self.robots if re.search(rf"\b{re.escape(name)}\b", one.part.text, re.IGNORECASE)]
         named = [name for name in named if self.knowledge.person(name) is None]
-        if named and not narrates(one.piece.text, self.robots) and not _quotes(one.piece.text):
+        if named and not addressees(self.robots).narrates(one.part.text) and not _quotes(one.part.text):
             name = display_name(named[0])
             reason = (
                 f"{name} is a robot, and not somebody to go to or to hand things to; "
@@ -279,14 +279,14 @@ class _Reader:
             sentence, meant.status, (), meant.reason, meant.unknown_words, meant.question, meant.notes, meant.memory
         )
 
-    def _parts(self, read: Sequence[_Read], cut: Cut) -> Iterator[Part]:
-        """A part for each robot of each piece."""
+    def _parts(self, read: Sequence[_Read], cut: Split) -> Iterator[Part]:
+        """A part for each robot of each part."""
         listener = cut.listener
         by = robot_called(listener[0], self.robots) if isinstance(listener, tuple) else None
         numbers: list[tuple[int, ...]] = []
         count = 0
         for one in read:
-            who = self._who(one.piece.who)
+            who = self._who(one.part.who)
             after = tuple(sorted({at for number in one.after for at in numbers[number]}))
             numbers.append(tuple(range(count, count + len(who))))
             count += len(who)
@@ -302,33 +302,12 @@ class _Reader:
         names = who if isinstance(who, tuple) else self.robots
         return listing(map(display_name, names), last="and" if who is not None else "or")
 
-    def _to_do(self, deed: str) -> str:
-        """What was done as what is to be done: "has brought a coke" -> "bring a coke"."""
-        said = f"She has {deed}"
-        tokens = self.parser.parse(said)
-        verb = next((token for token in tokens[2:3]), None)
-        return deed if verb is None else f"{verb.lemma} {said[verb.start + len(verb.text) :].strip()}"
-
-
-def _joined(pieces: Sequence[Piece]) -> tuple[Piece, ...]:
-    """Pieces in a row for the same robots as one."""
-    found: list[Piece] = []
-    for piece in pieces:
-        last = found[-1] if found else None
-        waits = piece.behind is not None and piece.behind != piece.who
-        if last is not None and last.who == piece.who and not waits and not (last.deed or piece.deed):
-            joint = ", otherwise " if piece.otherwise else ", then " if piece.then else " and "
-            found[-1] = replace(last, text=f"{last.text}{joint}{piece.text}")
-        else:
-            found.append(piece)
-    return tuple(found)
-
 
 def _side_by_side(before: Sequence[_Read]) -> Iterator[int]:
     """The last piece, and those right before it that it does not wait for."""
     for number in range(len(before) - 1, -1, -1):
         yield number
-        if before[number].after or before[number].piece.then:
+        if before[number].after or before[number].part.then:
             return
 
 
@@ -339,9 +318,52 @@ def _share(one: Who | None, other: Who) -> bool:
     return one is not None
 
 
-def _only_tells(meant: Understanding) -> bool:
-    """Whether a text only tells how something is."""
-    return meant.status is Status.REFUSED and meant.refused_as is RefusalKind.NOTHING_TO_DO
+def handed_on(meant: Understanding) -> Memory | None:
+    """What was spoken of, for another robot: things are where they were put, or looked for."""
+    memory, place = meant.memory, _where(meant)
+    return memory if memory is None or place is None else replace(memory, where=place, place=place)
+
+
+def with_place(memory: Memory, place: Location) -> Memory:
+    """The memory of things that are at `place`, whatever was said of them last."""
+    return replace(memory, told=(*memory.told, *((thing, place) for thing in memory.things)))
+
+
+def moved(before: Understanding, meant: Understanding) -> Location | None:
+    """Where a thing was put that `meant` names once more, without saying where it is ("the beer")."""
+    if meant.trace is None or before.trace is None or meant.status is not Status.OK or before.memory is None:
+        return None
+    named = (one for one in meant.trace.resolved if one.target is not None and one.source is None and not one.again)
+    same = any(
+        one.target is not None and not one.target.indefinite and one.target.text == thing.text
+        for one in named
+        for thing in before.memory.things
+    )
+    return _where(before) if same and _puts(before) else None
+
+
+def takes_what_was_put(before: Understanding, meant: Understanding) -> bool:
+    """Whether a thing is taken from where it was put before."""
+    put = {(str(command.item), command.goal) for command in before.commands if command.item is not None}
+    taken = {(str(command.object), command.goal) for command in meant.commands if command.task is Task.GRASP}
+    return bool(put & taken)
+
+
+def _puts(meant: Understanding) -> bool:
+    return any(command.item is not None for command in meant.commands)
+
+
+def _where(meant: Understanding) -> Location | None:
+    """The place where the things that were spoken of are at last; None with somebody, or where nothing is known."""
+    memory = meant.memory
+    if memory is None or meant.trace is None:
+        return None
+    for action in reversed(meant.trace.resolved):
+        if action.target in memory.things:
+            place = action.goal or action.source
+            return None if place is None or place.phrase is None or place.living else place
+    place = memory.place
+    return None if meant.trace.resolved or place is None or place.phrase is None or place.living else place
 
 
 def _quotes(text: str) -> bool:
@@ -349,6 +371,6 @@ def _quotes(text: str) -> bool:
     return re.match(r"(?:say|announce|shout)\b(?!.* to \w+\W*$)", text, re.IGNORECASE) is not None
 
 
-_MOST_QUESTIONS: Final = 3
 _GREETING: Final = r"(?i:hey|hi|ok|okay|hello)"
 _IT: Final = r"\b(?:it|them)\b"
+_FROM_THERE: Final = r"\s+from there\b"

@@ -1,0 +1,299 @@
+"""Who of several robots is meant, and what is said to each: "Alice, go to the hall and let Bob bring a coke"."""
+
+from __future__ import annotations
+
+import enum
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from typing import Final
+
+from executive.language.lexicon import Patterns, lexicon, read_table
+from executive.language.questions import RefusalError
+from executive.language.wake import addressed_to
+from executive.words.robots import display_name, robot_called
+from skills.files.errors import listing
+
+__all__ = ["Addressees", "Saying", "Who", "Whom", "addressees"]
+
+_NUMBERS: Final = {"two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "both": 2}
+_YOU: Final = frozenset({"you", "yourself"})
+_SOMEBODY: Final = frozenset({"he", "she", "it", "they", "that", "this", "you"})
+_WAITS: Final = frozenset({"after", "wait"})
+_LEADS: Final[Mapping[str, str]] = {"check": "check ", "send": "go "}
+_REFUSED: Final[Mapping[str, str]] = {
+    "not": "say what a robot is to do, and not what it is not to do",
+    "or": "say which of the robots is meant",
+}
+
+
+class Whom(enum.Enum):
+    """Who does a part of a sentence, where it is no one robot by its name."""
+
+    ALL = "all"  # each of the robots
+    ANY = "any"  # whichever of them does it best: none was named
+
+
+Who = tuple[str, ...] | Whom
+"""Robots by their names, or all of them, or any."""
+
+
+@dataclass(frozen=True)
+class Saying:
+    """What is said to one addressee: `who` is None where nobody was named; `joint` stood before it.
+
+    `then` says that it comes after the one before it; `behind` names the robots whose parts before it have to be done
+    first. `otherwise` says that it hangs on the condition of the one before it. `deed` says that it tells what the
+    robot has done by then, which is what it is to do.
+    """
+
+    who: Who | None
+    text: str
+    joint: str = ""
+    then: bool = False
+    behind: Who | None = None
+    otherwise: bool = False
+    deed: bool = False
+
+
+@cache
+def _verbs() -> Mapping[str, str]:
+    """The verbs by their forms: "bring" and "brings" are bring."""
+    table = read_table("robots.yaml")
+    bases = {verb[0] for verb in lexicon().verbs} | set(table["verbs_too"].split("|"))
+    forms = {f"{base}{'es' if re.search('(?:s|x|z|ch|sh)$', base) else 's'}": base for base in bases}
+    return {**forms, **table["third_persons"], **{base: base for base in bases}}
+
+
+@cache
+def addressees(names: tuple[str, ...]) -> Addressees:
+    """Finds the robots of these names where they are called."""
+    return Addressees(names)
+
+
+@dataclass(frozen=True)
+class Addressees:
+    """Finds the robots `names` where they are called, and parts what is said to each."""
+
+    names: tuple[str, ...]
+
+    @cached_property
+    def forms(self) -> Patterns:
+        """How they are called and told what to do."""
+        longest = sorted(map(re.escape, self.names), key=len, reverse=True)
+        verbs = rf"(?:{'|'.join(sorted(map(re.escape, _verbs()), key=len, reverse=True))})(?![\w'])"
+        return Patterns("robots.yaml", words={"one": rf"(?:{'|'.join(longest)})(?![\w'-])", "verbs": verbs})
+
+    def meant(self, said: str, but: Sequence[str] = ()) -> Who:
+        """Which robots `said` names; "the other robot" is the one that is none of `but`.
+
+        Raises RefusalError: as many robots as it says are not there.
+        """
+        words = " ".join(said.lower().split())
+        if self.forms.other.fullmatch(words):
+            others = tuple(name for name in self.names if name not in but)
+            if len(others) != 1:
+                raise RefusalError(f"which robot is '{said}'? say its name", [said])
+            return others
+        if self.forms.everybody.fullmatch(words):
+            number = next((_NUMBERS[word] for word in words.split() if word in _NUMBERS), None)
+            if number is not None and number != len(self.names):
+                known = listing(map(display_name, self.names))
+                raise RefusalError(f"there are {len(self.names)} robots, {known}: which are '{said}'?", [said])
+            return Whom.ALL
+        found = self.forms.one.findall(said)
+        return tuple(dict.fromkeys(filter(None, (robot_called(name, self.names) for name in found))))
+
+    def called_in_talk(self, text: str) -> tuple[Who, str] | None:
+        """Several robots that a text calls first, and the rest of it. Raises RefusalError: see `meant`."""
+        match = self.forms.talk.match(text)
+        return None if match is None else (self.meant(match["who"]), text[match.end() :])
+
+    def narrates(self, text: str) -> bool:
+        """Whether all that a text says of robots is how they are: "Bob can't reach the shelf"."""
+        return re.search(rf"\b{self.forms.one.pattern}", self.forms.narrated.sub("", text), re.IGNORECASE) is None
+
+    def parts(self, text: str) -> tuple[Who | None, tuple[Saying, ...]]:
+        """Whom a sentence is said to first, and its parts by who is to do them, those in a row for the same as one.
+
+        Raises RefusalError: it is not clear which robots are meant, or it says what one is not to do.
+        """
+        parting = _Parting(self, *self.listener(text))
+        found: list[Saying] = []
+        for part in parting.parts():
+            last = found[-1] if found else None
+            waits = part.behind is not None and part.behind != part.who
+            if last is not None and last.who == part.who and not waits and not (last.deed or part.deed):
+                joint = part.joint if re.search(r"\w", part.joint) else " and "
+                found[-1] = replace(last, text=f"{last.text}{joint}{part.text}")
+            else:
+                found.append(part)
+        return parting.listener, tuple(found)
+
+    def listener(self, text: str) -> tuple[Who | None, str]:
+        """Who a sentence is said to, and the rest of it. Raises RefusalError: see `meant`."""
+        if (match := self.forms.first.match(text)) is not None:
+            return self.meant(_who(match)), text[match.end() :]
+        if (match := self.forms.last.search(text)) is not None and not _lists(text[: match.start()]):
+            return self.meant(_who(match)), text[: match.start()]
+        address = addressed_to(text, self.names)
+        if address.name is not None:
+            return (address.name,), address.text
+        if (match := self.forms.called_back.search(text)) is not None:
+            return self.meant(_who(match)), f"{text[: match.start()]}{match['mark']}{text[match.end() :]}"
+        return None, text
+
+    @cached_property
+    def begins(self) -> tuple[tuple[str, re.Pattern[str]], ...]:
+        """What begins another robot's part, in the order of trying."""
+        return self.forms.mapping("begins")
+
+    def imperative(self, text: str) -> str:
+        """What somebody does as what is to be done: "goes to the hall and brings" -> "go to the hall and bring"."""
+        return self.forms.third_person.sub(lambda match: f"{match[1]}{_verbs()[match[2].lower()]}", text)
+
+    def tidy(self, text: str) -> str:
+        """The text without signs at its ends and without joints at its beginning."""
+        return self.forms.begins_with_joints.sub("", text.strip(" ,;:-")).strip(" ,;:-")
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A place where another robot's part begins, with its text behind `end`; `lead` is the verb that it stands for."""
+
+    who: str
+    end: int
+    kind: str
+    lead: str = ""
+
+
+@dataclass
+class _Parting:
+    """Parts one sentence by who is to do what."""
+
+    calls: Addressees
+    listener: Who | None
+    text: str
+    address: Who | None = None
+    found: list[Saying] = field(default_factory=list)
+
+    def parts(self) -> tuple[Saying, ...]:
+        """The parts of the sentence, in order."""
+        text, self.address, at = self.text, self.listener, 0
+        self.found = [Saying(self.listener, "")]
+        for start in (0, *(match.end() for match in self.calls.forms.boundary.finditer(text))):
+            if start < at:
+                continue
+            if (found := self._begins(start, at)) is not None:
+                called = self.calls.meant(found.who) if self.listener is None and found.kind == "call" else None
+                self.listener = self.listener or called
+                self._take(found, text[at:start])
+                at = found.end
+            elif self.found[-1].deed and text[:start].rstrip().endswith(","):
+                self._add(text[at:start])
+                self.found.append(Saying(self.address, "", then=True))
+                at = start
+        self._add(text[at:])
+        if len(self.found) > 1 and not _says(self.found[-1]) and self.found[-1].behind is not None:
+            behind = self.found.pop().behind
+            self.found[-1] = replace(self.found[-1], behind=behind)
+        return tuple(self._sentences())
+
+    def _begins(self, start: int, at: int) -> _Found | None:
+        """The part of another robot that begins here. Raises RefusalError: it is said what a robot is not to do."""
+        current = self.found[-1]
+        for kind, form in self.calls.begins:
+            match = form.match(self.text, start)
+            if match is None or (_who(match).lower() in _YOU and (current.who is None or not start)):
+                continue
+            if kind in _REFUSED:
+                raise RefusalError(f"{_REFUSED[kind]}: '{match[0].strip()}'", [match[0].strip()])
+            return _Found(_who(match), match.end(), kind, _LEADS.get(kind, ""))
+        match = self.calls.forms.gap.match(self.text, start)
+        if match is None or current.who is None or not self.text[:start].strip():
+            return None
+        said = self.calls.imperative(self.calls.tidy(f"{current.text}{self.text[at:start]}"))
+        verb = self.calls.forms.begins_with_verb.match(said)
+        return None if verb is None else _Found(match["who"], match.end(), "gap", f"{verb[1]} ")
+
+    def _take(self, found: _Found, before: str) -> None:
+        """End the part that `before` belongs to, and begin the one that was found."""
+        joint_at = self.calls.forms.joint.search(before)
+        at = len(before) if joint_at is None else joint_at.start()
+        said, joint = before[:at], before[at:]
+        if found.kind in _WAITS:
+            self._add(said)
+            now = self.found[-1].who
+            who = now if found.kind == "wait" or self.address is None else self.address
+            self.found.append(Saying(who, "", joint, behind=self._behind(found)))
+            return
+        who = self._who(found)
+        said, opener = (said, "") if found.kind == "deed" else self._split_opener(said)
+        self._add(said)
+        last = self.found[-1]
+        begun = Saying(
+            who,
+            f"{opener}, {found.lead}" if opener else found.lead,
+            joint,
+            then=last.deed or self.calls.forms.then.search(joint) is not None or (last.then and not last.text),
+            behind=None if last.text else last.behind,
+            otherwise=self.calls.forms.otherwise.search(joint) is not None,
+            deed=found.kind == "deed",
+        )
+        self.found.append(begun)
+        self.address = who if found.kind == "call" else self.address
+
+    def _split_opener(self, text: str) -> tuple[str, str]:
+        """The text, and the condition at its end that is for what follows: "if there is a coke,"."""
+        bare = text.strip(" ,")
+        match = self.calls.forms.opener.search(bare)
+        if match is None or self.calls.forms.opened.search(match[1]):
+            return text, ""
+        return bare[: match.start()], match[1]
+
+    def _add(self, more: str) -> None:
+        """Add to the text of the last part."""
+        last = self.found[-1]
+        self.found[-1] = replace(last, text=self.calls.tidy(f"{last.text}{more}"))
+
+    def _who(self, found: _Found) -> Who:
+        """Who is meant by a name, "you" or "the other robot"."""
+        named = [name for one in self.found if isinstance(one.who, tuple) for name in one.who]
+        if found.who.lower() in _YOU:
+            return self.calls.meant("the other robot", named) if self.address is None else self.address
+        return self.calls.meant(found.who, self.address if isinstance(self.address, tuple) else named[-1:])
+
+    def _behind(self, found: _Found) -> Who:
+        """Whose parts are to be done before."""
+        if found.who.lower() not in _SOMEBODY:
+            return self.calls.meant(found.who)
+        last = next((one.who for one in reversed(self.found) if one.who is not None), None)
+        if last is None:
+            raise RefusalError(f"who is '{found.who}'? say the robot's name", [found.who])
+        return last
+
+    def _sentences(self) -> Iterator[Saying]:
+        """The parts that say something; a sentence behind a robot's part is again for the one that is spoken to."""
+        tidy, imperative = self.calls.tidy, self.calls.imperative
+        for one in self.found:
+            split = self.address is not None and self.address != one.who
+            first, *rest = re.split(r"(?<=[.!?])\s+", one.text) if split else [one.text]
+            if _says(replace(one, text=first)):
+                yield replace(one, text=tidy(first) if one.deed else imperative(tidy(first)))
+            if rest:
+                yield Saying(self.address, imperative(tidy(" ".join(rest))))
+
+
+def _who(match: re.Match[str]) -> str:
+    """The words of who is meant."""
+    return next(words for key, words in match.groupdict().items() if key.startswith("who") and words)
+
+
+def _says(saying: Saying) -> bool:
+    return re.search(r"\w", saying.text) is not None
+
+
+def _lists(before: str) -> bool:
+    """Whether names at the end go on with a list: "a beer for Robin, Alice and Bob"."""
+    return re.search(r"\b[A-Z]\w*$", before) is not None and before[:1].islower()

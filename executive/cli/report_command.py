@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -12,27 +13,34 @@ from rich.console import Console
 
 from executive.app.evaluate.page import EvaluationPage, to_page
 from executive.app.evaluate.results import ResultsFile
+from executive.app.evaluate.runs import RunSpec
 from executive.app.evaluate.summary import (
+    GROUP_HEAD,
+    STANDING_HEAD,
     Case,
     causes_of,
     compared,
+    group_rows,
     groups_of,
     label_of,
+    standing_rows,
+    standing_texts,
     time_rows,
+    to_look_at,
     totals_of,
 )
+from executive.cli.options import AS_JSON, request_arguments
 from executive.cli.output import console_for, print_json, refusals, show_table
-from executive.cli.results_view import command_of, log_folder, show_cases, standings_json
 from skills.files.errors import InputError
 
-__all__ = ["report"]
+__all__ = ["report", "show_cases", "standings_json"]
 
 
 def report(
     results: Annotated[Path, typer.Argument(metavar="RESULTS", help="A file of `errand evaluate SCENARIO`.")],
     html: Annotated[Path | None, typer.Option(help="Write a page that needs nothing else.")] = None,
     against: Annotated[Path | None, typer.Option(metavar="RESULTS", help="Compare with another results file.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the report.")] = False,
+    as_json: AS_JSON = False,
 ) -> None:
     """Report the results of an evaluation: success with intervals, causes, where the time goes, each failure."""
     console = console_for(as_json)
@@ -132,4 +140,64 @@ def _json(about: Mapping[str, str], cases: Sequence[Case], other: Sequence[Case]
         "skills": {row.skill: {"runs": row.runs, "sim_s": row.total_s, "share": row.share} for row in time_rows(cases)},
         **({"against": comparisons} if other is not None else {}),
         **standings_json(cases, about.get("logs")),
+    }
+
+
+def command_of(run: RunSpec) -> str:
+    """The command line that repeats a run alone."""
+    return shlex.join(["errand", "run", *request_arguments(run.request)])
+
+
+def show_cases(console: Console, cases: Sequence[Case], *, logs: str | None) -> None:
+    """Show success by groups, claims against verdicts, and each run that is to be looked at with the folder of its log.
+
+    `logs` is the folder that holds those.
+    """
+    show_table(console, GROUP_HEAD, group_rows(groups_of(cases)))
+    console.print()
+    show_table(console, STANDING_HEAD, standing_texts(cases))
+    rows = [_to_look_at_row(case, logs) for case in to_look_at(cases)]
+    if rows:
+        console.print()
+        show_table(console, ("run", "world", "seed", "asked for", "why", "log"), rows)
+
+
+def _to_look_at_row(case: Case, logs: str | None) -> tuple[str, ...]:
+    folder = log_folder(case, logs)
+    world, seed = str(case.outcome.report.get("world") or ""), str(case.run.request.seed)
+    return case.label, world, seed, case.asked, case.why, "" if folder is None else str(folder)
+
+
+def log_folder(case: Case, logs: str | None) -> Path | None:
+    """The folder with the log of a run; None where there is none, or the evaluation ran on another machine."""
+    folder = None if logs is None else Path(logs) / case.outcome.run_id
+    return folder if folder is not None and folder.is_dir() else None
+
+
+def standings_json(cases: Sequence[Case], logs: str | None) -> dict[str, Any]:
+    """Claims against verdicts as JSON values: the counts, and each run that is to be looked at."""
+    return {
+        "standings": {
+            row.standing.value: {
+                "runs": row.rate.successes,
+                "interval": row.rate.interval(),
+                "causes": dict(row.causes),
+            }
+            for row in standing_rows(cases)
+        },
+        "to_look_at": [
+            {
+                "id": case.outcome.run_id,
+                "standing": case.outcome.standing.value,
+                "world": case.outcome.report.get("world"),
+                "seed": case.run.request.seed,
+                "mission": case.run.mission,
+                "asked": case.asked,
+                "cause": case.outcome.report.get("cause"),
+                "why": case.why,
+                "log": None if (folder := log_folder(case, logs)) is None else str(folder),
+                "command": command_of(case.run),
+            }
+            for case in to_look_at(cases)
+        ],
     }

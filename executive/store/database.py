@@ -79,7 +79,7 @@ class Database:
 
     kind: FileKind
 
-    def __init__(self, path: Path, *, create: bool = True) -> None:
+    def __init__(self, path: Path, *, create: bool = False) -> None:
         """Open the file, made new where `create` allows it.
 
         A killed process loses nothing that was committed: the file is in write-ahead mode. Raises InputError: there is

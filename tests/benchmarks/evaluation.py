@@ -28,25 +28,26 @@ from executive.app.evaluate.page import EvaluationPage, to_page
 from executive.app.evaluate.results import ResultsFile
 from executive.app.evaluate.runs import Evaluation, RunSpec
 from executive.app.evaluate.summary import Case
-from executive.cli.results_view import command_of
+from executive.cli.report_command import command_of
+from executive.mission.request import Request
 
 SHORT = "Hey Alice, go to the living room"
 
 
 def runs_of(count: int) -> tuple[RunSpec, ...]:
-    return tuple(RunSpec(SHORT, seed, sentence=SHORT, varied={"light": str(seed % 3)}) for seed in range(count))
+    return tuple(RunSpec(Request(SHORT, seed=seed), SHORT, {"light": str(seed % 3)}) for seed in range(count))
 
 
 def made_outcome(run: RunSpec) -> RunOutcome:
     """A made result; every tenth has failed and has a timeline and a picture."""
-    rng = random.Random(run.seed)
-    failed = run.seed % 10 == 0
+    rng = random.Random(run.request.seed)
+    failed = run.request.seed % 10 == 0
     report = {
         **{"outcome": "failure" if failed else "success", "cause": "PLANNING" if failed else None},
-        **{"message": "no path" if failed else "done", "world": "flat", "seed": run.seed, "sim_time_s": 60.0},
+        **{"message": "no path" if failed else "done", "world": "flat", "seed": run.request.seed, "sim_time_s": 60.0},
         **{"referee": {"success": not failed, "why": "so it is"}, "work": {"plant_steps": rng.randrange(9999)}},
     }
-    picture = np.random.default_rng(run.seed).integers(0, 255, (240, 320, 3), dtype=np.uint8)
+    picture = np.random.default_rng(run.request.seed).integers(0, 255, (240, 320, 3), dtype=np.uint8)
     jpeg = cv2.imencode(".jpg", cv2.GaussianBlur(picture, (9, 9), 0), [cv2.IMWRITE_JPEG_QUALITY, 60])[1].tobytes()
     lines = tuple((float(t), "alice/go", "RUNNING: on the way") for t in range(40))
     evidence = Evidence(lines, (("hand camera", jpeg),)) if failed else Evidence()

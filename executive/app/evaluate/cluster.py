@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster: a local one, or those of a scheduler. Needs the extra `cluster`."""
+"""Who works on an evaluation: processes of this machine, or a Dask cluster, which needs the extra `cluster`."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Any, Final
 
-from executive.app.evaluate.installed import installed_code
-from executive.app.evaluate.workers import MOST_DEATHS, Finished, Item, Result
+from executive.app.evaluate.workers import MOST_DEATHS, Finished, Item, LocalWorkers, Result, Workers, installed_code
 from skills.files.errors import InputError
 
-__all__ = ["ClusterWorkers", "local_cluster", "scheduler_at"]
+__all__ = ["ClusterWorkers", "Pool", "local_cluster", "scheduler_at"]
 
 ANSWER_S: Final = 10.0
 """How long a scheduler, and the first worker of it, is waited for."""
@@ -184,3 +184,33 @@ def scheduler_at(address: str) -> Iterator[ClusterWorkers]:
         raise InputError(f"no scheduler answers at {address}", hint=hint) from error
     with client:
         yield ClusterWorkers(client)
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Who does the work: so many local processes (`jobs`), a local cluster of `workers`, or those of a `scheduler`.
+
+    Raises:
+        InputError: both of a cluster and a scheduler are given.
+    """
+
+    jobs: int = 2
+    workers: int | None = None
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.workers is not None and self.scheduler is not None:
+            hint = "a scheduler has the workers that were started for it"
+            raise InputError("--workers and --scheduler do not go together", hint=hint)
+
+    @contextmanager
+    def opened(self) -> Iterator[Workers]:
+        """The workers, for as long as the context is open. Raises InputError: they cannot be had."""
+        if self.scheduler is not None:
+            with scheduler_at(self.scheduler) as workers:
+                yield workers
+        elif self.workers is not None:
+            with local_cluster(self.workers) as workers:
+                yield workers
+        else:
+            yield LocalWorkers(self.jobs)

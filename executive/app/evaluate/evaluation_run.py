@@ -1,38 +1,46 @@
-"""One run of an evaluation, in the process of a worker, which keeps what it has imported and loaded."""
+"""One run of an evaluation, in the process of a worker, and what its log shows: times, timeline, small pictures."""
 
 from __future__ import annotations
 
+import base64
 import os
 import platform
 import tempfile
 import threading
 import time
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from executive.app.evaluate.evidence import evidence_of, steps_of
-from executive.app.evaluate.outcome import RunOutcome, Standing
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.app.evaluate.outcome import Evidence, RunOutcome, Standing
 from executive.app.evaluate.runs import RunSpec
 from executive.app.feasibility import refuse_impossible
 from executive.app.memory import return_memory
 from executive.app.prepare import prepare
-from executive.app.prepared import Prepared
 from executive.app.report import RefereeReport, RunReport
 from executive.app.simulated import run_simulated
 from executive.mission.request import Request
-from executive.mission.scenario import Scenario
-from executive.record.reader import read_events
-from executive.words.robots import parse_robots
-from plant.kinds import robot_kinds
+from executive.record.reader import Event, read_events
+from executive.record.schemas import TRANSITIONS, TREE
+from executive.record.timeline import timeline
+from executive.view.map_picture import map_picture
 from skills.files.errors import InputError
 
-__all__ = ["lost_outcome", "request_of", "run_one"]
+__all__ = ["evidence_of", "lost_outcome", "run_one", "steps_of"]
 
 REFUSED: Final = "REFUSED"
+MOST_ENTRIES: Final = 60
+MOST_PICTURES: Final = 3
+_WIDEST_PX: Final = 360
+_JPEG_QUALITY: Final = 60
 _ONE_AT_A_TIME: Final = threading.Lock()
 
 
@@ -50,69 +58,49 @@ def run_one(spec: RunSpec, *, checked: bool = False) -> RunOutcome:
 
 
 def _ran(spec: RunSpec, folder: Path, checked: bool) -> RunOutcome:
-    out = folder / "out"
     try:
-        with _files(spec, folder) as placed:
-            prepared = prepared_run(placed, out)
-            if checked:
-                refuse_impossible(prepared)
-            report = run_simulated(prepared).report
+        prepared = prepare(replace(_with_files(spec, folder), out=folder / "out", record=False), ask=None)
+        if checked:
+            refuse_impossible(prepared)
+        report = run_simulated(prepared).report
     except InputError as error:
         return RunOutcome(spec.id, _report(spec, "refused", REFUSED, str(error)).to_json())
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
         kept = RunOutcome(spec.id, _report(spec, "error", "ERROR", what).to_json())
         return replace(kept, evidence=replace(kept.evidence, timeline=((0.0, "error", traceback.format_exc()),)))
-    events = read_events(out / "log.mcap")
+    events = read_events(folder / "out" / "log.mcap")
     outcome = RunOutcome(spec.id, {**report.to_json(), "log": ""}, steps_of(events))
-    if outcome.standing is Standing.FULFILLED:
+    failed = outcome.standing is not Standing.FULFILLED
+    if not failed and not spec.folder:
         return outcome
-    files = {path.name: path.read_bytes() for path in sorted(out.iterdir()) if path.is_file()}
-    return replace(outcome, evidence=evidence_of(events, files))
+    files = {path.name: path.read_bytes() for path in sorted((folder / "out").iterdir()) if path.is_file()}
+    return replace(outcome, evidence=evidence_of(events, files) if failed else Evidence(files=files))
 
 
-def prepared_run(spec: RunSpec, out: Path) -> Prepared:
-    """The run's request, understood; nobody is asked. Raises InputError."""
-    return prepare(request_of(spec, out))
-
-
-def request_of(spec: RunSpec, out: Path) -> Request:
-    """What `errand run` is asked for."""
-    return Request(
-        sentence=spec.sentence,
-        file=None if spec.file is None else Path(spec.file),
-        world=spec.world,
-        answers=spec.answers,
-        seed=spec.seed,
-        out=out,
-        record=False,
-        stack=None if spec.stack is None else Path(spec.stack),
-        given=spec.given,
-        scenario=Scenario(spec.faults, spec.random_faults),
-        scenario_files=() if spec.scenario is None else (Path(spec.scenario),),
-        time_limit_s=spec.time_limit_s,
-        variation=spec.variation,
-        robots=parse_robots(spec.robot_words, robot_kinds()) if spec.robot_words else (),
-    )
-
-
-@contextmanager
-def _files(spec: RunSpec, folder: Path) -> Iterator[RunSpec]:
-    """The run with its files as they were when it was given out: where they lie, or copies where those differ."""
+def _with_files(spec: RunSpec, folder: Path) -> Request:
+    """The request with its files as they were when it was given out: where they lie, or copies where those differ."""
+    request = spec.request
     if all(_is_text(Path(path), text) for path, text in spec.files.items()):
-        yield spec
-        return
-    moved = {}
-    for name, path in (("file", spec.file), ("scenario", spec.scenario), ("stack", spec.stack)):
-        if path is not None:
-            home = Path(path).parent
-            own = {each: text for each, text in spec.files.items() if Path(each).is_relative_to(home)}
-            for each, text in own.items():
-                copy = folder / name / Path(each).relative_to(home)
+        return request
+
+    def copied(name: str, path: Path | None) -> Path | None:
+        if path is None:
+            return None
+        for each, text in spec.files.items():
+            if Path(each).is_relative_to(path.parent):
+                copy = folder / name / Path(each).relative_to(path.parent)
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 copy.write_text(text, encoding="utf-8")
-            moved[name] = str(folder / name / Path(path).name)
-    yield replace(spec, file=moved.get("file"), scenario=moved.get("scenario"), stack=moved.get("stack"))
+        return folder / name / path.name
+
+    scenarios = (copied(f"scenario-{number}", path) for number, path in enumerate(request.scenario_files))
+    return replace(
+        request,
+        file=copied("file", request.file),
+        stack=copied("stack", request.stack),
+        scenario_files=tuple(filter(None, scenarios)),
+    )
 
 
 def _is_text(path: Path, text: str) -> bool:
@@ -134,11 +122,63 @@ def _report(spec: RunSpec, outcome: str, cause: str, message: str) -> RunReport:
         message=message,
         referee=RefereeReport(False, "the run gave no report", 0, 0),
         commands=(),
-        world=spec.world or "",
-        seed=spec.seed,
+        world=spec.request.world or "",
+        seed=spec.request.seed,
         sim_time_s=0.0,
         wall_time_s=0.0,
         real_time_factor=0.0,
         ticks=0,
         log="",
     )
+
+
+def steps_of(events: Sequence[Event]) -> dict[str, float]:
+    """How long each skill ran, by its name (s, on the robot's clock); what runs at once counts for each."""
+    skills, since, spent = dict[str, str](), dict[str, float](), defaultdict[str, float](float)
+    for event in events:
+        if event.topic == TREE:
+            skills |= dict(_skills(event.data["root"]))
+        elif event.topic == TRANSITIONS and (name := skills.get(event.data["node"])) is not None:
+            node, t_s = str(event.data["node"]), float(event.data.get("t", event.stamp_s))
+            if node in since:
+                spent[name] += t_s - since.pop(node)
+            if event.data["to"] == "RUNNING":
+                since[node] = t_s
+    end_s = max((event.stamp_s for event in events), default=0.0)
+    for node, begun_s in since.items():
+        spent[skills[node]] += max(0.0, end_s - begun_s)
+    return {name: round(seconds, 3) for name, seconds in sorted(spent.items())}
+
+
+def _skills(node: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """The path id and the name of each skill in a logged tree."""
+    if node["type"] == "skill":
+        yield node["id"], node["name"]
+    for child in node["children"]:
+        yield from _skills(child)
+
+
+def evidence_of(events: Sequence[Event], files: Mapping[str, bytes]) -> Evidence:
+    """The last of what happened, the map with the robot's way, and the last pictures that were taken."""
+    entries = [(entry.t, entry.about, entry.text) for entry in timeline(events, leaves_only=True) if entry.text]
+    return Evidence(tuple(entries[-MOST_ENTRIES:]), tuple(_pictures(events)), dict(files))
+
+
+def _pictures(events: Sequence[Event]) -> Iterator[tuple[str, bytes]]:
+    with suppress(InputError):
+        yield "the map, with the way of the robot", _jpeg(map_picture(events))
+    taken = [event for event in events if event.data.get("format") == "jpeg" and event.data.get("data")]
+    for event in taken[-MOST_PICTURES:]:
+        data = np.frombuffer(base64.b64decode(event.data["data"]), np.uint8)
+        picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
+        if picture is not None:
+            yield f"{event.topic} at {event.stamp_s:.1f} s", _jpeg(np.asarray(picture, np.uint8))
+
+
+def _jpeg(picture: NDArray[np.uint8]) -> bytes:
+    """A picture (height, width, 3; blue, green, red), made small, as a JPEG file."""
+    height, width = picture.shape[:2]
+    scale = min(1.0, _WIDEST_PX / width)
+    size = (round(width * scale), max(1, round(height * scale)))
+    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA) if scale < 1.0 else picture
+    return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes()

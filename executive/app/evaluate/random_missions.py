@@ -9,13 +9,18 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from executive.app.evaluate.runs import Evaluation, RunSpec
+from executive.app.evaluate.runs import Evaluation, RunSpec, first_seeds
+from executive.app.evaluate.scenario import MOST_RUNS
+from executive.app.feasibility import abilities_in
+from executive.app.worlds import knowledge_of, open_world
+from executive.mission.request import Request
 from executive.words.knowledge import Knowledge
 from skills.detect.words import plural
 from skills.files.errors import InputError
+from skills.files.outside import is_file
 from skills.files.yaml_source import read_yaml
 
-__all__ = ["KINDS", "KnownWorld", "random_evaluation", "random_sentence"]
+__all__ = ["KINDS", "KnownWorld", "random_evaluation", "random_missions", "random_sentence"]
 
 _TABLE: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(Path(__file__).with_suffix(".yaml")).data
 KINDS: Final[Mapping[str, tuple[str, ...]]] = {kind: tuple(about["sentences"]) for kind, about in _TABLE.items()}
@@ -41,6 +46,39 @@ class KnownWorld:
     carried: frozenset[str]
 
 
+def random_missions(count: int, worlds: str, seeds: str) -> Evaluation:
+    """The runs of the first `count` seeds, in worlds by name or folder ("flat,shop").
+
+    Raises:
+        InputError: a world cannot be used, it is named twice, or there are too few seeds or too many missions.
+    """
+    names = [name.strip() for name in worlds.split(",")]
+    if len(set(names)) < len(names):
+        raise InputError(f"--worlds {worlds} names a world twice", hint="name each once")
+    if count > MOST_RUNS:
+        raise InputError(f"these are {count} runs, more than {MOST_RUNS}", hint="give several ranges of seeds in turn")
+    chosen = first_seeds(seeds, count)
+    if len(set(chosen)) < count:
+        raise InputError(f"--seeds {seeds} names a seed twice", hint="name each once")
+    named = f"--random-missions {count} --worlds {worlds} --seeds {seeds}"
+    return random_evaluation([_known_world(name) for name in names], chosen, name=named)
+
+
+def _known_world(name: str) -> KnownWorld:
+    """What is known of a world, and what the robot of most missions can carry there. Raises InputError."""
+    world = open_world(name)
+    knowledge, abilities = knowledge_of(world), abilities_in(world)
+    carried = frozenset(
+        name
+        for name in knowledge.things
+        if name in abilities.masses_kg
+        and abilities.masses_kg[name] <= abilities.lift_kg
+        and abilities.widths_m.get(name, 0.0) <= abilities.opens_m
+    )
+    own = str(Path(name).resolve()) if is_file(Path(name) / "world.dmd.yaml") else name
+    return KnownWorld(own, knowledge, carried)
+
+
 def random_evaluation(worlds: Sequence[KnownWorld], seeds: Iterable[int], *, name: str) -> Evaluation:
     """One run for each seed, in the worlds in turn; a run is the same whichever other seeds there are.
 
@@ -53,7 +91,7 @@ def random_evaluation(worlds: Sequence[KnownWorld], seeds: Iterable[int], *, nam
 
 def _run(world: KnownWorld, seed: int) -> RunSpec:
     kind, sentence = random_sentence(world, seed)
-    return RunSpec(kind, seed, sentence=sentence, world=world.name, time_limit_s=TIME_LIMIT_S)
+    return RunSpec(Request(sentence, world=world.name, seed=seed, time_limit_s=TIME_LIMIT_S), kind)
 
 
 def random_sentence(world: KnownWorld, seed: int) -> tuple[str, str]:

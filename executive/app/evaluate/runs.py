@@ -5,63 +5,47 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final
+from pathlib import Path
+from typing import Final
 
-from executive.words.variation import NO_VARIATION, Variation
+from executive.mission.request import Request
+from skills.files.errors import InputError
 
-__all__ = ["Evaluation", "RunSpec"]
+__all__ = ["Evaluation", "RunSpec", "first_seeds", "seed_range"]
 
 _ID_LETTERS: Final = 16
 
 
 @dataclass(frozen=True)
 class RunSpec:
-    """What one run does.
+    """A request, what people call its `mission`, and in words what is varied, by dimension.
 
-    Exactly one of `sentence` and `file` says what is asked for; `file`, `scenario` and `stack` are paths. `files` has
-    the texts of those and of all that they use, by path, so that a machine that has none of them can run it.
-    `mission` is what people call it, `given` are values for the file's parameters. `robots` maps the robots' names to
-    their kinds; empty: the world's own. `varied` says in words what is varied, by dimension.
+    `files` has the texts of the request's files and of all that they use, by path, so that a machine that has none of
+    them can run it. A run with a `folder` leaves all its files there, else only one that is to be looked at leaves any.
     """
 
+    request: Request
     mission: str
-    seed: int
-    sentence: str | None = None
-    file: str | None = None
-    world: str | None = None
-    robots: Mapping[str, str] = field(default_factory=dict)
-    given: Mapping[str, Any] = field(default_factory=dict)
-    answers: tuple[str, ...] = ()
-    stack: str | None = None
-    time_limit_s: float | None = None
-    variation: Variation = NO_VARIATION
-    faults: tuple[str, ...] = ()
-    random_faults: int = 0
-    scenario: str | None = None
     varied: Mapping[str, str] = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
+    folder: str = ""
 
     @cached_property
     def id(self) -> str:
         """The hash of its content: equal for equal runs, wherever the files lie."""
-        content = asdict(self)
-        for name in ("mission", "varied", "files"):
-            del content[name]
-        for name in ("file", "scenario", "stack"):
-            content[name] = self._content(content[name])
+        content = json.loads(replace(self.request, out=Path()).to_json())
+        for name in {"file", "stack"} & content.keys():
+            content[name] = self.files.get(content[name], content[name])
+        content["scenario_files"] = [self.files.get(str(path), str(path)) for path in self.request.scenario_files]
         text = json.dumps({**content, "files": sorted(self.files.values())}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:_ID_LETTERS]
-
-    def _content(self, path: str | None) -> str | None:
-        """The text of a file that it carries, else the name itself."""
-        return path if path is None else self.files.get(path, path)
 
     @property
     def robot_words(self) -> str:
         """The robots as `errand run --robots` takes them."""
-        return ",".join(f"{name}={kind}" for name, kind in self.robots.items())
+        return ",".join(map(str, self.request.robots))
 
     @property
     def variation_words(self) -> str:
@@ -80,3 +64,43 @@ class Evaluation:
     def digest(self) -> str:
         """Equal for evaluations of the same runs."""
         return hashlib.sha256("".join(run.id for run in self.runs).encode()).hexdigest()[:_ID_LETTERS]
+
+
+def seed_range(text: str) -> tuple[int, ...]:
+    """Seeds from "1-20", "3" or "1,4,7-9".
+
+    Raises:
+        InputError: anything else.
+    """
+    try:
+        seeds = tuple(seed for part in text.split(",") for seed in _span(part))
+    except ValueError as error:
+        raise InputError(f"'{text}' is no range of seeds", hint="write it like 1-20 or 1,4,7") from error
+    if not seeds:
+        raise InputError(f"'{text}' holds no seed", hint="write it like 1-20")
+    return seeds
+
+
+def first_seeds(text: str, count: int) -> tuple[int, ...]:
+    """The first `count` seeds from text whose last range may have no end: "8001-" or "3,8001-".
+
+    Raises:
+        InputError: it is no range of seeds, or holds fewer.
+    """
+    before, _, last = text.rpartition(",")
+    begun, dash, end = last.partition("-")
+    if dash and not end.strip():
+        listed = seed_range(before) if before else ()
+        seeds = (*listed, *range(first := seed_range(begun)[0], first + count))
+    else:
+        seeds = seed_range(text)
+    if len(seeds) < count:
+        raise InputError(
+            f"'{text}' holds {len(seeds)} seeds, fewer than {count}", hint="leave its end open, as in 8001-"
+        )
+    return seeds[:count]
+
+
+def _span(part: str) -> range:
+    first, dash, last = part.partition("-")
+    return range(int(first), int(last if dash else first) + 1)

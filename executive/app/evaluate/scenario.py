@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -10,9 +10,12 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from executive.app.evaluate.runs import Evaluation, RunSpec
-from executive.app.evaluate.seeds import seed_range
-from executive.mission.scenario import RandomFaults
+from executive.app.evaluate.runs import Evaluation, RunSpec, seed_range
+from executive.app.mission_files import mission_file
+from executive.mission.request import Request
+from executive.mission.scenario import RandomFaults, Scenario
+from executive.mission.stack_file import stack_file
+from executive.words.robots import NamedRobot, RobotConfig, robots_in
 from executive.words.variation import (
     NORMAL_LIGHT,
     Brightness,
@@ -22,6 +25,7 @@ from executive.words.variation import (
     Variation,
     light_called,
 )
+from plant.kinds import robot_kinds
 from skills.files.errors import InputError
 from skills.files.outside import is_file, read_text
 from skills.files.schema import Name, Text, validate
@@ -31,9 +35,9 @@ from skills.quantities import LongDuration, Seed
 __all__ = [
     "EvaluationFile",
     "FaultsFile",
-    "FileFinder",
     "MissionEntry",
     "VariationsFile",
+    "files_of",
     "is_evaluation",
     "load_evaluation",
 ]
@@ -52,15 +56,14 @@ def is_evaluation(path: Path) -> bool:
     return isinstance(data, dict) and "missions" in data and "steps" not in data
 
 
-def load_evaluation(path: Path, *, mission_file: FileFinder, stack_file: FileFinder) -> Evaluation:
+def load_evaluation(path: Path) -> Evaluation:
     """The runs of a scenario file, in the order of missions, worlds, robots, variations, seeds.
 
     Raises:
         InputError: with file and line; a key, a mission, a file or a value is wrong, or the runs are too many.
     """
     source = read_yaml(path)
-    reader = _Reader(validate(EvaluationFile, source), source, mission_file, stack_file)
-    runs = tuple(reader.runs())
+    runs = tuple(_Reader(validate(EvaluationFile, source), source).runs())
     if len(runs) > MOST_RUNS:
         raise source.error((), f"these are {len(runs)} runs, more than {MOST_RUNS}", "split it into several files")
     twice = len(runs) - len({run.id for run in runs})
@@ -71,23 +74,30 @@ def load_evaluation(path: Path, *, mission_file: FileFinder, stack_file: FileFin
 
 @dataclass(frozen=True)
 class _Reader:
-    """One scenario file and how its names are found."""
+    """One scenario file."""
 
     file: EvaluationFile
     source: YamlSource
-    mission_file: FileFinder
-    stack_file: FileFinder
 
     def runs(self) -> Iterator[RunSpec]:
         """All runs. Raises InputError."""
         missions = [self._mission(entry, ("missions", index)) for index, entry in enumerate(self.file.missions)]
-        worlds = [None, *()] if self.file.worlds is None else [self._world(name) for name in self.file.worlds]
-        robots = _fleets(self.file.robots)
-        varied = [*self._varied(self.file.variations)]
-        seeds = self._seeds()
-        for mission, world, fleet, vary in product(missions, worlds, robots, varied):
-            first = vary(replace(mission, world=world, robots=fleet, time_limit_s=self.file.time_limit))
-            yield from (replace(first, seed=seed) for seed in seeds)
+        worlds = [None] if self.file.worlds is None else [self._world(name) for name in self.file.worlds]
+        seeds, variations = self._seeds(), [*self._variations(self.file.variations)]
+        for (name, asked), world, robots, (changes, varied) in product(missions, worlds, self._robots(), variations):
+            first = replace(asked, world=world, robots=robots, time_limit_s=self.file.time_limit, **changes)
+            files = files_of(first)
+            yield from (RunSpec(replace(first, seed=seed), name, varied, files) for seed in seeds)
+
+    def _robots(self) -> Sequence[tuple[RobotConfig, ...]]:
+        """The robots that are tried in turn. Raises InputError with the line: a name or kind is none."""
+        named = self.file.robots or ({},)
+        fleets = [named] if isinstance(named, dict) else named
+        kinds = [{name: NamedRobot.model_validate({"kind": kind}) for name, kind in each.items()} for each in fleets]
+        try:
+            return [robots_in(each, robot_kinds(), None) for each in kinds]
+        except InputError as error:
+            raise self.source.error(("robots",), error.message, error.hint) from error
 
     def _seeds(self) -> tuple[int, ...]:
         if not isinstance(self.file.seeds, str):
@@ -97,18 +107,17 @@ class _Reader:
         except InputError as error:
             raise self.source.error(("seeds",), error.message, error.hint) from error
 
-    def _mission(self, entry: str | MissionEntry, path: KeyPath) -> RunSpec:
-        """The mission of an entry; a text with spaces that names no file is a sentence."""
+    def _mission(self, entry: str | MissionEntry, path: KeyPath) -> tuple[str, Request]:
+        """What people call an entry, and its request; a text with spaces that names no file is a sentence."""
         if isinstance(entry, str):
             is_file = entry.endswith((".yaml", ".yml")) or " " not in entry.strip()
             entry = MissionEntry.model_validate({"file" if is_file else "say": entry})
         if entry.say is not None:
-            return RunSpec(entry.name or entry.say, 0, sentence=entry.say, answers=entry.answers)
+            return entry.name or entry.say, Request(entry.say, answers=entry.answers)
         assert entry.file is not None
-        found = self._found(entry.file, path, self.mission_file)
-        texts = dict(_with_used(found))
-        label = entry.name or _label(entry.file, entry.set)
-        return RunSpec(label, 0, file=str(found), given=entry.set, answers=entry.answers, files=texts)
+        found = self._found(entry.file, path, mission_file)
+        request = Request(file=found, given=entry.set, answers=entry.answers)
+        return entry.name or _label(entry.file, entry.set), request
 
     def _world(self, name: str) -> str:
         folder = self.source.path.parent / name
@@ -134,64 +143,54 @@ class _Reader:
             raise self.source.error(path, error.message, error.hint) from error
         return words
 
-    def _varied(self, lists: VariationsFile) -> Iterator[Callable[[RunSpec], RunSpec]]:
-        """For each combination, what makes a run vary by it."""
+    def _variations(self, lists: VariationsFile) -> Iterator[tuple[Mapping[str, Any], Mapping[str, str]]]:
+        """For each combination what it changes in a request, and in words what is varied."""
         several = [name for name in type(lists).model_fields if len(getattr(lists, name)) > 1]
         lights = [self._light(light, ("variations", "light", index)) for index, light in enumerate(lists.light)]
-        for light, clutter, people, friction in product(lights, lists.clutter, lists.people, lists.friction):
-            variation = Variation(light, clutter, people, friction)
+        scenarios, stacks = self._files("scenario", lists.scenario), self._files("stack", lists.stack, stack_file)
+        for light, clutter, people, friction, faults, scenario, stack in product(
+            lights, lists.clutter, lists.people, lists.friction, lists.faults, scenarios, stacks
+        ):
+            named, happens = _faults(faults)
             told = {"light": light, "clutter": clutter, "people": people, "friction": f"{friction:g}"}
-            for faults, scenario, stack in product(
-                enumerate(lists.faults), enumerate(lists.scenario), enumerate(lists.stack)
-            ):
-                name, words, random = _faults(faults[1])
-                files = {
-                    key: None if value in _NOTHING else self._found(value, ("variations", key, index), finder)
-                    for key, (index, value), finder in (
-                        ("scenario", scenario, None),
-                        ("stack", stack, self.stack_file),
-                    )
-                }
-                all_told = {**told, "faults": name, "scenario": scenario[1], "stack": stack[1]}
-                values = {
-                    "variation": variation,
-                    "faults": words,
-                    "random_faults": random,
-                    "varied": {key: str(all_told[key]) for key in several},
-                    **{key: None if file is None else str(file) for key, file in files.items()},
-                }
-                yield _Vary(values, {str(file): read_text(file) for file in files.values() if file is not None})
+            told |= {"faults": named, "scenario": scenario[0], "stack": stack[0]}
+            changes = {
+                "variation": Variation(light, clutter, people, friction),
+                "scenario": happens,
+                "scenario_files": () if scenario[1] is None else (scenario[1],),
+                "stack": stack[1],
+            }
+            yield changes, {name: str(told[name]) for name in several}
+
+    def _files(
+        self, key: str, names: Sequence[str], finder: FileFinder | None = None
+    ) -> Sequence[tuple[str, Path | None]]:
+        """Each file of a list with its name; None where none is meant. Raises InputError with the line."""
+        return [
+            (name, None if name in _NOTHING else self._found(name, ("variations", key, index), finder))
+            for index, name in enumerate(names)
+        ]
 
 
-@dataclass(frozen=True)
-class _Vary:
-    """Puts values and the texts of files into a run."""
-
-    values: Mapping[str, Any]
-    files: Mapping[str, str]
-
-    def __call__(self, run: RunSpec) -> RunSpec:
-        return replace(run, **self.values, files={**run.files, **self.files})
-
-
-def _fleets(robots: Any) -> tuple[Mapping[str, str], ...]:
-    """The mappings of robots that are tried in turn."""
-    if robots is None:
-        return ({},)
-    return (robots,) if isinstance(robots, dict) else tuple(robots)
-
-
-def _faults(entry: str | FaultsFile) -> tuple[str, tuple[str, ...], int]:
-    """Name, words and number of random ones."""
+def _faults(entry: str | FaultsFile) -> tuple[str, Scenario]:
+    """The name of an entry, and the faults that it means."""
     if isinstance(entry, str):
-        return entry, () if entry in _NOTHING else (entry,), 0
+        return entry, Scenario(() if entry in _NOTHING else (entry,))
     drawn = (f"{entry.random} random",) if entry.random else ()
-    return entry.name or " and ".join((*entry.faults, *drawn)) or "none", entry.faults, entry.random
+    name = entry.name or " and ".join((*entry.faults, *drawn)) or "none"
+    return name, Scenario(entry.faults, entry.random)
 
 
 def _label(file: str, given: Mapping[str, Any]) -> str:
     values = ", ".join(f"{name}={value}" for name, value in given.items())
     return Path(file).stem + (f" ({values})" if values else "")
+
+
+def files_of(request: Request) -> Mapping[str, str]:
+    """The texts of a request's files and of all that they use, by path."""
+    others = (path for path in (request.stack, *request.scenario_files) if path is not None)
+    used = {} if request.file is None else dict(_with_used(request.file))
+    return {**used, **{str(path): read_text(path) for path in others}}
 
 
 def _with_used(file: Path) -> Iterator[tuple[str, str]]:

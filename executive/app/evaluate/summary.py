@@ -89,7 +89,7 @@ class Case:
     @property
     def asked(self) -> str:
         """What was asked for: the sentence, else what people call the mission."""
-        return self.run.sentence or self.run.mission
+        return self.run.request.sentence or self.run.mission
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class Group:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """The counts by the keys of a sweep."""
+        """The counts by their keys in JSON."""
         return {
             "successes": self.claimed,
             "referee_successes": self.fulfilled,
@@ -133,7 +133,7 @@ def groups_of(cases: Sequence[Case]) -> Sequence[Group]:
 
 def _keys(case: Case) -> Iterator[tuple[str, str]]:
     yield "mission", case.run.mission
-    yield "world", str(case.outcome.report.get("world") or case.run.world or "")
+    yield "world", str(case.outcome.report.get("world") or case.run.request.world or "")
     yield "robots", case.run.robot_words
     yield from case.run.varied.items()
     if len(case.run.varied) > 1:

@@ -1,7 +1,8 @@
-"""How work is given out: one function for many items, to processes that may die and are replaced."""
+"""Who does the work of an evaluation: one function for many items, given out to processes that may die."""
 
 from __future__ import annotations
 
+import hashlib
 import multiprocessing
 import os
 import signal
@@ -11,12 +12,19 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any, Final, Generic, Protocol, TypeVar
 
-__all__ = ["MOST_DEATHS", "Finished", "LocalWorkers", "Workers"]
+__all__ = ["MOST_DEATHS", "Finished", "LocalWorkers", "Workers", "installed_code"]
 
 MOST_DEATHS: Final = 3
 """Work with which so many workers have died is given up."""
+_ROOT: Final = Path(__file__).resolve().parents[3]
+_PACKAGES: Final = ("executive", "skills", "plant", "missions")
+_LIBRARIES: Final = ("drake", "numpy", "numba", "onnxruntime", "ompl", "opencv-python-headless", "scipy")
+_LETTERS: Final = 12
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -121,3 +129,23 @@ def _end_with_starter() -> None:
         os._exit(1)
 
     threading.Thread(target=outlive, name="end-with-starter", daemon=True).start()
+
+
+@cache
+def installed_code() -> str:
+    """The version, and a hash of all files of the code, the models and the worlds, and of the libraries' versions."""
+    made = hashlib.sha256()
+    for package in _PACKAGES:
+        for path in sorted((_ROOT / package).rglob("*")):
+            if path.is_file() and "__pycache__" not in path.parts and path.suffix != ".pyc":
+                made.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    for library in _LIBRARIES:
+        made.update(f"{library} {_version(library)}\n".encode())
+    return f"{_version('spot-errand')}+{made.hexdigest()[:_LETTERS]}"
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from executive.app import simulated
 from executive.app.mission_run import Finished
 from executive.app.report import RefereeReport, RunReport
-from executive.cli import entry, evaluate_command
+from executive.cli import entry
 from executive.tree.node_view import node_view
 from plant.worlds.world import WORLDS_FOLDER
 
@@ -207,79 +207,6 @@ def test_what_check_refuses_is_refused_before_anything_moves(no_plant, tmp_path,
 
 def test_anyway_begins_what_check_refuses(no_plant, tmp_path):
     assert invoke("run", impossible_file(tmp_path), "--anyway", "--out", str(tmp_path / "out")).exit_code == 0
-
-
-AMBIGUOUS = "Hey Alice, put the cube on the table"
-
-
-@pytest.mark.parametrize(
-    ("flags", "table"), [(("--answer", "the coffee table"), "coffee"), (("--questions", "first"), "kitchen")]
-)
-def test_evaluate_answers_once_for_all_seeds(monkeypatch, tmp_path, flags, table):
-    asked = []
-
-    def sweep(arguments, seeds, *, jobs, out, done):
-        asked.append(arguments)
-        return ()
-
-    monkeypatch.setattr(evaluate_command, "sweep", sweep)
-    result = invoke("evaluate", "--say", AMBIGUOUS, *flags, "--seeds", "1-2", "--out", str(tmp_path))
-    assert asked == [[f"--say=Hey Alice, put the cube on the {table} table"]], result.output
-
-
-def test_evaluate_gives_the_answers_for_a_file_to_every_run(monkeypatch, tmp_path):
-    file, asked = tmp_path / "mission.yaml", []
-    file.write_text("name: tidy\nworld: flat\nsteps:\n  - say: put the cube on the table\n")
-    monkeypatch.setattr(evaluate_command, "sweep", lambda arguments, *_, **__: asked.append(arguments) or ())
-    result = invoke("evaluate", str(file), "--answer", "the coffee table", "--out", str(tmp_path))
-    assert asked == [[str(file), "--answer=the coffee table"]], result.output
-
-
-def test_evaluate_refuses_a_question_that_nobody_answers(tmp_path):
-    result = invoke("evaluate", "--say", AMBIGUOUS, "--questions", "refuse", "--out", str(tmp_path))
-    assert (result.exit_code, "Which table" in result.output) == (2, True)
-
-
-def test_evaluate_counts_claims_and_verdicts(monkeypatch, tmp_path):
-    reports = (
-        report(seed=1),
-        report(seed=2, referee=RefereeReport(False, "no", 0, 0)),
-        report(seed=3, outcome="failure", referee=RefereeReport(False, "no", 1, 0)),
-    )
-
-    def sweep(arguments, seeds, *, jobs, out, done):
-        assert (arguments, seeds, jobs) == ([f"--say={FETCH}"], (1, 2, 3), 2)
-        for each in reports:
-            done(each)
-        return reports
-
-    monkeypatch.setattr(evaluate_command, "sweep", sweep)
-    result = invoke("evaluate", "--say", FETCH, "--seeds", "1-3", "--json", "--out", str(tmp_path))
-    values = json.loads(result.stdout.splitlines()[-1])
-    assert (values["successes"], values["referee_successes"], values["false_claims"]) == (2, 1, 1)
-    assert ([run["seed"] for run in values["runs"]], result.exit_code) == ([1, 2, 3], 1)
-
-
-def test_evaluate_tries_each_fault_alone(monkeypatch, tmp_path):
-    asked = []
-
-    def sweep(arguments, seeds, *, jobs, out, done):
-        asked.append((arguments[1:], out.name))
-        return (report(outcome="failure" if arguments[1:] else "success"),)
-
-    monkeypatch.setattr(evaluate_command, "sweep", sweep)
-    faults = ("--fault", "camera.hand: dropout 5 s at 20 s", "--random-faults", "1")
-    options = ("--each-fault", "--json", "--out", str(tmp_path))
-    result = invoke("evaluate", "--say", FETCH, *faults, *options)
-    assert asked == [
-        ([], "0-no-fault"),
-        (["--fault=camera.hand: dropout 5 s at 20 s"], "1-camera-hand-dropout-5-s-at-20-s"),
-        (["--random-faults=1"], "2-1-random-faults"),
-    ]
-    values = json.loads(result.stdout.splitlines()[-1])
-    told = [(each["condition"], each["runs"], each["successes"]) for each in values["conditions"]]
-    assert told == [("no fault", 1, 1), ("camera.hand: dropout 5 s at 20 s", 1, 0), ("1 random faults", 1, 0)]
-    assert (values["successes"], result.exit_code) == (1, 1)
 
 
 @pytest.mark.parametrize(

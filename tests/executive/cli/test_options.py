@@ -11,12 +11,14 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from executive.app.evaluate.runs import RunSpec
 from executive.cli.entry import loaded
 from executive.cli.options import StartCommand, request_arguments, takes_request
 from executive.mission.request import Request
 from executive.store.missions import MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.triggers import OnCall
+from executive.store.values import form
 from skills.files.yaml_source import read_yaml
 
 GOLDEN: dict[str, Any] = read_yaml(Path(__file__).with_name("request_options.yaml")).data
@@ -67,3 +69,10 @@ def test_a_request_comes_back_from_the_store_and_a_standing_mission(words, tmp_p
         StandingMissions(store).fire([(standing, request)], "")
     with MissionStore(tmp_path / "missions.sqlite", create=False) as store:
         assert [each.request for each in store.missions()] == [request] * 3
+
+
+@pytest.mark.parametrize("words", GOLDEN)
+def test_a_request_comes_back_from_a_run_of_an_evaluation(words):
+    spec = RunSpec(request_of(words), "mission")
+    back = form(RunSpec).validate_json(form(RunSpec).dump_json(spec))
+    assert (back, back.id) == (spec, spec.id)

@@ -6,12 +6,12 @@ from contextlib import contextmanager
 import pytest
 from typer.testing import CliRunner
 
-from executive.app.evaluate import evaluation_run, worker_pool
+from executive.app.evaluate import cluster, evaluation_run
+from executive.app.evaluate.random_missions import random_missions
 from executive.app.evaluate.workers import Finished as Done
 from executive.app.mission_run import Finished
 from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry
-from executive.cli.random_evaluation import random_missions
 from executive.record.event_log import EventLog
 from executive.tree.node_view import node_view
 from skills.files.errors import InputError
@@ -48,7 +48,7 @@ def ran(monkeypatch):
         yield Here()
 
     monkeypatch.setattr(evaluation_run, "run_simulated", run_simulated)
-    monkeypatch.setattr(worker_pool.Pool, "opened", opened)
+    monkeypatch.setattr(cluster.Pool, "opened", opened)
     return seen
 
 
@@ -118,5 +118,5 @@ def test_only_random_missions_take_worlds(tmp_path):
 
 
 def test_all_that_the_robot_lifts_is_drawn():
-    texts = " ".join(run.sentence for run in random_missions(400, "flat", "1-").runs)
+    texts = " ".join(run.request.sentence for run in random_missions(400, "flat", "1-").runs)
     assert all(name in texts for name in ("extinguisher", "hammer", "cylinder", "screwdriver"))

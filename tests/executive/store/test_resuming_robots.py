@@ -49,7 +49,7 @@ def world():
 
 @pytest.fixture
 def robots(clock, make):
-    return {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
+    return {robot.name: make.ScriptedRobot(clock, robot.name) for robot in ROBOTS}
 
 
 @pytest.fixture
@@ -160,7 +160,7 @@ def live(store, clock, robots, make, handling, knowledge):
 @pytest.mark.parametrize("after", [(), ("Alice",)])
 def test_a_kill_in_any_tick_of_two_robots_repeats_nothing(live, store, robots, world, after):
     result, ticks = live(after=after)
-    once = {(what, name): 1 for what in ("grasp", "place") for name in ROBOTS}
+    once = {(what, name): 1 for what in ("grasp", "place") for name in robots}
     assert (result.outcome, world.done) == (Outcome.SUCCESS, once)
     for moment in range(1, ticks):
         store.remove(store.missions()[0].id)

@@ -7,9 +7,10 @@ import pytest
 from executive.app.evaluate.outcome import Evidence, RunOutcome
 from executive.app.evaluate.results import ResultsFile
 from executive.app.evaluate.runs import Evaluation, RunSpec
+from executive.mission.request import Request
 from skills.files.errors import InputError
 
-RUNS = tuple(RunSpec("go", seed, sentence="go") for seed in range(3))
+RUNS = tuple(RunSpec(Request("go", seed=seed), "go") for seed in range(3))
 EVALUATION = Evaluation("scenario.yaml", RUNS)
 
 
@@ -47,7 +48,7 @@ def test_only_one_process_writes(tmp_path):
 
 def test_what_is_no_results_file_is_refused(tmp_path):
     (tmp_path / "text").write_text("no database, " * 100)
-    for name, says in (("text", "no results file"), ("none", "there is no results file")):
+    for name, says in (("text", "the results file is damaged"), ("none", "there is no results file")):
         with pytest.raises(InputError, match=says):
             ResultsFile(tmp_path / name)
 

@@ -9,7 +9,7 @@ from skills.files.errors import InputError
 def load(tmp_path, text):
     file = tmp_path / "scenario.yaml"
     file.write_text(text)
-    return load_evaluation(file, mission_file=lambda path: tmp_path / path, stack_file=lambda path: path)
+    return load_evaluation(file)
 
 
 def test_the_runs_are_the_product_of_all_lists(tmp_path):

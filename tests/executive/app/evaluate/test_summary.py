@@ -16,12 +16,13 @@ from executive.app.evaluate.summary import (
     standing_texts,
     to_look_at,
 )
+from executive.mission.request import Request
 
 
 def case(seed, outcome, success=None, *, cause=None, holds=None, kind="fetch", world="flat"):
     referee = {"success": success, "why": "the hammer is on the floor", "holds": holds}
     report = {"outcome": outcome, "cause": cause, "message": "no path", "referee": referee, "sim_time_s": 9.0}
-    run = RunSpec(kind, seed, sentence=f"fetch me the hammer {seed}", world=world)
+    run = RunSpec(Request(f"fetch me the hammer {seed}", world=world, seed=seed), kind)
     return Case(run, RunOutcome(run.id, {**report, "world": world}))
 
 
@@ -72,7 +73,7 @@ def test_claims_are_counted_against_verdicts_with_intervals_and_causes():
 
 
 def test_what_is_to_be_looked_at_begins_with_false_claims():
-    assert [each.run.seed for each in to_look_at(CASES)] == [3, 4, 5, 6, 7, 8, 9]
+    assert [each.run.request.seed for each in to_look_at(CASES)] == [3, 4, 5, 6, 7, 8, 9]
 
 
 def test_a_false_claim_is_explained_by_the_referee_and_a_failure_by_the_robot():

@@ -177,5 +177,5 @@ def test_without_a_refinement_network_there_is_nothing_to_learn_from(tmp_path: P
 
 def test_learning_goes_on_from_no_refinement_networks_file(tmp_path: Path) -> None:
     write_pair(tmp_path / "m.onnx")
-    with pytest.raises(TrainingDataError, match=r"m_refinement\.onnx.*begin anew without it"):
+    with pytest.raises(TrainingDataError, match=r"m_refinement\.onnx.*start again without it"):
         new_learner(2).start_from(tmp_path / "m_refinement.onnx", [])

@@ -273,7 +273,7 @@ def test_learning_goes_on_from_a_refinement_networks_file(tmp_path: Path, feed: 
 
 def test_learning_goes_on_from_no_proposal_networks_file(tmp_path: Path, feed: CropFeed) -> None:
     export(random_network(1, len(CLASSES)), tmp_path / "m.onnx", class_names=CLASSES, facts={})
-    with pytest.raises(TrainingDataError, match=r"m\.onnx.*begin anew without it"):
+    with pytest.raises(TrainingDataError, match=r"m\.onnx.*start again without it"):
         new_learner(2).start_from(tmp_path / "m.onnx", [feed.batch(0, 8)])
 
 

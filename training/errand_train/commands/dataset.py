@@ -1,4 +1,4 @@
-"""`errand dataset`: pictures from the plant to learn and to judge a detector by."""
+"""`errand dataset`: renders pictures with labels, trains the detector on them, and scores it."""
 
 from __future__ import annotations
 
@@ -47,25 +47,25 @@ dataset.command(name="refine")(refine_command)
 
 @dataset.command(name="render")
 def render_command(
-    out: Annotated[Path, typer.Option(help="Folder for the data set; one begun before is gone on with.")],
+    out: Annotated[Path, typer.Option(help="Folder for the data set; one that was begun is continued.")],
     images: Annotated[int, quantity_option(Pictures, help="How many pictures.")],
     seed: Annotated[int, quantity_option(Seed, help="The same seed gives the same pictures.")] = 1,
     others: Annotated[
-        Path | None, typer.Option(help="Folder of object models of no class, for the rooms to train on.")
+        Path | None, typer.Option(help="Folder of object models without a class; distractors of the training rooms.")
     ] = None,
-    jobs: Annotated[int | None, quantity_option(Count, help="How many processes; all cores unless said.")] = None,
+    jobs: Annotated[int | None, quantity_option(Count, help="Processes; one for each core by default.")] = None,
     workers: Annotated[int | None, quantity_option(Count, help="A local Dask cluster of so many workers.")] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="tcp://HOST:PORT", help="The scheduler of a Dask cluster.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Render pictures of things in random rooms, with boxes and masks as COCO files."""
+    """Render pictures of objects in random rooms, with boxes and masks as COCO files."""
     console = console_for(as_json)
     began = time.monotonic()
     with refusals():
         pool = Pool(jobs or os.cpu_count() or 1, workers, scheduler)
-        summary = _rendered(out, images, seed, others, pool, console)
+        summary = _render(out, images, seed, others, pool, console)
     _show(console, out, summary, time.monotonic() - began)
     if as_json:
         print_json({"out": str(out), **asdict(summary)})
@@ -74,7 +74,7 @@ def render_command(
 Pictures = Annotated[int, Quantity(ge=1, le=10_000_000)]
 
 
-def _rendered(out: Path, images: int, seed: int, others: Path | None, pool: Pool, console: Console) -> Summary:
+def _render(out: Path, images: int, seed: int, others: Path | None, pool: Pool, console: Console) -> Summary:
     from errand_train.dataset.shards import render
 
     columns = (
@@ -92,13 +92,13 @@ def _rendered(out: Path, images: int, seed: int, others: Path | None, pool: Pool
 
         try:
             with pool.opened() as workers:
-                given_out = partial(_given_out, workers)
-                return render(out, images=images, seed=seed, progress=show, give_out=given_out, others=others)
+                give_out = partial(_give_out, workers)
+                return render(out, images=images, seed=seed, progress=show, give_out=give_out, others=others)
         except DatasetError as error:
             raise InputError(error.message, hint=error.hint) from error
 
 
-def _given_out(
+def _give_out(
     workers: Workers, function: Callable[[int], Mapping[str, bytes]], numbers: list[int]
 ) -> Iterator[tuple[int, Mapping[str, bytes] | None]]:
     """As `errand_train.dataset.shards.GiveOut` says."""
@@ -112,6 +112,6 @@ def _show(console: Console, out: Path, summary: Summary, seconds: float) -> None
     rows.append(("pictures", *map(str, summary.images.values())))
     show_table(console, ("class", *summary.images), rows)
     console.print(
-        f"{out}: {sum(summary.images.values())} pictures, {summary.empty_images} of them with nothing to find, "
-        f"{summary.ignored} labels to ignore; {seconds:.0f} s"
+        f"{out}: {sum(summary.images.values())} pictures, {summary.empty_images} of them without an object, "
+        f"{summary.ignored} ignored labels; {seconds:.0f} s"
     )

@@ -1,4 +1,4 @@
-"""What the commands that train a network have in common: checks of what they are given, and a bar of progress."""
+"""Checks of options and a progress bar for the commands that train a network."""
 
 from __future__ import annotations
 
@@ -14,41 +14,41 @@ from errand_train.detector.schedule import Budget, Report
 from executive.cli.output import print_json
 from skills.files.errors import InputError
 
-__all__ = ["LIBRARIES", "budget_of", "check_folders", "check_time", "print_trained", "trained"]
+__all__ = ["LIBRARIES", "budget_of", "check_folders", "check_time", "print_trained", "with_progress"]
 
 LIBRARIES: Final = ("torch", "onnx", "pycocotools")
 RENDER: Final = "make one: errand dataset render --out DIR --images 8000"
 
 
 def check_folders(data: Path, out: Path, resume: bool) -> None:
-    """Raises InputError."""
+    """Raises InputError for a folder without a data set, and for one with a training unless `resume`."""
     for name in ("train.json", "val.json"):
         if not (data / name).is_file():
-            raise InputError(f"{data / name}: there is no such file of a data set", hint=RENDER)
+            raise InputError(f"{data / name}: the data set has no such file", hint=RENDER)
     if (out / "checkpoint.pt").exists() and not resume:
-        raise InputError(f"{out}: holds a training already", hint="go on with it by --resume, or name another --out")
+        raise InputError(f"{out}: there is a training already", hint="continue it with --resume, or name another --out")
 
 
 def check_time(minutes: float | None, epochs: int | None) -> None:
-    """Raises InputError."""
+    """Raises InputError when both are given."""
     if minutes is not None and epochs is not None:
         raise InputError("--minutes and --epochs are both given", hint="give one of them")
 
 
-def budget_of(data: Path, minutes: float | None, epochs: int | None, *, unless_said_minutes: float) -> Budget:
+def budget_of(data: Path, minutes: float | None, epochs: int | None, *, default_minutes: float) -> Budget:
     """How long to train. Raises InputError."""
     if epochs is None:
-        return Budget(seconds=60.0 * (unless_said_minutes if minutes is None else minutes))
+        return Budget(seconds=60.0 * (default_minutes if minutes is None else minutes))
     try:
         return Budget(pictures=epochs * len(read_split(data, "train")))
     except TrainingDataError as error:
         raise InputError(error.message, hint=error.hint) from error
 
 
-def trained(
+def with_progress(
     work: Callable[[Callable[[Report], None]], Path], out: Path, console: Console
 ) -> tuple[Path, dict[str, float]]:
-    """The ONNX file that some work makes, and its last figures, with a bar of progress. Raises InputError."""
+    """Runs a training with a progress bar; its ONNX file and last figures. Raises InputError."""
     figures = dict[str, float]()
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
@@ -56,9 +56,9 @@ def trained(
 
         def show(report: Report) -> None:
             new_percent = int(100 * report.progress) > int(100 * bar.tasks[task].completed)
-            bar.update(task, completed=report.progress, description=_told(report))
+            bar.update(task, completed=report.progress, description=_progress_text(report))
             if new_percent and not console.is_terminal:
-                console.print(f"{report.progress:4.0%}  step {report.steps}, {_told(report)}")
+                console.print(f"{report.progress:4.0%}  step {report.steps}, {_progress_text(report)}")
             if report.figures is not None:
                 figures.update(report.figures)
                 console.print(f"{report.progress:4.0%}  {_line(report.figures)}")
@@ -72,13 +72,13 @@ def trained(
 
 
 def print_trained(console: Console, model: Path, figures: dict[str, float], *, as_json: bool) -> None:
-    """Say which file was written, and how good it is."""
+    """Prints which file was written, and its figures."""
     console.print(f"{model}: {_line(figures)}")
     if as_json:
         print_json({"model": str(model), "figures": figures})
 
 
-def _told(report: Report) -> str:
+def _progress_text(report: Report) -> str:
     scores, boxes = report.losses
     return f"training, {report.pictures_per_s:.0f}/s, losses {scores:.2f} {boxes:.2f}"
 

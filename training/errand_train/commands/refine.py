@@ -1,4 +1,4 @@
-"""`errand dataset refine`: a refinement or classifier network is trained to judge what those before it find."""
+"""`errand dataset refine`: trains the refinement or classifier network on what the earlier stages find."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated, Final
 import typer
 from rich.console import Console
 
-from errand_train.commands.learning import LIBRARIES, budget_of, check_folders, check_time, print_trained, trained
+from errand_train.commands.learning import LIBRARIES, budget_of, check_folders, check_time, print_trained, with_progress
 from errand_train.detector.schedule import REFINEMENT_RATE, RefineOptions, Schedule
 from errand_train.libraries import check_libraries
 from executive.cli.number_options import LearningRate, Minutes, quantity_option
@@ -20,34 +20,34 @@ from skills.quantities import Count, Seed
 
 __all__ = ["refine_command"]
 
-UNLESS_SAID_MINUTES: Final = 90.0
+DEFAULT_MINUTES: Final = 90.0
 
 
 def refine_command(
     data: Annotated[Path, typer.Option(help="Folder of a data set that `errand dataset render` made.")],
     out: Annotated[Path, typer.Option(help="Folder for checkpoints, figures and the ONNX files.")],
     model: Annotated[
-        Path | None, typer.Option(help="The proposal network's file; else the one of Errand.", show_default=False)
+        Path | None, typer.Option(help="The proposal network's file; Errand's own by default.", show_default=False)
     ] = None,
     classifier: Annotated[
         bool,
-        typer.Option("--classifier", help="The classifier network, which judges what the refinement network sees."),
+        typer.Option("--classifier", help="Train the classifier network, which takes the refinement network's boxes."),
     ] = False,
     minutes: Annotated[
         float | None,
-        quantity_option(Minutes, help="How long to train; an hour and a half unless said.", show_default=False),
+        quantity_option(Minutes, help="Minutes to train; 90 by default.", show_default=False),
     ] = None,
-    epochs: Annotated[int | None, quantity_option(Count, help="Instead: how many crops for each picture.")] = None,
-    seed: Annotated[int, quantity_option(Seed, help="Of the first weights and of all random draws.")] = 1,
+    epochs: Annotated[int | None, quantity_option(Count, help="Instead of --minutes: crops for each picture.")] = None,
+    seed: Annotated[int, quantity_option(Seed, help="Seed of the first weights and of all random draws.")] = 1,
     rate: Annotated[float, quantity_option(LearningRate, help="The highest learning rate.")] = REFINEMENT_RATE,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue from the checkpoint in --out.")] = False,
     start: Annotated[
         Path | None,
-        typer.Option(help="A checkpoint or an ONNX file of the same network whose weights are taken over."),
+        typer.Option(help="A checkpoint or an ONNX file of the same network; training starts from its weights."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Train the refinement network, which sees each proposal anew, or the classifier network; export it."""
+    """Train the refinement network, which takes crops of the proposals, or the classifier network; export it."""
     console = console_for(as_json)
     with refusals():
         check_folders(data, out, resume)
@@ -56,19 +56,19 @@ def refine_command(
         options = RefineOptions(
             data,
             out,
-            budget_of(data, minutes, epochs, unless_said_minutes=UNLESS_SAID_MINUTES),
-            model=_first(model),
+            budget_of(data, minutes, epochs, default_minutes=DEFAULT_MINUTES),
+            model=_proposal_network(model),
             classifier=classifier,
             seed=seed,
             resume=resume,
             start=start,
             schedule=Schedule(rate),
         )
-        file, figures = _refined(options, console)
+        file, figures = _refine(options, console)
     print_trained(console, file, figures, as_json=as_json)
 
 
-def _first(model: Path | None) -> Path:
+def _proposal_network(model: Path | None) -> Path:
     """Raises InputError."""
     file = model or MODEL_FILE
     if not file.is_file():
@@ -76,8 +76,8 @@ def _first(model: Path | None) -> Path:
     return file
 
 
-def _refined(options: RefineOptions, console: Console) -> tuple[Path, dict[str, float]]:
-    """The ONNX file and its figures. Raises InputError."""
+def _refine(options: RefineOptions, console: Console) -> tuple[Path, dict[str, float]]:
+    """Trains; the ONNX file and its figures. Raises InputError."""
     from errand_train.detector.refine import refine
 
-    return trained(partial(refine, options), options.out, console)
+    return with_progress(partial(refine, options), options.out, console)

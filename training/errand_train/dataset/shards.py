@@ -240,7 +240,7 @@ def _shots(out: Path, images: int) -> Iterator[Mapping[str, Any]]:
         try:
             entries = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, json.JSONDecodeError) as error:
-            hint = f"remove {path.parent}; the same command makes it anew"
+            hint = f"remove {path.parent}; the same command makes it again"
             raise DatasetError(f"{path}: is damaged or missing", hint) from error
         yield from entries[:count]
 

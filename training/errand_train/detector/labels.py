@@ -86,7 +86,7 @@ def _file(folder: Path, split: str) -> CocoFile:
 def _picture(folder: Path, image: CocoImage, labels: Sequence[CocoLabel]) -> TrainingPicture:
     file = folder / image.file_name
     if image.size_px is None:
-        raise TrainingDataError(f"{file}: the data set does not tell its size", hint="render it anew")
+        raise TrainingDataError(f"{file}: the data set does not tell its size", hint="render it again")
     scale = np.array(Letterbox(*image.size_px).scale_xy, dtype=np.float32)
     found = Labels(
         outlines=tuple(outline_of(label) * scale for label in labels),

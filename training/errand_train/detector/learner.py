@@ -28,7 +28,7 @@ FORMAT = 2
 ONNX = ".onnx"
 _LONGEST_STEP = 10.0
 _AVERAGED_OVER, _SETTLES_IN = 0.998, 10
-_WITHOUT = "begin anew without it"
+_WITHOUT = "start again without it"
 Network = TypeVar("Network", bound=CascadeNetwork)
 
 
@@ -109,7 +109,7 @@ class Learner(Generic[Network]):
     def start_from(self, file: Path, batches: Iterable[Batch | CropBatch]) -> None:
         """Take over the weights of an ONNX file, with statistics of batches, or the averaged ones of a checkpoint.
 
-        All else begins anew. Raises TrainingDataError.
+        All else starts again. Raises TrainingDataError.
         """
         if file.suffix == ONNX:
             take_over(self.network, file)
@@ -119,7 +119,7 @@ class Learner(Generic[Network]):
             self.start_from_checkpoint(file)
 
     def start_from_checkpoint(self, file: Path) -> None:
-        """Take over a checkpoint's averaged weights; all else begins anew. Raises TrainingDataError."""
+        """Take over a checkpoint's averaged weights; all else starts again. Raises TrainingDataError."""
         _take(self._average, read_checkpoint(file)["average"], file)
         self._average.n_averaged.zero_()
         self.network.load_state_dict(self.average.state_dict())

@@ -20,7 +20,7 @@ from skills.perception.detector.network_file import ModelFileError, load_network
 
 _BEFORE = "network."
 _BYTES = 255.0
-_HINT = "begin anew without it"
+_HINT = "start again without it"
 
 
 @torch.no_grad()

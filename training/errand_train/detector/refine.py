@@ -70,7 +70,7 @@ def _networks_before(options: RefineOptions, names: tuple[str, ...]) -> Detector
         raise TrainingDataError(f"{options.model}: {error.message}", hint=error.hint) from error
     if model.class_names != names:
         raise TrainingDataError(
-            f"{options.model}: knows other classes than {options.data}", hint="render the data anew"
+            f"{options.model}: knows other classes than {options.data}", hint="render the data again"
         )
     return model
 

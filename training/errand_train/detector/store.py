@@ -38,7 +38,7 @@ def read_picture(file: Path) -> Picture:
     """A picture (H, W, 3) of a data set, RGB. Raises TrainingDataError."""
     found = cv2.imread(str(file), cv2.IMREAD_COLOR_RGB)
     if found is None:
-        raise TrainingDataError(f"{file}: is no picture, or damaged", hint="render the data set anew")
+        raise TrainingDataError(f"{file}: is no picture, or damaged", hint="render the data set again")
     return np.asarray(found, dtype=np.uint8)
 
 

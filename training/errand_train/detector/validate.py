@@ -40,7 +40,7 @@ def examination(folder: Path, split: str, class_names: Sequence[str], most: int 
     try:
         found = pictures_of_coco(json.loads(file.read_text(encoding="utf-8")), class_names)
     except (OSError, ValueError) as error:
-        raise TrainingDataError(f"{file}: cannot be used ({error})", hint="render the data set anew") from error
+        raise TrainingDataError(f"{file}: cannot be used ({error})", hint="render the data set again") from error
     pictures = [one for one in found if not one.crowded]
     step = 1 if most is None else max(1, len(pictures) // most)
     return Examination(folder, pictures[::step], class_names)

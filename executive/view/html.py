@@ -1,4 +1,4 @@
-"""HTML files that need no other file: reports from the templates in `templates`, and the page with a log in it."""
+"""HTML and SVG files that need no other file, from the templates in `templates`, and the page with a log in it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SCRIPT: Final = re.compile(r'<script src="page/([\w.]+)" defer></script>\n?')
 
 
 def render(template: str, **values: Any) -> str:
-    """The HTML that a template makes of values. Every text is escaped; a missing value raises jinja2.UndefinedError."""
+    """The text that a template makes of values. Every text is escaped; a missing value raises jinja2.UndefinedError."""
     return _environment().get_template(template).render(values)
 
 
@@ -48,7 +48,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(clock=clock_text, data_address=picture, percent="{:.1%}".format)
+    environment.filters.update(clock=clock_text, data_address=picture, percent="{:.1%}".format, short="{:g}".format)
     return environment
 
 

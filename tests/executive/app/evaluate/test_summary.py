@@ -90,7 +90,7 @@ def test_the_page_lists_each_run_to_look_at_with_its_sentence_and_the_commands()
     commands = ("errand run --say x", "errand log logs/3/log.mcap")
     page = to_page(EvaluationPage("random", (), CASES, lambda _: Evidence(), lambda _: commands))
     assert "claimed, not fulfilled: FALSE CLAIM</b> fetch me the hammer 3, flat, seed 3" in page
-    assert page.count("errand log logs/3/log.mcap") == 7
+    assert page.count("errand run --say x\nerrand log logs/3/log.mcap\n") == 7
     assert "fetch me the hammer 1," not in page
 
 

@@ -85,7 +85,7 @@ class Member:
 def members_of(kind: type[Any]) -> Iterator[Member]:
     """The public methods and properties that a class itself defines."""
     fields = {field.name for field in dataclasses.fields(kind)} if dataclasses.is_dataclass(kind) else set()
-    for name, value in vars(kind).items():
+    for name, value in tuple(vars(kind).items()):
         inner = getattr(value, "__func__", getattr(value, "fget", value))
         if (
             not name.startswith("_")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from graphlib import CycleError, TopologicalSorter
+from typing import TYPE_CHECKING
 
 from executive.app.mission_files import mission_file
 from executive.app.prepared import Prepared, compiled_request, together
@@ -12,8 +13,6 @@ from executive.app.robots import PlacedRobot, knowledge_for, only_robot, placed_
 from executive.app.worlds import knowledge_of, open_world, refuse_blocked, with_map
 from executive.language.parser import load_parser
 from executive.language.questions import Answerer, ClarifyingQuestion, QuestionPolicy, answer_by
-from executive.language.robots import Addressed, Part, Whom, understand_for_robots_asking
-from executive.language.understand import Status, Understanding
 from executive.mission.file.objects import import_folders
 from executive.mission.file.overrides import overridden
 from executive.mission.file.people import routes_in
@@ -37,6 +36,10 @@ from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.files.texts import LONGEST_ANSWER, plain_text
 from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
+
+if TYPE_CHECKING:
+    from executive.language.robots import Addressed, Part
+    from executive.language.understand import Understanding
 
 __all__ = ["Setting", "instead", "prepare", "prepare_alone"]
 
@@ -106,6 +109,9 @@ class Setting:
 
     def understood(self) -> Addressed:
         """What the request's sentence asks of each robot. Raises InputError: it is not understood."""
+        from executive.language.robots import understand_for_robots_asking  # which a mission file does not need
+        from executive.language.understand import Status
+
         asked = self.request.require_wake
         meant = understand_for_robots_asking(
             self.request.sentence or "",
@@ -260,6 +266,8 @@ def _for_whom_it_calls(setting: Setting) -> Prepared:
 
 def _expanded(part: Part, setting: Setting) -> Iterator[Part]:
     """The part for each robot that it is for. Raises InputError: it is for any of them, and none can do it."""
+    from executive.language.robots import Whom
+
     if part.robot is Whom.ALL:
         yield from (replace(part, robot=name) for name in setting.robots)
     elif part.robot is Whom.ANY:

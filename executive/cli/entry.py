@@ -21,7 +21,6 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-from executive.cli.options import StartCommand
 from executive.cli.plugin_commands import help_lines, plugin_command
 from skills.files.errors import MOST_LETTERS, InputError, one_line
 
@@ -90,6 +89,8 @@ def as_command(name: str, found: Any) -> Any:
         return get_command(found)
     if not isinstance(found, FunctionType):
         raise TypeError("it is neither a typer.Typer nor a function")
+    from executive.cli.options import StartCommand  # which loads what a request is
+
     alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     alone.command(name=name, cls=StartCommand)(found)
     return get_command(alone)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from executive.app.checker import Checker
 from executive.app.prepare import prepare
 from executive.app.simulated import run_simulated
-from executive.cli.check_command import Checker
 from executive.mission.request import Request
 
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -34,7 +34,7 @@ def test_it_is_achieved_and_takes_about_as_long_as_estimated(name, seed, tmp_pat
     assert report.achieved, (report.message, report.referee.why)
     assert report.referee.collisions == 0
     if "skipped" not in report.message:
-        assert 0.6 < report.sim_time_s / Checker().check(file).estimate.duration_s < 1.6
+        assert 0.6 < report.sim_time_s / Checker().check_file(file).estimate.duration_s < 1.6
 
 
 DECIDING = {

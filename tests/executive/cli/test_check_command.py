@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from executive.cli import check_command, entry
+from executive.app import checker
+from executive.cli import entry
 
 ROOT = Path(__file__).parents[3]
 GOOD = ROOT / "missions" / "go_living_room.yaml"
@@ -69,7 +70,7 @@ def test_the_parts_of_all_robots_are_checked(write):
 
 def test_robots_that_wait_for_each_other_take_as_long_as_one_after_the_other(write):
     def estimate(text):
-        return check_command.Checker().check(write(text)).estimate
+        return checker.Checker().check_file(write(text)).estimate
 
     robots, _, alice, bob = PARTS.replace("%s", "office").split("\n")[1:5]
     together = f"name: x\n{robots}\nparts:\n{alice}\n{bob}\n"
@@ -176,14 +177,14 @@ def test_a_broken_plug_in_fails_only_the_file_that_uses_it(write, tmp_path):
 
 def test_each_file_is_checked_on_its_own(write, monkeypatch):
     """A defect that one file brings about is its error, and the others are still checked."""
-    poison, checked = write("name: x\nsteps:\n  - to: kitchen\n"), check_command.prepare
+    poison, checked = write("name: x\nsteps:\n  - to: kitchen\n"), checker.prepare
 
     def prepared(request, **more):
         if request.file == poison:
             raise RecursionError("too deep")
         return checked(request, **more)
 
-    monkeypatch.setattr(check_command, "prepare", prepared)
+    monkeypatch.setattr(checker, "prepare", prepared)
     result = invoke(poison, GOOD, "--json")
     told = json.loads(result.stdout.splitlines()[-1])
     assert [(error["file"], "RecursionError" in error["message"]) for error in told["errors"]] == [(str(poison), True)]

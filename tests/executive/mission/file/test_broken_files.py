@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.cli.check_command import Checker
+from executive.app.checker import Checker
 from skills.files.errors import InputError
 
 _spec = importlib.util.spec_from_file_location("mission_mutations", Path(__file__).with_name("mutations.py"))
@@ -27,7 +27,7 @@ def checker(parser):
 
 
 def test_the_good_ones_are_good(checker, missions):
-    faults = {path.name: list(map(str, checker.check(path).errors)) for path in missions}
+    faults = {path.name: list(map(str, checker.check_file(path).errors)) for path in missions}
     assert not any(faults.values()), faults
 
 
@@ -36,7 +36,7 @@ def test_every_broken_file_is_refused_with_a_place_and_a_hint(checker, mission_f
     for name, raw in mutations.broken_files(missions, COUNT, SEED):
         path = mission_folder / "mission.yaml"
         path.write_bytes(raw)
-        errors = checker.check(path).errors
+        errors = checker.check_file(path).errors
         if not errors:
             wrong.append((name, "accepted"))
         for error in errors:

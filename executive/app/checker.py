@@ -1,0 +1,109 @@
+"""Checks missions without running them: all that speaks against them, and what they take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from graphlib import TopologicalSorter
+from pathlib import Path
+from typing import Final
+
+from executive.app.feasibility import check_prepared, route_planner_of
+from executive.app.prepare import prepare
+from executive.app.prepared import Prepared
+from executive.app.worlds import refuse_unusable
+from executive.mission.request import Request
+from executive.tree.compiler import CompiledTree
+from executive.tree.estimate import Estimate, RoutePlanner
+from skills.files.errors import InputError
+
+__all__ = ["Checked", "Checker"]
+
+MOST_LETTERS: Final = 300
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What speaks against a mission, the tree of each of its robots, and what all of them take together.
+
+    `file` is its file, where it has one.
+    """
+
+    file: Path | None
+    errors: tuple[InputError, ...] = ()
+    trees: tuple[CompiledTree, ...] = ()
+    estimate: Estimate = field(default_factory=Estimate)
+    warnings: tuple[InputError, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """True without errors."""
+        return not self.errors
+
+
+class Checker:
+    """Checks missions; the routes planned in each world for each kind of robot are shared among them.
+
+    `like` has what the requests of files share: the world in place of the files' own, stack, start, robots and the
+    values of parameters.
+    """
+
+    def __init__(self, like: Request | None = None) -> None:
+        self._like = like or Request()
+        self._routes: dict[tuple[Path, str, Path | None], RoutePlanner] = {}
+
+    def check_file(self, file: Path) -> Checked:
+        """Checks one file; raises nothing for what stands in it."""
+        return self.check(replace(self._like, file=file))
+
+    def check(self, request: Request) -> Checked:
+        """Checks a request; raises nothing for what is asked in it."""
+        trees, file = tuple[CompiledTree, ...](), request.file
+        try:
+            prepared = prepare(request)
+            trees = tuple(each.tree for each in prepared.all)
+            refuse_unusable(prepared.world)
+            checked = {each.mission.robot_name: check_prepared(each, self._planner(each)) for each in prepared.all}
+        except InputError as error:
+            return Checked(file, _placed(file, (error, *error.others)), trees)
+        except Exception as defect:  # the other files are still to be checked
+            what = f"errand cannot check it ({type(defect).__name__}: {defect})"[:MOST_LETTERS]
+            return Checked(file, _placed(file, (InputError(what, hint="report it with this file"),)), trees)
+        errors = tuple(error for each in checked.values() for error in each.errors)
+        warnings = tuple(warning for each in checked.values() for warning in each.warnings)
+        estimates = {name: each.estimate for name, each in checked.items()}
+        return Checked(file, _placed(file, errors), trees, _of_all(prepared, estimates), warnings)
+
+    def _planner(self, prepared: Prepared) -> RoutePlanner:
+        world, robot = prepared.world, prepared.robot
+        key = (world.folder, robot.kind, robot.stack_file)
+        if key not in self._routes:
+            self._routes[key] = route_planner_of(world, robot)
+        return self._routes[key]
+
+
+def _of_all(prepared: Prepared, estimates: Mapping[str, Estimate]) -> Estimate:
+    """What several robots take together: until the last is done, all that is driven, the most that one charge gives."""
+    after = {each.mission.robot_name: each.after for each in prepared.all}
+    done_s: dict[str, float] = {}
+    latest_s: dict[str, float] = {}
+    for name in TopologicalSorter(after).static_order():
+        done_s[name] = estimates[name].duration_s + max((done_s[first] for first in after[name]), default=0.0)
+        latest_s[name] = estimates[name].most_s + max((latest_s[first] for first in after[name]), default=0.0)
+    whole = Estimate(
+        max(done_s.values()),
+        sum(each.distance_m for each in estimates.values()),
+        max(each.charge for each in estimates.values()),
+    )
+    return whole.up_to(max(latest_s.values()), *(reason for each in estimates.values() for reason in each.reasons))
+
+
+def _placed(file: Path | None, errors: Sequence[InputError]) -> tuple[InputError, ...]:
+    """The errors, in the order of their lines; one that names no place stands at the head of the file."""
+    if file is None:
+        return tuple(errors)
+    placed = [
+        error if error.file is not None else InputError(error.message, hint=error.hint, file=file, line=1)
+        for error in errors
+    ]
+    return tuple(sorted(placed, key=lambda error: (str(error.file) != str(file), str(error.file), error.line or 0)))

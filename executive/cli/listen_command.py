@@ -23,9 +23,8 @@ from executive.language.understand import Status, Understanding
 from executive.mission.request import Request
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, TeamReader, refuse_alike, spoken_phrases
-from executive.speech.listener import HeardUtterance, Listener, Recording
-from executive.speech.microphone import Hearing, follow, microphone_blocks
-from executive.speech.vocabulary import Vocabulary, of_world, read_vocabulary
+from executive.speech.listener import HeardUtterance, Hearing, Listener, Recording, follow, microphone_blocks
+from executive.speech.recogniser import Vocabulary, of_world, read_vocabulary
 from executive.speech.voice import Voice, installed_voice
 from executive.speech.whisper import load_whisper
 from executive.words.knowledge import Knowledge

@@ -9,7 +9,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from executive.speech.extra import speech_module
+from executive.speech.recogniser import speech_module
 from executive.speech.sound import RATE_HZ, Samples, joined
 
 __all__ = ["FRAME", "Endpointer", "PauseRules", "SileroDetector", "SpeechDetector", "Utterance", "load_detector"]

@@ -17,8 +17,8 @@ from executive.language.roles import HERE
 from executive.language.spelling import SoundAlikes, sound_distance
 from executive.language.understand import Status, Understanding, understand
 from executive.language.wake import SAME_NAME, Address, addressed_to, heard_wake
-from executive.speech.sound_correction import Reading
-from executive.speech.vocabulary import Vocabulary
+from executive.speech.interpret import Reading
+from executive.speech.recogniser import Vocabulary
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
 from skills.files.errors import InputError

@@ -1,15 +1,24 @@
-"""Sound as samples, and what can be told of it without understanding it."""
+"""Sound as samples, what can be told of it without understanding it, and wav files of any rate, width and channels."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass
-from typing import Final
+from math import gcd
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["RATE_HZ", "Loudness", "Samples", "joined", "level_db"]
+from skills.files.errors import InputError
+from skills.files.outside import plain_file
+
+if TYPE_CHECKING:
+    from soundfile import SoundFile
+
+__all__ = ["RATE_HZ", "Loudness", "Samples", "joined", "level_db", "read_wav"]
 
 Samples = npt.NDArray[np.float32]
 """Sound of one channel at RATE_HZ; full scale is -1 to 1."""
@@ -68,3 +77,98 @@ def _runs(flags: npt.NDArray[np.bool_]) -> int:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     lengths = edges[1::2] - edges[::2]
     return int(lengths[lengths >= _CLIP_RUN].sum())
+
+
+_OPEN_END: Final = 0x7FFF_F000
+"""From this size on the head says that its writer did not know it (recorders that write into a pipe)."""
+_HEAD_BYTES: Final = 44
+MOST_BYTES: Final = 8_000_000_000
+_RATES_HZ: Final = range(4_000, 384_001)
+_SAMPLE_BYTES: Final = {"PCM_U8": 1, "PCM_16": 2, "PCM_24": 3, "PCM_32": 4, "FLOAT": 4, "DOUBLE": 8}
+_CONTEXT: Final = 16
+"""How many samples at the lower rate a block is told of its neighbours when its rate is changed."""
+_HINT: Final = "save the recording as a plain wav file (PCM or float)"
+
+
+def read_wav(file: Path) -> Iterator[Samples]:
+    """The sound of a wav file at RATE_HZ, its channels averaged, in blocks of one second; the last one is shorter.
+
+    Only a few blocks are in memory at a time.
+
+    Raises:
+        InputError: when the first or a later block is asked for: it cannot be read, is no wav file, ends before its
+            head says, holds no sound, or holds samples that are no numbers.
+    """
+    from soundfile import LibsndfileError, SoundFile
+
+    plain_file(file, most_bytes=MOST_BYTES, hint="name a wav file")
+    try:
+        with file.open("rb") as stream:
+            head = stream.read(_HEAD_BYTES)
+        with SoundFile(file) as sound, closing(_resampled(_blocks(file, head, sound), sound.samplerate)) as blocks:
+            yield from blocks
+    except OSError as error:
+        raise InputError(f"cannot read it ({error.strerror})", hint="name a wav file", file=file) from error
+    except LibsndfileError as error:
+        raise _error(file, *_unreadable(head, error.error_string)) from error
+
+
+def _blocks(file: Path, head: bytes, sound: SoundFile) -> Iterator[Samples]:
+    """One second after another, at the file's own rate."""
+    rate_hz, there_s = sound.samplerate, sound.frames / sound.samplerate
+    if rate_hz not in _RATES_HZ:
+        raise _error(file, f"{rate_hz} samples per second are not read", "record at 16 kHz in one channel")
+    size = int.from_bytes(head[4:8], "little")
+    missing = 0 if size >= _OPEN_END else size + 8 - file.stat().st_size
+    if missing > 1:
+        missing_s = missing / (rate_hz * sound.channels * _SAMPLE_BYTES.get(sound.subtype, 1))
+        told = f"it ends after {there_s:.1f} s, and its head says {there_s + missing_s:.1f} s"
+        raise _error(file, told, "copy the whole file, or record again")
+    if sound.frames == 0:
+        raise _error(file, "it holds no sound", "record again")
+    for at_s, frames in enumerate(sound.blocks(rate_hz, dtype="float64", always_2d=True)):
+        block = frames.mean(axis=1)
+        bad = np.flatnonzero(~np.isfinite(block))
+        if bad.size:
+            where = at_s + bad[0] / rate_hz
+            raise _error(file, f"the sample at {where:.3f} s is no number", "record again, or export it anew")
+        yield np.asarray(np.clip(block, -1.0, 1.0), np.float32)
+
+
+def _unreadable(head: bytes, reason: str) -> tuple[str, str]:
+    """What is wrong with a file that is no sound, and the hint."""
+    if not head:
+        return "the file is empty", "record again"
+    if head[:4] == b"RIFF" and len(head) < _HEAD_BYTES:
+        return "the file ends before its sound", "copy the whole file, or record again"
+    return f"this is no wav file ({reason.rstrip('.')})", _HINT
+
+
+def _error(file: Path, message: str, hint: str) -> InputError:
+    return InputError(message, hint=hint, file=file)
+
+
+def _resampled(blocks: Iterator[Samples], rate_hz: int) -> Generator[Samples, None, None]:
+    """The blocks of one second at RATE_HZ; each is filtered together with the ends of its neighbours."""
+    if rate_hz == RATE_HZ:
+        yield from blocks
+        return
+    up, down = RATE_HZ // gcd(RATE_HZ, rate_hz), rate_hz // gcd(RATE_HZ, rate_hz)
+    context = down * -(-_CONTEXT * max(up, down) // (up * down))
+    before = np.zeros(context, np.float32)
+    held: Samples | None = None
+    for block in blocks:
+        if held is not None:
+            yield _converted(before, held, block[:context], up, down)
+            before = np.concatenate([before, held])[-context:]
+        held = block
+    if held is not None:
+        yield _converted(before, held, np.zeros(0, np.float32), up, down)
+
+
+def _converted(before: Samples, block: Samples, after: Samples, up: int, down: int) -> Samples:
+    from scipy.signal import resample_poly
+
+    wide = resample_poly(np.concatenate([before, block, after]), up, down)
+    start = len(before) * up // down
+    return np.asarray(wide[start : start + len(block) * up // down], np.float32)

@@ -17,12 +17,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from executive.speech.adapter import packaged_adapter
-from executive.speech.extra import speech_module
-from executive.speech.model_file import read_model_file
-from executive.speech.recogniser import Transcript
+from executive.speech.adapter import packaged_adapter, read_model_file
+from executive.speech.recogniser import Transcript, Vocabulary, speech_module
 from executive.speech.sound import RATE_HZ, Samples
-from executive.speech.vocabulary import Vocabulary
 from skills.files.errors import InputError
 
 __all__ = ["BASE_SHA256", "WhisperRecogniser", "base_weights", "load_whisper", "start_tokens"]

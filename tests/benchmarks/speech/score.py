@@ -26,8 +26,7 @@ import sentences
 import voices
 
 from executive.cli.listen_command import listener_for
-from executive.speech.sound import RATE_HZ, joined
-from executive.speech.wav import read_wav
+from executive.speech.sound import RATE_HZ, joined, read_wav
 from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
 

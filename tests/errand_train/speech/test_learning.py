@@ -15,7 +15,7 @@ from errand_train.speech.data import SpokenSentence, usual  # noqa: E402
 from errand_train.speech.learning import Lessons, learn, losses, text_loss  # noqa: E402
 from errand_train.speech.model import AdaptedWhisper  # noqa: E402
 from errand_train.speech.noises import Conditions  # noqa: E402
-from executive.speech.model_file import read_model_file  # noqa: E402
+from executive.speech.adapter import read_model_file  # noqa: E402
 from executive.speech.whisper import base_weights  # noqa: E402
 
 NOISY = Conditions(clear=0.0, echoing=0.0, ratio_db=(10.0, 10.0))

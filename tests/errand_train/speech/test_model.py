@@ -11,7 +11,7 @@ faster_whisper = pytest.importorskip("faster_whisper")
 from made_speech import tone  # noqa: E402
 
 from errand_train.speech.model import AdaptedWhisper  # noqa: E402
-from executive.speech.model_file import read_model_file  # noqa: E402
+from executive.speech.adapter import read_model_file  # noqa: E402
 from executive.speech.whisper import base_weights  # noqa: E402
 
 RANKS = {"encoder/": 4, "decoder/layer_0": 2}

@@ -13,7 +13,7 @@ from executive.cli.entry import app
 from executive.cli.listen_command import answer_line, hear_request, show_hearing
 from executive.language.understand import Status, Understanding
 from executive.mission.request import Request
-from executive.speech.microphone import follow
+from executive.speech.listener import follow
 from executive.words.robots import RobotConfig
 from skills.files.errors import InputError
 

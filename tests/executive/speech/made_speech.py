@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from executive.speech.recogniser import Transcript
+from executive.speech.recogniser import Transcript, Vocabulary
 from executive.speech.sound import RATE_HZ, Samples
-from executive.speech.vocabulary import Vocabulary
 
 __all__ = [
     "LoudIsSpeech",

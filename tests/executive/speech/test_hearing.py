@@ -4,7 +4,7 @@ import pytest
 
 from executive.language.understand import Status
 from executive.speech.hearing import SpeechReader, spoken_phrases
-from executive.speech.vocabulary import Vocabulary, of_world
+from executive.speech.recogniser import Vocabulary, of_world
 
 
 @pytest.fixture(scope="module")

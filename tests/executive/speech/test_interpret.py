@@ -1,12 +1,9 @@
-"""Which reading was meant; the reader here takes only sentences with a known thing in them."""
-
 import pytest
 from made_speech import ScriptedRecognition
 
 from executive.language.spelling import SoundAlikes
-from executive.speech.interpret import interpret, smoothed
+from executive.speech.interpret import Candidate, Reading, corrections, interpret, opening_as_heard, smoothed
 from executive.speech.recogniser import Transcript
-from executive.speech.sound_correction import Reading
 
 ALIKES = SoundAlikes(["wrench", "bench", "coke"])
 
@@ -79,3 +76,106 @@ def test_nothing_said_means_nothing():
 )
 def test_what_was_said_twice_is_heard_once(said, left):
     assert smoothed(said) == left
+
+
+NAMES = ("wrench", "bench", "desk", "kitchen", "beer", "coke")
+WORDS = ("could you", "would you", "drive to", "bring", "from", "take")
+KNOWN = {"bring", "take", "me", "the", "from", "to", "could", "would", "you", "drive", *NAMES}
+ALIKES = SoundAlikes(NAMES, WORDS)
+
+
+def read_known(text):
+    unknown = tuple(word for word in text.rstrip(".?").lower().split() if word not in KNOWN)
+    return Reading(text, not unknown, unknown)
+
+
+def corrected(text, most=3):
+    first = Candidate(text, 0.0, read_known(text))
+    return [candidate.text for candidate in corrections([first], read_known, ALIKES, most=most)]
+
+
+@pytest.mark.parametrize(
+    ("heard", "meant"),
+    [
+        ("bring me the ranch", "bring me the wrench"),
+        ("bring me the ranch.", "bring me the wrench."),
+        ("coat you bring me the beer", "could you bring me the beer"),
+        ("bring the bear from the nest", "bring the beer from the desk"),
+        ("rive to the kitchen", "drive to the kitchen"),
+    ],
+)
+def test_misheard_words_become_known_ones(heard, meant):
+    assert meant in corrected(heard)
+
+
+def test_a_sentence_that_fits_stays_as_it_is():
+    assert corrected("bring me the coke", most=1) == ["bring me the coke"]
+
+
+def test_right_words_are_left_alone():
+    assert corrected("take the beer from the nest")[0].startswith("take the beer from the")
+
+
+def test_what_sounds_like_nothing_known_is_not_corrected():
+    assert corrected("bring me the newspaper subscription") == []
+
+
+def test_behind_an_article_stands_a_name():
+    assert not any("the could" in text or "the from" in text for text in corrected("bring me the food", most=9))
+
+
+def test_the_likest_sentence_comes_first():
+    found = corrections([Candidate("bring me the ranch", 0.0, read_known("bring me the ranch"))], read_known, ALIKES)
+    assert [candidate.cost for candidate in found] == sorted(candidate.cost for candidate in found)
+
+
+def test_the_search_ends_however_long_the_sentence():
+    reads = []
+
+    def never(text):
+        reads.append(text)
+        return Reading(text, fits=False)
+
+    heard = Candidate("could you bring me the ranch from the nest " * 6, 0.0, Reading("", fits=False))
+    assert corrections([heard], never, ALIKES) == []
+    assert len(reads) < 50
+
+
+OLIVER, ALICE = "Hey Oliver, get me a cube.", "Hey Alice, get me a cube."
+
+
+def _opening(text, plain, likely):
+    recognition = ScriptedRecognition(plain=plain, likely=likely)
+    return opening_as_heard(recognition, text, ("Alice",), lambda heard: "alice" in heard.lower())
+
+
+#   heard with the name expected    heard without   likelier by e to the    taken
+#   Hey Alice, get me a cube.       Hey Oliver,..   12                      Hey Oliver, ...
+#   Hey Alice, get me a cube.       Hey Ellis,..    3                       Hey Alice, ...
+#   Hey Alice, get me a cube.       Hey Alice,..    -                       Hey Alice, ...
+@pytest.mark.parametrize(("ahead", "taken"), [(12.0, OLIVER), (3.0, ALICE)])
+def test_another_name_must_be_much_likelier(ahead, taken):
+    assert _opening(ALICE, OLIVER, {OLIVER: ahead, ALICE: 0.0}) == taken
+
+
+def test_a_name_that_is_heard_without_being_expected_is_meant():
+    assert _opening(ALICE, "Hey Alice, get me acute.", {}) == ALICE
+
+
+def test_only_the_opening_is_taken_from_what_was_heard_without_expecting_names():
+    other = "Hey Oliver, get me a cube."
+    assert _opening(ALICE, "Hey Oliver, get meat cue.", {other: 12.0}) == other
+
+
+def test_a_sentence_that_is_much_likelier_as_a_whole_was_not_to_the_robot():
+    meant, heard = "Okay, let us meet at five.", "OK Alice, meet at five."
+    likely = {meant: 12.0, "Okay, let meet at five.": 3.0}
+    assert _opening(heard, meant, likely) == meant
+
+
+def test_a_call_at_the_end_stays():
+    assert _opening("Get me a cube from the table, Alice.", "Get me.", {}) == "Get me a cube from the table, Alice."
+
+
+def test_where_nothing_is_heard_without_expecting_names_the_call_stays():
+    assert opening_as_heard(ScriptedRecognition(), ALICE, ("Alice",), lambda heard: False) == ALICE

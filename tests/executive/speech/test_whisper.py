@@ -6,13 +6,12 @@ from importlib import import_module
 import pytest
 from made_speech import silence
 
-import executive.speech.extra as extra
+import executive.speech.recogniser as extra
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener
-from executive.speech.sound import joined
-from executive.speech.vocabulary import of_world
-from executive.speech.wav import read_wav
+from executive.speech.recogniser import of_world
+from executive.speech.sound import joined, read_wav
 from executive.speech.whisper import load_whisper
 from skills.files.errors import InputError
 

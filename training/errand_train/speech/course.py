@@ -15,8 +15,8 @@ from errand_train.speech.data import spoken_sentences, usual
 from errand_train.speech.learning import Lessons, learn, text_loss
 from errand_train.speech.model import AdaptedWhisper
 from errand_train.speech.noises import Conditions
-from executive.speech.extra import speech_module
-from executive.speech.model_file import read_model_file
+from executive.speech.adapter import read_model_file
+from executive.speech.recogniser import speech_module
 from executive.speech.whisper import BASE_SHA256, base_weights
 
 __all__ = ["Course", "train"]

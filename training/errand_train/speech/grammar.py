@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from executive.speech.vocabulary import Vocabulary
+from executive.speech.recogniser import Vocabulary
 from skills.files.yaml_source import read_yaml
 
 __all__ = ["Grammar", "TrainingSentence", "load_grammar"]

@@ -15,8 +15,7 @@ import torch
 import torch.nn.functional as tf
 from torch import Tensor, nn
 
-from executive.speech.adapter import Adapter, LowRank
-from executive.speech.model_file import ModelFile
+from executive.speech.adapter import Adapter, LowRank, ModelFile
 
 __all__ = ["AdaptedWhisper"]
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from executive.speech.sound import Samples, joined
-from executive.speech.wav import read_wav
+from executive.speech.sound import Samples, joined, read_wav
 from skills.files.errors import InputError
 
 __all__ = ["Speaker", "drawn_speaker", "speakers", "speech"]

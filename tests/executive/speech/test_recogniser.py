@@ -1,6 +1,6 @@
 import pytest
 
-from executive.speech.vocabulary import Vocabulary, of_world, read_vocabulary
+from executive.speech.recogniser import Vocabulary, of_world, read_vocabulary
 from skills.files.errors import InputError
 
 

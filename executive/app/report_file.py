@@ -21,7 +21,7 @@ from executive.record.schemas import TRANSITIONS
 from executive.run.findings import Said
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView
-from executive.view.collapse import DRAWN_NODES, folded_to, what_ran
+from executive.view.collapse import DRAWN_NODES, executed_tree, fold_to
 from executive.view.html import render
 from executive.view.map_picture import map_picture
 from executive.view.styles import ROBOT_COLOURS, NodeStyle, Styles, style_of
@@ -131,7 +131,7 @@ class EndedTree:
     @property
     def picture(self) -> str:
         """What ran of the tree, as SVG."""
-        return to_svg(folded_to(what_ran(self.view), DRAWN_NODES), title=self.tree.mission_name)
+        return to_svg(fold_to(executed_tree(self.view), DRAWN_NODES), title=self.tree.mission_name)
 
     def steps(self, events: Sequence[Event]) -> tuple[StepRow, ...]:
         """The steps of its mission, with their times by a log."""

@@ -17,7 +17,7 @@ from executive.cli.output import BAD_INPUT, console_for, print_json
 from executive.mission.request import Request
 from executive.tree.estimate import Estimate
 from executive.tree.node_view import node_view
-from executive.view.collapse import folded_to
+from executive.view.collapse import fold_to
 from executive.view.text import to_rich
 from skills.files.errors import InputError, count_text, one_line
 
@@ -93,7 +93,7 @@ def _show(one: Checked, console: Console, *, verbose: bool) -> None:
     for tree in one.trees if verbose else ():
         for command in tree.commands:
             console.print(f"  {command}", markup=False)
-        console.print(to_rich(folded_to(node_view(tree.root), SHOWN_NODES), collapsed=False))
+        console.print(to_rich(fold_to(node_view(tree.root), SHOWN_NODES), collapsed=False))
 
 
 def _in_words(estimate: Estimate) -> str:

@@ -21,7 +21,7 @@ from executive.mission.request import Request
 from executive.record.history import read_history
 from executive.tree.node_view import NodeView, node_view, to_json
 from executive.view.btcpp import to_btcpp
-from executive.view.collapse import DRAWN_NODES, MANY_NODES, folded_below, folded_to
+from executive.view.collapse import DRAWN_NODES, MANY_NODES, fold_below, fold_to
 from executive.view.mermaid import to_mermaid
 from executive.view.svg import to_svg
 from executive.view.text import to_text
@@ -75,9 +75,9 @@ def tree(
     """Show the tree of a sentence or a mission file before it runs, or of a log as it last was."""
     with refusals():
         whole = _view(file, say, world, at, robot)
-        shown = whole if depth is None else folded_below(whole, depth)
+        shown = whole if depth is None else fold_below(whole, depth)
         few = most or _MOST.get(form)
-        text = _FORMS[form](shown if few is None else folded_to(shown, few), ascii_only)
+        text = _FORMS[form](shown if few is None else fold_to(shown, few), ascii_only)
         if output is None:
             sys.stdout.write(text)
         else:

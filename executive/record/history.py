@@ -1,4 +1,4 @@
-"""What an event log says about a run: its trees in their state at any time, and its transitions."""
+"""History of a run from its event log: the trees at any time, and the transitions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class History:
     events: tuple[Event, ...]
 
     def transitions(self) -> Iterator[dict[str, Any]]:
-        """Each change of a node: `t` (s), `node`, `from`, `to`, `cause`, `message`."""
+        """The transitions of the nodes: `t` (s), `node`, `from`, `to`, `cause`, `message`."""
         for event in self.events:
             if event.topic == TRANSITIONS:
                 yield {"t": event.data.get("t", event.stamp_s), **_picked(event.data, TRANSITION_KEYS[1:])}
@@ -39,7 +39,7 @@ class History:
         return tuple(sorted({name for event in self.events if (name := robot_of(event))}))
 
     def of_robot(self, name: str) -> History:
-        """What one robot did, with what is no robot's. Raises InputError: the log has no such robot."""
+        """The events of one robot, and those of no robot. Raises InputError if the log has no such robot."""
         known = robot_called(name, self.robots)
         if known is None:
             hint = f"there are: {', '.join(self.robots)}" if self.robots else "no robot's messages are in it"
@@ -68,23 +68,23 @@ class History:
 
 
 def robot_of(event: Event) -> str:
-    """The name of the robot whose message it is; empty where it is no robot's."""
+    """Name of the robot that an event belongs to; empty if it belongs to none."""
     return str(event.data.get("robot") or event.data.get("robot_name") or "")
 
 
 def read_history(path: Path) -> History:
-    """The history of a log, also of one that was cut off. Raises InputError for a file that is no log."""
+    """Reads the history of a log, even of one that was cut off. Raises InputError for a file that is no log."""
     return History(path, read_events(path))
 
 
 def logged_state(transition: dict[str, Any]) -> NodeState:
-    """The state that a logged transition led to."""
+    """State of a node after a logged transition."""
     cause = transition.get("cause")
     return NodeState(Status(transition["to"]), None if not cause else Cause(cause), transition.get("message") or "")
 
 
 def logged_activity(activity: dict[str, Any]) -> NodeState:
-    """The state of a node that goes on, from what it was logged to do by then."""
+    """State of a running node with its latest logged message."""
     return NodeState(Status.RUNNING, None, activity.get("message") or "")
 
 
@@ -93,7 +93,7 @@ def _before(events: Iterable[Event], until_s: float | None) -> Iterator[Event]:
 
 
 def _latest(found: list[tuple[dict[str, Any], dict[str, NodeState]]], robot: Any) -> dict[str, NodeState]:
-    """The states of the robot's latest tree; of the latest of all when the robot is not named."""
+    """States of the robot's latest tree, or of the latest tree if no robot is named."""
     mine = [states for data, states in found if data.get("robot") == robot]
     return mine[-1] if mine else found[-1][1]
 

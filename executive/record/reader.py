@@ -1,4 +1,4 @@
-"""Reads an event log back, one that a kill cut off included."""
+"""Reads event logs, even those that a killed process left behind."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Event:
 def read_events(path: Path) -> tuple[Event, ...]:
     """All events in the order in which they were written; of a log that was cut off, those before the cut.
 
-    Raises InputError: there is no such file, or it is no event log.
+    Raises InputError if there is no such file, or it is no event log.
     """
     plain_file(path, most_bytes=MOST_BYTES, hint="name a log that exists")
     try:

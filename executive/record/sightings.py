@@ -1,4 +1,4 @@
-"""Which objects were seen on the way, as a log tells it."""
+"""Objects that the robots saw during a run, from its event log."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from skills.perception.class_forms import THING
 
 
 def seen_objects(events: Iterable[Event]) -> tuple[ObjectObservation, ...]:
-    """The objects that a run is sure to have seen, each once, in the order of the searches.
+    """The confirmed objects of a run, each once, in the order of the searches.
 
-    Sure is what `detect` itself would count as found: seen from two places, and believed to be of its class at the end
-    of the search. What has no class is left out. Objects of one class within `SAME_WITHIN_M` of each other, seen by
-    different searches, are one. Sizes are not logged, and 0 here; the score is the belief.
+    An object is confirmed as in `detect`: seen from two viewpoints, and still believed to be of its class at the end of
+    the search. Objects without a class are left out. Two objects of one class from different searches are the same if
+    they are within `SAME_WITHIN_M`. The log has no sizes, so they are 0 here; the score is the belief.
     """
     searches: list[list[ObjectObservation]] = []
     open_searches: dict[str, int] = {}

@@ -1,4 +1,4 @@
-"""A log as a list of what happened, for people."""
+"""Timeline of a run from its event log, for people."""
 
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ from executive.tree.snapshot import NodeState
 
 @dataclass(frozen=True)
 class Entry:
-    """One line: time on the robot's clock (s), what it is about, and what happened; `state` of a node's change, `robot`
-    whose it is.
+    """One line of a timeline: time on the robot's clock (s), node or topic, and text.
+
+    `state` is the node's state after a change, `robot` the robot's name.
     """
 
     t: float
@@ -42,7 +43,7 @@ class Entry:
 def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[Entry]:
     """The entries of a log in order.
 
-    `leaves_only` leaves out the changes of inner nodes that did not fail, and single late ticks.
+    `leaves_only` omits changes of inner nodes that did not fail, and single late ticks.
     """
     return (replace(entry, robot=robot_of(event)) for event, entry in _entries(events, leaves_only))
 

@@ -1,4 +1,4 @@
-"""Makes a large tree small enough to look at: what is done or not begun is folded, what runs or failed is not."""
+"""Folds large trees: nodes that succeeded or have not begun are hidden, running and failed ones are not."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import replace
 from py_trees.common import Status
 
 from executive.tree.node_view import NodeView
-from executive.view.text import closed
+from executive.view.text import is_closed
 
 MANY_NODES = 80
 DRAWN_NODES = 40
 _PLUMBING = frozenset({"monitor", "remember"})
 
 
-def folded_below(root: NodeView, depth: int) -> NodeView:
-    """The tree down to `depth` levels below the root; what lies deeper is counted in `hidden`.
+def fold_below(root: NodeView, depth: int) -> NodeView:
+    """The tree down to `depth` levels below the root; `hidden` counts the deeper nodes.
 
     Raises ValueError: a negative depth.
     """
@@ -24,18 +24,18 @@ def folded_below(root: NodeView, depth: int) -> NodeView:
         raise ValueError(f"a depth is at least 0, not {depth}")
     if depth == 0:
         return replace(root, children=(), hidden=root.below)
-    return replace(root, children=tuple(folded_below(child, depth - 1) for child in root.children))
+    return replace(root, children=tuple(fold_below(child, depth - 1) for child in root.children))
 
 
-def folded_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
-    """The tree with at most about `most` nodes in sight.
+def fold_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
+    """The tree with about `most` visible nodes at most.
 
-    Subtrees that have not begun are folded first, then those that succeeded, the deepest first, until few enough are
-    left. The way to what runs, failed or was cancelled always stays in sight, and so do the root and its children.
+    Subtrees that have not begun are folded first, then those that succeeded, the deepest first. The root, its
+    children, and the path to each running, failed or cancelled node stay visible.
     """
     deepest = max(depth for depth, _ in root.walk())
     shown = root
-    for foldable in (_idle, closed):
+    for foldable in (_idle, is_closed):
         for level in range(deepest, 0, -1):
             if sum(1 for _ in shown.walk()) <= most:
                 return shown
@@ -43,10 +43,10 @@ def folded_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
     return shown
 
 
-def what_ran(root: NodeView) -> NodeView:
-    """The nodes that ran, with what they did in their names. Nodes that pass on what their one child says are left out.
+def executed_tree(root: NodeView) -> NodeView:
+    """The nodes that ran, with their actions in their names, without those that only pass on their one child's result.
 
-    So are watches that held and notes of where the robot stood; what failed or was cancelled never is.
+    Conditions that held and stored poses are left out, too. Nodes that failed or were cancelled never are.
     """
     return _ran(root, None)
 
@@ -63,11 +63,11 @@ def _unseen(node: NodeView) -> bool:
 
 
 def _folded(node: NodeView, foldable: Callable[[NodeView], bool], level: int, depth: int) -> NodeView:
-    """The node with every subtree at `level` or deeper folded whose nodes are all foldable."""
+    """Folds every subtree at `level` or deeper whose nodes are all foldable."""
     if depth >= level and all(foldable(below) for _, below in node.walk()):
         return replace(node, children=(), hidden=node.below)
     return replace(node, children=tuple(_folded(child, foldable, level, depth + 1) for child in node.children))
 
 
 def _idle(node: NodeView) -> bool:
-    return closed(node) and node.state.status is Status.INVALID
+    return is_closed(node) and node.state.status is Status.INVALID

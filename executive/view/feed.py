@@ -1,4 +1,4 @@
-"""What the page is told: every logged message in order, and the newest word on what is not logged."""
+"""Feed of the page: every logged message in order, and the latest state of what is not logged."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_PICTURES: Final = 500
 
 @dataclass(frozen=True)
 class _Message:
-    """A message by its number from 1, with the topic, robot and node that it is about, and its picture's number."""
+    """A message with its number from 1, its topic, robot and node, and the number of its picture."""
 
     number: int
     about: Hashable
@@ -31,15 +31,14 @@ class _Message:
 
 
 class Feed:
-    """An ordered list of messages as JSON text, written by the run's thread and read by the server's.
+    """An ordered list of messages as JSON text. The run's thread writes it, the server's thread reads it.
 
-    Pictures are kept aside, so that a page that opens late gets the list at once and fetches the pictures it shows.
-    Of a long run, and for a slow page, the older half is dropped at times, but for the newest message of each topic,
-    robot and node.
+    Pictures are stored apart: a page that opens late gets the list at once and fetches only the pictures that it shows.
+    When the list is full, the feed drops its older half, except the newest message of each topic, robot and node.
     """
 
     def __init__(self, *, most: int | None = MOST_MESSAGES, most_pictures: int = MOST_PICTURES) -> None:
-        """About `most` messages and `most_pictures` are kept; all of them where `most` is None."""
+        """Keeps about `most` messages and `most_pictures` pictures, or all of them if `most` is None."""
         self._lock = threading.Condition()
         self._most, self._most_pictures = most, most_pictures
         self._full, self._full_pictures = most or 0, most_pictures
@@ -52,7 +51,7 @@ class Feed:
         self._read = self._readers = 0
 
     def __call__(self, topic: str, t: float, message: Mapping[str, Any]) -> None:
-        """Add a logged message (`executive.record.event_log.Listener`): topic, time (s), plain values."""
+        """Adds a logged message (`executive.record.event_log.Listener`): topic, time (s), plain values."""
         if topic in _UNSEEN:
             return
         with self._lock:
@@ -66,19 +65,19 @@ class Feed:
         self._call_listeners()
 
     def tell(self, about: str, word: Mapping[str, Any]) -> None:
-        """The newest word on something that is not logged, such as progress; it takes the place of the last one."""
+        """Sets the latest state of something that is not logged, such as progress."""
         with self._lock:
             self._told += 1
             self._news[about] = (self._told, _encoded({"live": about, "data": word}))
         self._call_listeners()
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Call `listener` whenever there is something new; from the thread that wrote it."""
+        """Calls `listener` after each change, in the thread that made it."""
         with self._lock:
             self._listeners = (*self._listeners, listener)
 
     def since(self, cursor: tuple[int, int]) -> tuple[tuple[int, int], Sequence[str]]:
-        """What is new since a cursor, (0, 0) at first, and the next cursor."""
+        """The next cursor, and the messages since a cursor, which is (0, 0) at first."""
         with self._lock:
             added, told = cursor
             words = [text for number, text in sorted(self._news.values()) if number > told]
@@ -87,40 +86,40 @@ class Feed:
 
     @property
     def pictures(self) -> int:
-        """How many pictures there have been."""
+        """Number of pictures so far."""
         with self._lock:
             return self._shown
 
     def picture(self, number: int) -> tuple[str, bytes]:
-        """A picture's format ("jpeg" or "png") and bytes. Raises LookupError when there is none of that number."""
+        """Format ("jpeg" or "png") and bytes of a picture. Raises LookupError for an unknown number."""
         with self._lock:
             found = self._pictures.get(number)
         if found is None:
             raise LookupError(f"there is no picture {number}")
         return found
 
-    def joined(self) -> None:
-        """A page begins to read."""
+    def add_reader(self) -> None:
+        """Counts a page that begins to read."""
         with self._lock:
             self._readers += 1
 
-    def left(self) -> None:
-        """A page reads no more."""
+    def remove_reader(self) -> None:
+        """Counts a page that reads no more."""
         with self._lock:
             self._readers -= 1
             self._lock.notify_all()
 
-    def sent(self, cursor: tuple[int, int]) -> None:
-        """A page has been sent all up to a cursor."""
+    def mark_sent(self, cursor: tuple[int, int]) -> None:
+        """Notes that a page has got all messages up to a cursor."""
         with self._lock:
             self._read = max(self._read, cursor[0])
             self._lock.notify_all()
 
     def wait_sent(self, timeout_s: float) -> bool:
-        """Block (on the wall's clock) until a page has been sent all messages, or time is over; True when sent.
+        """Waits until a page has got all messages, at most `timeout_s` of wall time; True if it has.
 
-        The run calls it after each tick, so that a busy run does not keep the server's thread from its turn. Nobody
-        waits where no page reads.
+        The run calls it after each tick, so that a busy run lets the server's thread work. It returns at once if no
+        page reads.
         """
         with self._lock:
             return self._lock.wait_for(lambda: self._readers == 0 or self._read >= self._added, timeout_s)
@@ -134,7 +133,7 @@ class Feed:
         return {**rest, "picture": number}
 
     def _drop_old(self) -> None:
-        """Keep the newer half of messages, or of pictures, where there are too many."""
+        """Drops the older half of the messages or pictures when there are too many."""
         if self._most is None or (len(self._messages) < self._full and len(self._pictures) < self._full_pictures):
             return
         newest = {each.about: each for each in self._messages}

@@ -1,4 +1,4 @@
-"""What a log knows of a robot's way at one time, drawn on its map."""
+"""Draws what a log knows of the robots' paths at one time on their map."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ class _Frame:
 
 
 def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.uint8]:
-    """The map (height, width, 3; blue, green, red) as it was known at a time on the robot's clock.
+    """The map (height, width, 3; blue, green, red) at a time on the robot's clock.
 
-    On it are the way walked, the planned path, what is reserved of it, the particles of the localiser, the cells of the
-    costmap that something unmapped blocks, and the footprint; among several robots each has its colour.
-    Raises InputError: the log has no map.
+    It shows the trajectory, the planned and the reserved path, the localiser's particles, the costmap's cells that an
+    unmapped obstacle blocks, and the footprint. Each of several robots has its colour. Raises InputError if the log has
+    no map.
     """
     known = [event for event in events if event.stamp_s <= at_s]
     maps = [event.data for event in events if event.topic == MAP]
@@ -67,7 +67,7 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
 
 
 def _ground(data: Mapping[str, Any]) -> tuple[NDArray[np.uint8], _Frame]:
-    """The grid, enlarged, with its places' names."""
+    """The grid, enlarged, with the names of the places."""
     grey = cv2.imdecode(np.frombuffer(base64.b64decode(data["data"]), np.uint8), cv2.IMREAD_GRAYSCALE)
     if grey is None:
         raise InputError("the log's map is no picture")
@@ -85,7 +85,7 @@ def _ground(data: Mapping[str, Any]) -> tuple[NDArray[np.uint8], _Frame]:
 def _draw_robot(
     picture: NDArray[np.uint8], frame: _Frame, name: str, events: Sequence[Event], colour: Colour | None
 ) -> None:
-    """One robot: what is known of it by these events; in a colour of its own (blue, green, red) where it has one."""
+    """Draws one robot from its events, in its colour (blue, green, red) if there are several robots."""
     poses = [event.data for event in events if event.topic == POSE]
     paths = [event.data["poses"] for event in events if event.topic == PATH]
     views = [event.data for event in events if event.topic == NAVIGATION]
@@ -115,7 +115,7 @@ def _draw_robot(
 
 
 def _draw_reserved(picture: NDArray[np.uint8], pixels: NDArray[np.int32], colour: Colour) -> None:
-    """What is reserved: a broad pale band, and a ring where it ends."""
+    """Draws the reserved path: a broad pale band, and a ring at its end."""
     pale = tuple(round(0.35 * part + 0.65 * 255) for part in colour)
     cv2.polylines(picture, [pixels], False, pale, 15, cv2.LINE_AA)
     cv2.circle(picture, pixels[-1].tolist(), 9, colour, 3, cv2.LINE_AA)
@@ -127,7 +127,7 @@ def _pairs(data: Mapping[str, Any], name: str) -> list[tuple[float, float]]:
 
 
 def _write(picture: NDArray[np.uint8], text: str, middle: NDArray[np.int32]) -> None:
-    """Dark letters with a light seam, centred."""
+    """Draws dark letters with a light outline, centred."""
     width = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.6, 1)[0][0]
     corner = (int(middle[0]) - width // 2, int(middle[1]) + 6)
     for colour, thick in (((255, 255, 255), 5), (_INK, 1)):

@@ -169,7 +169,7 @@ class PageServer:
         await websocket.accept()
         waker = asyncio.Event()
         self._wakers.add(waker)
-        self._content.feed.joined()
+        self._content.feed.add_reader()
         try:
             await websocket.send_text(json.dumps([{"live": "hello", "data": self._hello()}]))
             await self._stream(websocket, waker)
@@ -177,7 +177,7 @@ class PageServer:
             pass  # the page went away
         finally:
             self._wakers.discard(waker)
-            self._content.feed.left()
+            self._content.feed.remove_reader()
 
     async def _stream(self, websocket: WebSocket, waker: asyncio.Event) -> None:
         feed = self._content.feed
@@ -187,7 +187,7 @@ class PageServer:
             cursor, texts = feed.since(cursor)
             if texts:
                 await websocket.send_text(f"[{','.join(texts)}]")
-                feed.sent(cursor)
+                feed.mark_sent(cursor)
             else:
                 await waker.wait()
         await websocket.close(_GOING_AWAY)

@@ -83,7 +83,7 @@ def to_svg(root: NodeView, *, title: str = "") -> str:
 
 
 def _laid_out(node: NodeView, x: float, y: float) -> tuple[_Box, float]:
-    """The node's box with all below it, beginning at height y, and where the next one may begin."""
+    """The box of a node and of all nodes below it from height y on, and the height at which the next one may begin."""
     note = _wrapped(note_of(node))
     height = BOX_H + NOTE_LINE_H * len(note) + (4 if note else 0)
     children: list[_Box] = []

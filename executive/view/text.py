@@ -14,7 +14,7 @@ from executive.view.styles import NodeStyle, style_of
 
 @dataclass(frozen=True)
 class Line:
-    """One node as a line: the branches before it, its style, what it is, and a note on its state."""
+    """One node as a line: the branches before it, its style, kind and name, and a note on its state."""
 
     branches: str
     style: NodeStyle
@@ -33,7 +33,7 @@ def to_text(root: NodeView, *, ascii_only: bool = False) -> str:
 
 
 def to_rich(root: NodeView, *, collapsed: bool = True) -> Text:
-    """The tree with colours, for a terminal; collapsed: nodes below what is done or not begun are not shown."""
+    """The tree with colours, for a terminal; `collapsed` hides nodes below those that succeeded or have not begun."""
     text = Text(no_wrap=True, overflow="ellipsis")
     for n, line in enumerate(lines(root, collapsed=collapsed)):
         text.append("\n" if n else "")
@@ -52,7 +52,7 @@ def lines(root: NodeView, *, ascii_only: bool = False, collapsed: bool = False) 
 
 def _lines(node: NodeView, own: str, below: str, pieces: tuple[str, str, str, str], collapsed: bool) -> Iterator[Line]:
     branch, last_branch, bar, blank = pieces
-    hidden = collapsed and closed(node)
+    hidden = collapsed and is_closed(node)
     note = note_of(node)
     unseen = node.below if hidden else node.hidden
     if unseen:
@@ -66,20 +66,20 @@ def _lines(node: NodeView, own: str, below: str, pieces: tuple[str, str, str, st
 
 
 def note_of(node: NodeView) -> str:
-    """Cause and sentence; the sentence only where it is not a child's already."""
+    """Cause and message of a node; the message only if no child has the same."""
     state = node.state
     told = state.message and all(state.message != child.state.message for child in node.children)
     sentence = state.message if told and (state.cause is not None or not node.children or node.kind == "retry") else ""
     return ": ".join(filter(None, (state.cause.value if state.cause else "", sentence)))
 
 
-def closed(node: NodeView) -> bool:
-    """True of a node that is done well or not begun: what lies below it can be left out of sight."""
+def is_closed(node: NodeView) -> bool:
+    """Whether a node succeeded or has not begun, so that the nodes below it can be hidden."""
     return node.state.status in (Status.SUCCESS, Status.INVALID) and node.state.cause is None
 
 
 def printable(text: str) -> str:
-    """The text on one line, without control characters, which XML and terminals do not bear."""
+    """The text on one line without control characters, which XML does not allow and terminals obey."""
     return "".join(" " if char in "\n\r\t" else char if char.isprintable() else "\ufffd" for char in text)
 
 

@@ -38,18 +38,18 @@ def test_a_track_counts_when_it_is_confirmed():
     assert names(look_for(), tracks(*seen)) == [("coke", "table")]
 
 
-def test_what_a_later_look_of_the_search_denies_does_not_count():
+def test_an_object_that_a_later_view_denies_does_not_count():
     first = tracks((1, "coke", True, "table", HERE))
     assert names(look_for(), first, tracks((1, "coke", False, "table", HERE))) == []
 
 
 @pytest.mark.parametrize(("place", "count"), [(BESIDE, 1), (THERE, 2)])
-def test_an_object_seen_by_two_searches_is_told_once(place, count):
+def test_an_object_that_two_searches_saw_counts_once(place, count):
     first, second = tracks((1, "coke", True, "table", HERE)), tracks((1, "coke", True, "table", place))
     assert len(names(look_for(), first, look_for(), second)) == count
 
 
-def test_what_has_no_class_is_left_out():
+def test_an_object_without_a_class_is_left_out():
     assert names(look_for(), tracks((1, "thing", True, "", HERE))) == []
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from executive.tree.node_view import node_view
 from executive.view.btcpp import to_btcpp
-from executive.view.collapse import folded_below
+from executive.view.collapse import fold_below
 from skills.api import Cause, Failed
 
 CONTROLS = {"Sequence", "Fallback", "Control"}
@@ -72,14 +72,14 @@ def test_every_path_id_stands_in_one_description(compiled, make, document):
         assert told.count(f"| {path_id} |") == 1
 
 
-def test_a_failure_is_told_with_cause_and_sentence(compiled, run_tree, make, script):
+def test_a_failed_node_shows_its_cause_and_message(compiled, run_tree, make, script):
     script.ends["approach"] = lambda skill: Failed(Cause.TIMEOUT, "no room to stand")
     tree = compiled(*make.FETCH)
     document = ElementTree.fromstring(to_btcpp(node_view(tree.root, run_tree(tree).worst.states)))
     assert any("failure: TIMEOUT: no room to stand" in node.get("_description", "") for node in nodes_of(document))
 
 
-def test_a_folded_composite_is_no_empty_sequence(compiled, make):
-    document = ElementTree.fromstring(to_btcpp(folded_below(node_view(compiled(*make.FETCH).root), 1)))
+def test_a_folded_composite_does_not_become_an_empty_sequence(compiled, make):
+    document = ElementTree.fromstring(to_btcpp(fold_below(node_view(compiled(*make.FETCH).root), 1)))
     assert all(len(node) > 0 for node in nodes_of(document) if node.tag in CONTROLS)
     assert any("nodes below are left out" in node.get("_description", "") for node in nodes_of(document))

@@ -37,7 +37,7 @@ def ask(server, method="POST", name="patrol", body=b"", **headers):
     return answer.status, answer.read()
 
 
-def test_a_call_with_the_token_is_done_and_answered(server, calls):
+def test_a_call_with_the_token_is_carried_out(server, calls):
     status, answer = ask(server, body=b'{"room": "office"}')
     assert (status, json.loads(answer)) == (202, {"missions": [7]})
     assert calls == [("patrol", b'{"room": "office"}')]
@@ -87,7 +87,7 @@ def test_nothing_else_is_served(server, calls, method, name):
     assert calls == []
 
 
-def test_it_is_served_where_it_is_said_only(server):
+def test_the_server_listens_only_at_its_own_address(server):
     assert server._serving._socket.getsockname()[0] == "127.0.0.1"
 
 
@@ -96,7 +96,7 @@ def test_an_address_that_is_taken_is_an_error():
         CallServer(lambda name, body: {}, token=TOKEN, host="127.0.0.1", port=taken.getsockname()[1])
 
 
-def test_after_the_end_nothing_is_served(server):
+def test_a_closed_server_answers_no_call(server):
     server.close()
     server.close()
     with pytest.raises(OSError):

@@ -7,7 +7,7 @@ from py_trees.common import Status
 
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.snapshot import NodeState
-from executive.view.collapse import folded_below, folded_to, what_ran
+from executive.view.collapse import executed_tree, fold_below, fold_to
 from executive.view.svg import to_svg
 from executive.view.text import to_text
 from skills.api import Cause
@@ -33,47 +33,47 @@ def shown(tree: NodeView) -> list[str]:
 
 def test_a_small_tree_is_shown_whole():
     tree = mission(DONE, IDLE)
-    assert folded_to(tree, 100) == tree
+    assert fold_to(tree, 100) == tree
 
 
-def test_what_runs_or_failed_stays_in_sight_and_the_rest_is_folded():
-    tree = folded_to(mission(DONE, RUNS, FAILED, IDLE), 30)
+def test_running_and_failed_nodes_stay_visible_and_the_rest_is_folded():
+    tree = fold_to(mission(DONE, RUNS, FAILED, IDLE), 30)
     assert [child.hidden for child in tree.children] == [10, 0, 0, 10]
     assert {"r/1/0", "r/2/0"} <= set(shown(tree))
 
 
-def test_what_has_not_begun_is_folded_before_what_is_done():
-    assert [child.hidden for child in folded_to(mission(DONE, RUNS, IDLE), 30).children] == [0, 0, 10]
+def test_nodes_that_have_not_begun_are_folded_before_those_that_succeeded():
+    assert [child.hidden for child in fold_to(mission(DONE, RUNS, IDLE), 30).children] == [0, 0, 10]
 
 
-def test_a_failure_below_what_succeeded_stays_in_sight():
+def test_a_failure_below_a_node_that_succeeded_stays_visible():
     tree = NodeView("r", "sequence", "m", RUNS, children=(step(0, DONE, FAILED), step(1, DONE), step(2, DONE)))
-    assert [child.hidden for child in folded_to(tree, 15).children] == [0, 10, 10]
+    assert [child.hidden for child in fold_to(tree, 15).children] == [0, 10, 10]
 
 
 def test_an_idle_tree_is_folded_from_its_deepest_level():
-    tree = folded_to(NodeView("top", "sequence", "top", IDLE, children=(mission(IDLE, IDLE),)), 12)
+    tree = fold_to(NodeView("top", "sequence", "top", IDLE, children=(mission(IDLE, IDLE),)), 12)
     assert shown(tree) == ["top", "r", "r/0", "r/1"] or shown(tree) == ["top", "r"]
 
 
-def test_the_number_of_hidden_nodes_is_told():
-    assert "step 0 - (10 nodes)" in to_text(folded_to(mission(DONE, RUNS), 15))
+def test_the_text_shows_the_number_of_hidden_nodes():
+    assert "step 0 - (10 nodes)" in to_text(fold_to(mission(DONE, RUNS), 15))
 
 
 @pytest.mark.parametrize(("depth", "count"), [(0, 1), (1, 3), (2, 23), (9, 23)])
 def test_a_depth_cuts_and_counts(depth, count):
-    tree = folded_below(mission(DONE, RUNS), depth)
+    tree = fold_below(mission(DONE, RUNS), depth)
     assert len(shown(tree)) == count
     assert tree.below == 22
 
 
 def test_a_negative_depth_is_refused():
     with pytest.raises(ValueError, match="at least 0"):
-        folded_below(mission(DONE), -1)
+        fold_below(mission(DONE), -1)
 
 
-def test_the_picture_tells_how_many_nodes_are_hidden():
-    assert "+ 10 nodes" in to_svg(folded_to(mission(DONE, RUNS), 15))
+def test_the_picture_shows_the_number_of_hidden_nodes():
+    assert "+ 10 nodes" in to_svg(fold_to(mission(DONE, RUNS), 15))
 
 
 def node(kind: str, name: str, *children: NodeView, state: NodeState = DONE) -> NodeView:
@@ -84,31 +84,31 @@ def kinds(tree: NodeView) -> list[tuple[str, str]]:
     return [(each.kind, each.name) for _, each in tree.walk()]
 
 
-def test_of_what_ran_only_nodes_with_something_to_show_are_left():
+def test_the_executed_tree_leaves_out_nodes_that_only_pass_on_a_result():
     drive = node("recover", "go to the bench", node("skill", "navigate"), node("skill", "back_off", state=IDLE))
     search = node("selector", "find cube", node("only if known", "again", state=IDLE), node("sequence", "look", drive))
     tree = node(
         "interrupts", "watched", node("monitor", "lease"), node("sequence", "m", search, node("skill", "grasp"))
     )
-    assert kinds(what_ran(tree)) == [("sequence", "m"), ("skill", "go to the bench"), ("skill", "grasp")]
+    assert kinds(executed_tree(tree)) == [("sequence", "m"), ("skill", "go to the bench"), ("skill", "grasp")]
 
 
-def test_of_what_ran_no_failure_is_left_out():
+def test_the_executed_tree_keeps_every_failure():
     drive = node("recover", "go to the bench", node("skill", "navigate", state=FAILED), node("skill", "back_off"))
     tree = node("sequence", "m", drive, node("monitor", "lease", state=FAILED), state=FAILED)
     left = ["m", "go to the bench", "go to the bench", "back off", "lease"]
-    assert [name for _, name in kinds(what_ran(tree))] == left
+    assert [name for _, name in kinds(executed_tree(tree))] == left
 
 
 def test_a_node_that_gives_another_reason_than_its_child_is_kept():
     gave_up = NodeState(Status.FAILURE, Cause.PLANNING, "given up after 3 attempts")
     tree = node("retry", "thrice", node("skill", "stow", state=FAILED), state=gave_up)
-    assert kinds(what_ran(tree)) == [("retry", "thrice"), ("skill", "stow")]
+    assert kinds(executed_tree(tree)) == [("retry", "thrice"), ("skill", "stow")]
 
 
 def test_a_title_says_where_and_with_what(compiled, make):
     tree = compiled(*make.FETCH)
-    ran = what_ran(node_view(tree.root, dict.fromkeys(tree.path_ids, DONE)))
+    ran = executed_tree(node_view(tree.root, dict.fromkeys(tree.path_ids, DONE)))
     titles = {each.name for _, each in ran.walk()}
     assert {"go to the counter", "hand over (Robin)"} <= titles, titles
 

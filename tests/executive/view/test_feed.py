@@ -21,7 +21,7 @@ def test_messages_come_in_order_and_once():
     assert feed.since(cursor) == (cursor, [])
 
 
-def test_pictures_are_kept_aside():
+def test_pictures_are_fetched_apart_from_messages():
     feed = Feed()
     feed("detections", 1.0, PICTURE)
     (text,) = feed.since(START)[1]
@@ -31,7 +31,7 @@ def test_pictures_are_kept_aside():
         feed.picture(1)
 
 
-def test_of_words_that_are_not_logged_only_the_newest_is_told():
+def test_only_the_latest_state_of_what_is_not_logged_is_sent():
     feed = Feed()
     for number in range(3):
         feed.tell("progress", {"now_s": number})
@@ -41,7 +41,7 @@ def test_of_words_that_are_not_logged_only_the_newest_is_told():
     assert len(feed.since(cursor)[1]) == 1
 
 
-def test_of_a_long_run_the_newest_messages_are_kept_and_the_last_word_on_each_node():
+def test_a_long_run_keeps_the_newest_messages_and_the_last_of_each_node():
     feed = Feed(most=100)
     feed("tree", 0.0, {"robot": "Alice"})
     feed("transitions", 0.1, {"robot": "Alice", "node": "a", "to": "RUNNING"})
@@ -58,7 +58,7 @@ def test_of_a_long_run_the_newest_messages_are_kept_and_the_last_word_on_each_no
     assert (len(late), feed.since(cursor)[1]) == (len(poses), [])
 
 
-def test_of_many_pictures_the_newest_are_kept_and_the_last_of_each_kind():
+def test_the_feed_keeps_the_newest_pictures_and_the_last_of_each_topic():
     feed = Feed(most=100_000, most_pictures=10)
     feed("map", 0.0, PICTURE)
     for number in range(100):
@@ -82,21 +82,21 @@ def has_picture(feed, number):
         return False
 
 
-def test_nobody_waits_where_no_page_reads():
+def test_a_writer_does_not_wait_when_no_page_reads():
     feed = Feed()
     feed("pose", 0.0, {})
     assert feed.wait_sent(60.0)
 
 
-def test_a_writer_waits_for_its_readers_and_not_longer():
+def test_a_writer_waits_until_a_page_has_all_messages():
     feed = Feed()
-    feed.joined()
+    feed.add_reader()
     feed("pose", 0.0, {})
     assert not feed.wait_sent(0.01)
-    threading.Timer(0.05, lambda: feed.sent(feed.since(START)[0])).start()
+    threading.Timer(0.05, lambda: feed.mark_sent(feed.since(START)[0])).start()
     assert feed.wait_sent(5.0)
     feed("pose", 0.1, {})
-    threading.Timer(0.05, feed.left).start()
+    threading.Timer(0.05, feed.remove_reader).start()
     assert feed.wait_sent(5.0)
 
 

@@ -52,7 +52,7 @@ DRAWN = [
 
 
 @pytest.mark.parametrize(("what", "place", "colour", "known_s"), DRAWN)
-def test_it_is_drawn_where_it_is_once_it_is_known(what, place, colour, known_s):
+def test_obstacles_are_drawn_once_the_robot_has_seen_them(what, place, colour, known_s):
     assert colour_at(map_picture(EVENTS), *place) == colour
     assert colour_at(map_picture(EVENTS, known_s - 0.1), *place) != colour
 

@@ -19,13 +19,13 @@ WORDS_MAY = (
 )
 """All that the words import: what things are, how files are read, and which numbers a quantity may have."""
 HOMES = (
-    ("executive.words", "executive.record.profile", "executive.record.work"),
+    ("executive.words", "executive.record.schemas", "executive.record.work"),
     ("executive.language",),
     ("executive.speech",),
     ("executive.mission",),
     ("executive.tree",),
-    ("executive.record",),
     ("executive.run",),
+    ("executive.record",),
     ("executive.store",),
     ("executive.conversation",),
     ("executive.view",),

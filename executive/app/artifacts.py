@@ -16,6 +16,7 @@ import numpy as np
 
 from executive.record.reader import Event
 from executive.record.schemas import DESTINATION, TRANSITIONS
+from executive.run.visitor import RunVisitor
 from executive.store.resuming import told_before
 from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.view.styles import ROBOT_COLOURS, rgb_of
@@ -32,7 +33,6 @@ from plant.pictures import (
     top_view,
 )
 from plant.simulation import Simulation
-from skills.api import Publish
 from skills.robot import Picture
 
 DETECTIONS: Final = "detections"
@@ -59,15 +59,14 @@ class RobotArtifacts:
     moments: dict[str, float] = field(default_factory=dict)
 
 
-class Artifacts:
-    """Passes messages on to the log and remembers what is worth a picture, apart for each robot.
+class Artifacts(RunVisitor):
+    """Remembers what is worth a picture, apart for each robot, and adds one to each answer for the log.
 
     `pictures` are small JPEG files for the answers, and `numbers` says which goes with the answer of a node (path id)
     at a time (s); once they have `MOST_BYTES`, no more are kept. `drawn` are the files that were written, by name.
     """
 
-    def __init__(self, publish: Publish) -> None:
-        self._publish = publish
+    def __init__(self) -> None:
         self._of_robot: dict[str, RobotArtifacts] = {}
         self.answer: Picture | None = None
         self.pictures: list[bytes] = []
@@ -78,8 +77,8 @@ class Artifacts:
         """What is known of a robot."""
         return self._of_robot.setdefault(robot_name, RobotArtifacts())
 
-    def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
-        """Take note of a message and pass it on."""
+    def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Take note of a message; an answer gets a picture."""
         own = self.of(str(message.get("robot", "")))
         if topic == DETECTIONS:
             own.looked.append(message)
@@ -93,7 +92,7 @@ class Artifacts:
             name = _MOMENTS.get(str(message["node"]).rsplit("/", 1)[-1])
             if name is not None:
                 own.moments[name] = float(message["t"])
-        self._publish(topic, message)
+        return message
 
     def _shown(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
         """The answer with a picture: of what was found, or of all that was looked at in vain."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from executive.app.goal_conditions import Share, verdict_of
 from executive.app.robots import PlacedRobot
 from executive.run.outcome import RobotResult
-from executive.run.runner import RunEntry
+from executive.run.visitor import RunEntry
 from executive.tree.compiler import CompiledTree
 from executive.words.variation import NO_VARIATION, Variation
 from plant.referee import Verdict

@@ -11,7 +11,7 @@ from executive.app.durable import Durable
 from executive.app.report import RefereeReport
 from executive.record.profile import Profile
 from executive.run.outcome import RobotResult
-from executive.run.runner import RunEntry
+from executive.run.visitor import RunEntry
 from executive.tree.compiler import CompiledTree
 from skills.robot import Clock
 

@@ -65,7 +65,8 @@ def _journals(store: MissionStore, mission: StoredMission, prepared: Prepared) -
     """The journals of a mission's robots; what takes the place of one's part by a correction is kept in its stead."""
     return {
         each.mission.robot_name: store.journal(mission.id, _part_of(each)).replaceable(
-            lambda tree: compiled_request(replace(mission.request, sentence=None, file=None, text=None), tree)
+            each.tree,
+            lambda tree: compiled_request(replace(mission.request, sentence=None, file=None, text=None), tree),
         )
         for each in prepared.all
     }
@@ -120,8 +121,8 @@ def take_up(store: MissionStore, mission: StoredMission, *, ask: Answerer | None
         for each, memory in zip(every, memories, strict=True)
     ]
     journals = _journals(store, mission, prepared)
-    for each, (_, recollection) in zip(every, resumed, strict=True):
-        journals[each.mission.robot_name].remembering(recollection)
+    for each, (tree, recollection) in zip(every, resumed, strict=True):
+        journals[each.mission.robot_name].remembering(recollection, tree)
     names = [each.mission.robot_name for each in every]
     poses = {name: memory.pose for name, memory in zip(names, memories, strict=True) if memory.pose is not None}
     label, log = str(mission.id), _log_name(mission.starts + 1)

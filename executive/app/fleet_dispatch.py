@@ -26,10 +26,9 @@ from executive.mission.scenario import Scenario
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
 from executive.record.schemas import MISSIONS
-from executive.record.work import Work
-from executive.run.dispatch import MissionEnd
 from executive.run.outcome import Outcome, RobotResult, RobotStatus
-from executive.run.runner import RunEntry
+from executive.run.visitor import Assigner, MissionEnd, RunEntry
+from executive.run.visitor import Progress as RunProgress
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.node_view import node_view
@@ -45,8 +44,8 @@ LEFT_M: Final = 1.5
 
 
 @dataclass
-class FleetDispatch:
-    """Gives the missions of a store to robots of a backend (`executive.run.dispatch.Dispatch`), and keeps in the store
+class FleetDispatch(Assigner):
+    """Gives the missions of a store to robots of a backend, and keeps in the store
     whose each is, how it ended and what a referee saw.
 
     A robot whose `battery` is low gives its mission back once it has nothing in hand, and charges by its mission of
@@ -79,7 +78,6 @@ class FleetDispatch:
         self._recalled: set[str] = set()
         self._to_dock: list[str] = []
         self._leaving: dict[str, tuple[int, Pose2D]] = {}
-        self._work = Work()
         self.over: list[EndedMission] = []
         self._stopped: str | None = None
 
@@ -92,7 +90,7 @@ class FleetDispatch:
         """The missions that no robot has."""
         return self._dispatcher.waiting
 
-    def begin(self) -> Sequence[RunEntry]:
+    def assign(self) -> Sequence[RunEntry]:
         """The missions that begin now."""
         entries: list[RunEntry] = []
         self._let_follow({})
@@ -115,7 +113,7 @@ class FleetDispatch:
         if self._dispatcher.waiting or self._dispatcher.under_way:
             entries += [self._dock_entry(name) for name in self._to_dock if name in self._dispatcher.resting]
             self._to_dock = []
-        return entries if len(refused) == len(given.refused) else [*entries, *self.begin()]
+        return entries if len(refused) == len(given.refused) else [*entries, *self.assign()]
 
     def _split(self, number: int) -> bool:
         """Have a mission done in two parts, as no robot can do it alone; whether two can."""
@@ -139,7 +137,7 @@ class FleetDispatch:
         self._tell(f"No robot can do mission {number} alone: missions {added[0]} and then {added[1]} do it{by}")
         return True
 
-    def recalled(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
+    def recall(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
         """The robots that are low and have nothing in hand; and those that charge when nothing is left to do."""
         self._let_follow(seen)
         under_way = self._dispatcher.under_way
@@ -164,7 +162,14 @@ class FleetDispatch:
         low = seen.charge is not None and seen.charge < self.battery.low
         return low and robot.dock is not None and not seen.holding and not robot.progress.begun
 
-    def ended(self, end: MissionEnd) -> None:
+    def tick(self, progress: RunProgress) -> None:
+        """See how far the missions are."""
+        for name, note in progress.notes.items():
+            journal = self._robots[name].journal
+            if journal is not None:
+                journal.note(note)
+
+    def mission_ended(self, end: MissionEnd) -> None:
         """A robot's mission is over, or another robot goes on with it."""
         name = end.result.robot_name
         robot, recalled = self._robots[name], name in self._recalled
@@ -308,7 +313,7 @@ class FleetDispatch:
         speaker_W = next(iter(self.robots.values())).start
         entry = self._robot_entry(name, prepared)
         self._announce(prepared)
-        return replace(entry, tree=prepared.tree, journal=robot.journal, speaker_W=speaker_W)
+        return replace(entry, tree=prepared.tree, speaker_W=speaker_W)
 
     def spare(self) -> Sequence[RunEntry]:
         """The robots before they have a mission."""
@@ -320,7 +325,7 @@ class FleetDispatch:
         robot = self._robots[name]
         if robot.entry is None:
             disturbed = replace(prepared.request, scenario=Scenario(robot.faults))
-            robot.entry = entry_for(replace(prepared, request=disturbed), self.backend, None, self._work)
+            robot.entry = entry_for(replace(prepared, request=disturbed), self.backend, None)
         return robot.entry
 
     def _progress(self, mission: FleetMission, progress: Progress) -> None:

@@ -8,7 +8,7 @@ from typing import Final
 
 from py_trees.common import Status
 
-from executive.run.journal import TickNote
+from executive.run.visitor import TickNote
 from executive.tree.behaviours.conditions import KnowsPlace
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
@@ -68,7 +68,7 @@ def _changing(node: NodeSpec, over: set[str]) -> list[NodeSpec]:
 
 
 class ProgressJournal:
-    """Tells how far a mission is whenever that changes (`executive.run.journal.Journal`)."""
+    """Tells how far a mission is whenever that changes."""
 
     def __init__(self, tree: CompiledTree, tell: Callable[[Progress], None]) -> None:
         self._tree, self._tell = tree, tell
@@ -86,7 +86,3 @@ class ProgressJournal:
         if progress != self.progress:
             self.progress = progress
             self._tell(progress)
-
-    def replaced(self, tree: CompiledTree) -> ProgressJournal:
-        """Another mission has taken the place of this one."""
-        return ProgressJournal(tree, self._tell)

@@ -15,7 +15,7 @@ from executive.app.fleet_missions import FleetMission, RobotNow, bid_for, is_way
 from executive.app.fleet_progress import Progress, ProgressJournal
 from executive.app.prepared import Prepared
 from executive.app.robots import PlacedRobot
-from executive.run.runner import RunEntry
+from executive.run.visitor import RunEntry
 from executive.tree.estimate import RoutePlanner
 from executive.words.knowledge import BatteryFacts, SurfaceFacts
 from plant.kinds import robot_kind

@@ -14,7 +14,8 @@ from executive.app.signals import cancelled_by_signals, ended_by_signals
 from executive.record.event_log import EventLog
 from executive.record.reader import read_events
 from executive.run.control import Control
-from executive.run.runner import RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunSettings
 from executive.run.worker import LockStepWorker
 
 __all__ = ["run_fleet"]
@@ -38,24 +39,22 @@ def run_fleet(
     """
     backend, clock = dispatch.backend, dispatch.backend.clock
     dispatch.log = log = EventLog(out / "log.mcap", clock, apart=True)
-    artifacts, begun_s = Artifacts(log), clock.now()
+    artifacts, begun_s = Artifacts(), clock.now()
     limit_s = TIME_LIMIT_S * max(1, len(dispatch.missions)) if time_limit_s is None else time_limit_s
     asked = Control(pace=None) if page is None else page.control
     try:
         if page is not None:
-            page.begin(log, backend.show_live())
+            page.serve(log, backend.show_live())
         if first is not None:
             log_map(log, first)
         with ended_by_signals(dispatch.stop), cancelled_by_signals(asked) as control, LockStepWorker(clock) as worker:
             result = run(
-                (),
+                dispatch,
                 clock=clock,
                 worker=worker,
-                publish=artifacts,
+                visitors=(artifacts, log, *([] if page is None else [page])),
                 settings=RunSettings(seed=seed, time_limit_s=limit_s),
                 control=control,
-                observer=page,
-                dispatch=dispatch,
                 spare=dispatch.spare(),
             )
         dispatch.close()
@@ -70,4 +69,4 @@ def run_fleet(
         out, rows, dispatch.over, kinds, artifacts, read_events(log.path), (*facts, ("duration", lasted))
     )
     if page is not None:
-        page.end(recording)
+        page.offer(recording)

@@ -9,8 +9,7 @@ from executive.app.artifacts import Artifacts
 from executive.app.report import ReportedAnswer, ReportedObject, RunReport
 from executive.record.reader import Event
 from executive.record.sightings import seen_objects
-from executive.run.findings import Finding
-from executive.run.outcome import RunResult
+from executive.run.outcome import Finding, RunResult
 from executive.tree.compiler import StepPart
 from executive.words.geometry import inside
 from executive.words.knowledge import Knowledge

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from executive.run.executions import Execution, is_speech
-from executive.run.outcome import Outcome, RobotResult
+from executive.run.executions import is_speech
+from executive.run.outcome import Execution, Outcome, RobotResult
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.words.expression import Expression, Template

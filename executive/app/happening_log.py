@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from executive.record.schemas import CONTROL
-from executive.run.runner import Progress
+from executive.run.visitor import Progress, RunVisitor
 from skills.api import Publish
 from skills.faults.faulty_robot import FaultyRobot
 from skills.robot import Robot
@@ -18,8 +18,8 @@ FAULT: Final = "fault"
 EVENT: Final = "event"
 
 
-class HappeningLog:
-    """An observer of a run: looks after each tick what is new."""
+class HappeningLog(RunVisitor):
+    """Logs after each tick what is new."""
 
     def __init__(self, publish: Publish, robot: Robot, happened: Happened) -> None:
         """`happened` gives all that has happened in the world so far: times (s) and sentences."""
@@ -28,7 +28,7 @@ class HappeningLog:
         self._at_work: tuple[str, ...] = ()
         self._told = len(happened())
 
-    def __call__(self, progress: Progress) -> None:
+    def tick(self, progress: Progress) -> None:
         """Log what has begun, ended or happened since the last tick."""
         for now_s, sentence in self._happened()[self._told :]:
             self._log(now_s, EVENT, sentence)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,19 +15,19 @@ from executive.app.happening_log import HappeningLog
 from executive.app.page_view import PageView, log_map
 from executive.app.preload import preload
 from executive.app.prepared import Prepared
-from executive.app.profiling import profiled
+from executive.app.profiling import RunProfile
 from executive.app.report import RefereeReport, RobotReport, RunReport
 from executive.app.report_file import EndedTree, write_report
 from executive.app.signals import HUNG_UP, cancelled_by_signals
 from executive.mission.request import Request
 from executive.record.announce import announce
-from executive.record.event_log import EventLog, Listener
+from executive.record.event_log import EventLog
 from executive.record.profile import Profile
 from executive.record.schemas import WORK
-from executive.record.work import CountedDetector, Work
 from executive.run.control import Control
 from executive.run.outcome import RobotResult, RunResult
-from executive.run.runner import Observer, Progress, RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
@@ -52,55 +53,52 @@ def run_request(
     prepared: Prepared,
     backend: Backend,
     *,
-    observer: Observer | None = None,
+    visitors: Sequence[RunVisitor] = (),
     control: Control | None = None,
     page: PageView | None = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
-    listener: Listener | None = None,
 ) -> Finished:
     """Run a request on a backend and write log, tree, report and what that has recorded into its folder.
 
-    The observer is told after each tick, the listener of each logged message; through `control` the run is held,
-    cancelled, and so on; `page` shows it; with `durable` another process can take it up, or this one takes
-    up another's; `profile` times the subsystems.
+    The log and the other `visitors` watch it; through `control` the run is held, cancelled, and so on; `page` shows it;
+    with `durable` another process can take it up, or this one takes up another's; `profile` times the subsystems.
     Raises InputError when the world cannot be used.
     """
-    out, clock, work = prepared.request.out, backend.clock, Work()
+    out, clock = prepared.request.out, backend.clock
     scenario = prepared.request.scenario
-    entries = [entry_for(each, backend, durable, work) for each in prepared.all]
+    entries = [entry_for(each, backend, durable) for each in prepared.all]
     spare = _spare(prepared, backend)
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock, apart=prepared.several)
-    if listener is not None:
-        log.listen(listener)
-    artifacts = Artifacts(log)
+    artifacts = Artifacts()
     try:
         if page is not None:
-            page.begin(log, backend.show_live())
+            page.serve(log, backend.show_live())
         log_map(log, prepared)
         world, seed = prepared.world.name, prepared.request.seed
         kinds = {name: robot.kind for name, robot in prepared.robots.items()} if prepared.several else {}
         for each in prepared.all:
             lines = scenario.lines()
             announce(log, clock, each.tree, each.knowledge, world=world, seed=seed, scenario=lines, robots=kinds)
-        watched = HappeningLog(log, entries[0].robot, backend.happened) if scenario else None
+        journals = () if durable is None else durable.journals.values()
+        watching = [artifacts, log, *journals, *visitors, *([] if page is None else [page])]
+        if scenario:
+            watching.append(HappeningLog(log, entries[0].robot, backend.happened))
+        if profile is not None:
+            watching.append(RunProfile(profile, backend, (artifacts, log), journals))
         with cancelled_by_signals(control or Control(pace=None)) as controlled, LockStepWorker(clock) as worker:
-            begin = run if profile is None else profiled(profile, run, backend, entries, worker)
-            result = begin(
+            result = run(
                 entries,
                 clock=clock,
                 worker=worker,
-                publish=artifacts if profile is None else profile.timed("log", artifacts),
+                visitors=watching,
                 settings=_settings(prepared.request),
                 control=controlled,
-                observer=both(observer, page, watched),
-                work=work,
-                profile=profile,
                 spare=spare,
             )
         if durable is not None:
             _keep(durable, log, prepared.tree.robot_name)
-        counts = work.totals({**backend.work(), "bytes_logged": log.bytes})
+        counts = dict(sorted(Counter({**result.work, **backend.work(), "bytes_logged": log.bytes}).items()))
         log(WORK, counts)
     finally:
         log.close()
@@ -112,19 +110,18 @@ def run_request(
     recording = backend.leave(artifacts, out)
     write_report(prepared, report, ended, artifacts, events)
     if page is not None:
-        page.end(recording)
+        page.offer(recording)
     return replace(finished, report=report)
 
 
-def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None, work: Work) -> RunEntry:
-    """The robot of a mission with its faults, its pictures counted, and its numeric code warm."""
+def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> RunEntry:
+    """The robot of a mission with its faults, and its numeric code warm."""
     entry, clock = backend.entry(prepared.tree, durable), backend.clock
     preload(entry)
     faults = _to_come(prepared.request.scenario.faults, clock.now())
     return replace(
         entry,
         robot=with_faults(entry.robot, clock, faults, since_s=0.0),
-        detector=CountedDetector(entry.detector, work),
         after=prepared.after,
         speaker_W=prepared.speaker_W,
     )
@@ -190,19 +187,6 @@ def robot_report(ended: RobotResult, tree: CompiledTree, kind: str, seen: Refere
         referee=seen,
         commands=tuple(map(str, tree.commands)),
     )
-
-
-def both(*observers: Observer | None) -> Observer | None:
-    """An observer that tells all that there are, None where there is none."""
-    if not any(observers):
-        return None
-
-    def tell(progress: Progress) -> None:
-        for observer in observers:
-            if observer is not None:
-                observer(progress)
-
-    return tell
 
 
 def _report(prepared: Prepared, worst: RobotReport, result: RunResult, *, log: str) -> RunReport:

@@ -22,7 +22,7 @@ from executive.record.announce import map_message
 from executive.record.event_log import EventLog
 from executive.record.schemas import MAP
 from executive.run.control import Control
-from executive.run.runner import Progress
+from executive.run.visitor import Progress, RunVisitor
 from executive.store.missions import MissionStore
 from executive.view.actions import Action, RefusedError, asked_json, control_actions, robot_of, text_of
 from executive.view.feed import Feed
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from executive.view.server import PageServer
 
 
-class PageView:
-    """The page of one run: `begin` before it, called as an observer while it runs, `end` and `stay` after it."""
+class PageView(RunVisitor):
+    """The page of one run: `serve` before it, `offer` and `stay` after it."""
 
     def __init__(
         self, prepared: Prepared | None, console: Console, *, port: int = 0, later: Callable[[str], str] | None = None
@@ -54,7 +54,7 @@ class PageView:
         self._server: PageServer | None = None
         self._watch: ControlWatch | None = None
 
-    def begin(self, log: EventLog, scene: Scene | None) -> None:
+    def serve(self, log: EventLog, scene: Scene | None) -> None:
         """Serve the page and print its address. Raises InputError when the port is taken."""
         from executive.view.server import PageContent, serve
 
@@ -71,11 +71,11 @@ class PageView:
         self._watch = ControlWatch(self.control, self._feed)
         self._console.print(f"The page: {self._server.url}", markup=False)
 
-    def __call__(self, progress: Progress) -> None:
-        """One tick has passed."""
-        self._progress(progress)
+    def tick(self, progress: Progress) -> None:
+        """Tell how far the run is."""
+        self._progress.tick(progress)
 
-    def end(self, recording: Path | None) -> None:
+    def offer(self, recording: Path | None) -> None:
         """The run is over; from now on the page shows the recording where there is one."""
         if self._server is not None and recording is not None and recording.is_file():
             self._server.offer_recording(recording)

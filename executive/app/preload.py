@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 from contextlib import suppress
 
-from executive.run.runner import RunEntry
+from executive.run.visitor import RunEntry
 from skills.api import PlanningError
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path

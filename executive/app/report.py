@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from rich.markup import escape
 
-from executive.run.findings import Said
+from executive.run.outcome import Said
 from skills.files.errors import count_text
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from executive.app.prepared import Prepared
 from executive.app.report import Ending, ReportedAnswer, ReportedObject, RobotReport, RunReport, counts_text
 from executive.record.reader import Event
 from executive.record.schemas import TRANSITIONS
-from executive.run.findings import Said
+from executive.run.outcome import Said
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView
 from executive.view.collapse import DRAWN_NODES, executed_tree, fold_to

@@ -20,11 +20,10 @@ from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.report import RefereeReport
 from executive.app.robots import PlacedRobot
-from executive.record.event_log import Listener
 from executive.record.profile import Profile
 from executive.run.control import Control
 from executive.run.outcome import RobotResult
-from executive.run.runner import Observer, RunEntry
+from executive.run.visitor import RunEntry, RunVisitor
 from executive.run.worker import WorkThread
 from executive.tree.compiler import CompiledTree
 from executive.words.variation import NO_VARIATION, Variation
@@ -87,9 +86,8 @@ class SimulatedBackend:
             return replace(run_entry(self._simulation, self._world, tree, robot.stack, told=robot.told), robot=driven)
         told, believed = robot.told and not durable.take_up, durable.poses.get(tree.robot_name)
         entry = run_entry(self._simulation, self._world, tree, robot.stack, believed=believed, told=told)
-        journal = durable.journals[tree.robot_name]
-        journal.keep_world = self._keeping(durable)
-        return replace(entry, robot=driven, journal=journal)
+        durable.journals[tree.robot_name].keep_world = self._keeping(durable)
+        return replace(entry, robot=driven)
 
     def _keeping(self, durable: Durable) -> Callable[[], None]:
         """Keeps the plant's state, which the first robot to be had takes up where `durable` says so."""
@@ -147,12 +145,11 @@ class SimulatedBackend:
 def run_simulated(
     prepared: Prepared,
     *,
-    observer: Observer | None = None,
+    visitors: Sequence[RunVisitor] = (),
     control: Control | None = None,
     page: PageView | None = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
-    listener: Listener | None = None,
 ) -> Finished:
     """Run a request in the plant, as `run_request` does. Raises InputError: the world cannot be used."""
     compile_first()
@@ -168,12 +165,11 @@ def run_simulated(
     return run_request(
         prepared,
         backend,
-        observer=observer,
+        visitors=visitors,
         control=control,
         page=page,
         durable=durable,
         profile=profile,
-        listener=listener,
     )
 
 

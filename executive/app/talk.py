@@ -20,7 +20,7 @@ from executive.language.understand import Understanding, understand
 from executive.language.wake import addressed_to
 from executive.mission.mission import mission_from_steps
 from executive.run.control import Control
-from executive.run.runner import Progress
+from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.steps import MissionStep
@@ -33,7 +33,7 @@ def load_ahead() -> None:
     threading.Thread(target=lambda: load_parser().parse("go"), name="errand-parser", daemon=True).start()
 
 
-class Talk:
+class Talk(RunVisitor):
     """What is said to the robots of a run. All methods may be called from any thread.
 
     Among several, a sentence is for the robot that it names, else for the first by name; a remark without a name, such
@@ -53,10 +53,10 @@ class Talk:
         for prepared, conversation in self._each.values():
             conversation.begun(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
 
-    def observe(self, progress: Progress) -> None:
-        """See how far the run is; an observer for the runner."""
+    def tick(self, progress: Progress) -> None:
+        """See how far the run is."""
         for _, conversation in self._each.values():
-            conversation.observe(progress)
+            conversation.tick(progress)
 
     def hear(self, text: str, robot: str | None = None) -> Reply:
         """Do what was said, to a robot or to those that it names, and say what became of it. Never raises on text."""

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from executive.cli.keys import HELP, Keys, keys_pressed, prompt_lines
 from executive.run.control import Control
-from executive.run.runner import Observer, Progress
+from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.snapshot import NodeState, Snapshot
@@ -31,7 +31,7 @@ PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
 @contextmanager
 def live_view(
     console: Console, control: Control | None = None, *, say: Callable[[str], str] | None = None
-) -> Iterator[Observer]:
+) -> Iterator[RunVisitor]:
     """Show the tree while the mission runs, and write a line for each skill that ends.
 
     Where somebody sits at a terminal, keys control the run, and `say` answers the sentences that are typed.
@@ -44,23 +44,46 @@ def live_view(
             yield lines
             return
         with Live(console=console, auto_refresh=False, transient=True, vertical_overflow="crop") as live:
-            picture = _Picture(live, lambda now_s: prompt_lines(hands.state, now_s, keys.typing) if heard else [])
-
-            def observe(progress: Progress) -> None:
-                lines(progress)
-                picture(progress)
-
-            yield observe
+            yield _Picture(lines, live, lambda now_s: prompt_lines(hands.state, now_s, keys.typing) if heard else [])
 
 
-class _Picture:
-    """Redraws the tree of the mission under way a few times a second, with `prompt(now_s)` below."""
+class _Lines(RunVisitor):
+    """Writes a line whenever a skill has ended."""
 
-    def __init__(self, live: Live, prompt: Callable[[float], Sequence[str]]) -> None:
-        self._live, self._prompt, self._drawn_s = live, prompt, 0.0
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._leaves: dict[str, dict[str, str]] = {}
+        self._last: dict[str, NodeState] = {}
+        self._begun_s: dict[str, float] = {}
 
-    def __call__(self, progress: Progress) -> None:
-        """Draw when it is time again."""
+    def tick(self, progress: Progress) -> None:
+        """Write what ended since the last tick."""
+        for robot, tree in progress.trees.items():
+            if tree.root.path_id not in self._leaves:
+                self._leaves[tree.root.path_id] = _skill_titles(node_view(tree.root))
+            for path_id, title in self._leaves[tree.root.path_id].items():
+                self._tell(path_id, title, progress.states[robot][path_id], progress.now_s)
+
+    def _tell(self, path_id: str, title: str, state: NodeState, now_s: float) -> None:
+        before = self._last.get(path_id, NodeState())
+        if state is before:
+            return
+        self._last[path_id] = state
+        if before.status is not Status.RUNNING:
+            self._begun_s[path_id] = now_s
+        if style_of(state) not in _UNDER_WAY and before != state:
+            self._console.print(skill_line(title, state, now_s - self._begun_s[path_id]))
+
+
+class _Picture(RunVisitor):
+    """Writes those `lines`, and redraws the tree under way a few times a second, with `prompt(now_s)` below."""
+
+    def __init__(self, lines: _Lines, live: Live, prompt: Callable[[float], Sequence[str]]) -> None:
+        self._lines, self._live, self._prompt, self._drawn_s = lines, live, prompt, 0.0
+
+    def tick(self, progress: Progress) -> None:
+        """Write; draw when it is time again."""
+        self._lines.tick(progress)
         now = time.perf_counter()
         if now - self._drawn_s < REFRESH_S:
             return
@@ -92,34 +115,6 @@ def fitted(picture: Text, rows: int) -> Text:
 def _of_tree(tree: CompiledTree, states: Snapshot) -> Snapshot:
     """The states of one mission's nodes, without those that wait below it."""
     return {path_id: states[path_id] for path_id in tree.path_ids}
-
-
-class _Lines:
-    """Writes a line whenever a skill has ended."""
-
-    def __init__(self, console: Console) -> None:
-        self._console = console
-        self._leaves: dict[str, dict[str, str]] = {}
-        self._last: dict[str, NodeState] = {}
-        self._begun_s: dict[str, float] = {}
-
-    def __call__(self, progress: Progress) -> None:
-        """Write what ended since the last tick."""
-        for robot, tree in progress.trees.items():
-            if tree.root.path_id not in self._leaves:
-                self._leaves[tree.root.path_id] = _skill_titles(node_view(tree.root))
-            for path_id, title in self._leaves[tree.root.path_id].items():
-                self._tell(path_id, title, progress.states[robot][path_id], progress.now_s)
-
-    def _tell(self, path_id: str, title: str, state: NodeState, now_s: float) -> None:
-        before = self._last.get(path_id, NodeState())
-        if state is before:
-            return
-        self._last[path_id] = state
-        if before.status is not Status.RUNNING:
-            self._begun_s[path_id] = now_s
-        if style_of(state) not in _UNDER_WAY and before != state:
-            self._console.print(skill_line(title, state, now_s - self._begun_s[path_id]))
 
 
 def _skill_titles(node: NodeView, above: NodeView | None = None) -> dict[str, str]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Final, Protocol
@@ -13,17 +14,16 @@ from rich.console import Console
 from rich.text import Text
 
 from executive.app.durable import STORE
-from executive.app.mission_run import Finished, both
+from executive.app.mission_run import Finished
 from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.talk import Talk, load_ahead
 from executive.cli.live import live_view
 from executive.language.parser import load_parser
-from executive.record.event_log import Listener
 from executive.record.profile import Profile
 from executive.record.schemas import SPEECH
 from executive.run.control import Control
-from executive.run.runner import Observer
+from executive.run.visitor import RunVisitor
 from executive.speech.voice import Silence, Voice, queued_voice
 from executive.view.text import printable, to_rich
 
@@ -33,9 +33,7 @@ SILENCE: Final = Silence()
 class Start(Protocol):
     """Runs a mission to its end."""
 
-    def __call__(
-        self, *, control: Control, observer: Observer | None = None, listener: Listener | None = None
-    ) -> Finished:
+    def __call__(self, *, control: Control, visitors: Sequence[RunVisitor] = ()) -> Finished:
         """Run it."""
 
 
@@ -52,17 +50,22 @@ def voice_for(aloud: bool) -> Iterator[Voice]:
         voice.close()
 
 
-def speech_heard(console: Console, voice: Voice, *, quiet: bool) -> Listener:
+@dataclass(frozen=True)
+class HeardSpeech(RunVisitor):
     """Writes what a robot says on the console, unless `quiet`, and says it with a voice, which must not block."""
 
-    def hear(topic: str, t_s: float, message: Mapping[str, Any]) -> None:
+    console: Console
+    voice: Voice
+    quiet: bool
+
+    def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Let speech be heard."""
         if topic == SPEECH:
             robot, text = (str(message.get(name, "")) for name in ("robot", "text"))
-            if not quiet:
-                console.print(Text(printable(f"{robot}: {text}"), style="bold"))
-            voice.say(text)
-
-    return hear
+            if not self.quiet:
+                self.console.print(Text(printable(f"{robot}: {text}"), style="bold"))
+            self.voice.say(text)
+        return message
 
 
 def control_for(console: Console, *, quiet: bool) -> Control:
@@ -97,16 +100,16 @@ def show_run(
             console.print(f"{to}{command}", markup=False)
     elsewhere, talk = talk is not None, talk or Talk(prepared, control)
     talk.begun()
-    listener = speech_heard(console, voice, quiet=quiet)
+    speech = HeardSpeech(console, voice, quiet)
     if quiet:
         if not elsewhere:
             load_parser().release()  # nobody speaks to the run
-        finished = start(control=control, observer=talk.observe if elsewhere else None, listener=listener)
+        finished = start(control=control, visitors=(speech, talk) if elsewhere else (speech,))
     else:
-        with live_view(console, control, say=lambda text: talk.hear(text).text) as observer:
+        with live_view(console, control, say=lambda text: talk.hear(text).text) as view:
             if control.attended and not elsewhere:
                 load_ahead()
-            finished = start(control=control, observer=both(observer, talk.observe), listener=listener)
+            finished = start(control=control, visitors=(speech, view, talk))
     if whole_tree:
         console.print(to_rich(finished.tree, collapsed=False))
     for line in finished.report.lines():

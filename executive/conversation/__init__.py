@@ -3,7 +3,7 @@
 From Python, beside a run:
 
     conversation = Conversation(speech, control)
-    run([entry], control=control, observer=conversation.observe, ...)     # in one thread
+    run([entry], control=control, visitors=[conversation], ...)           # in one thread
     reply = conversation.hear("no, the hammer", now_s=12.0)               # from another
     print(reply.text)
 """

@@ -11,7 +11,7 @@ from executive.conversation.status_words import doing_in_words, place_in_words
 from executive.language.followups import Remark
 from executive.language.grounding import known_line
 from executive.run.control import Control, Mode, RobotMode
-from executive.run.runner import Progress
+from executive.run.visitor import Progress
 
 __all__ = ["RemarkAnswers"]
 

@@ -7,7 +7,7 @@ from typing import Final
 from py_trees.common import Status
 
 from executive.run.control import ControlState, Mode
-from executive.run.runner import Progress
+from executive.run.visitor import Progress
 from executive.tree.snapshot import NodeState, Snapshot
 from executive.words.geometry import distance_m
 from executive.words.knowledge import Knowledge

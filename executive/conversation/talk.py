@@ -38,7 +38,7 @@ from executive.language.reference import Memory
 from executive.language.understand import Status, Understanding
 from executive.language.wake import heard_wake, strip_wake
 from executive.run.control import Control, Mode
-from executive.run.runner import Progress
+from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree
 from executive.words.command import Command, Task, Thing
 from executive.words.steps import MissionStep
@@ -82,7 +82,7 @@ class _When(enum.Enum):
     AFTERWARDS = "afterwards"
 
 
-class Conversation:
+class Conversation(RunVisitor):
     """What is said to one robot during a run. All methods may be called from any thread.
 
     With `require_wake` only what is said to the robot by its name counts, and answers to its questions.
@@ -113,8 +113,8 @@ class Conversation:
             steps = tree.steps if any(step.block is not None for step in tree.steps) else ()
             self._last = _Spoken(tree.commands, memory, now_s, tree.mission_name, steps)
 
-    def observe(self, progress: Progress) -> None:
-        """See how far the run is; an observer for the runner."""
+    def tick(self, progress: Progress) -> None:
+        """See how far the run is."""
         self._progress = self._remarks.progress = progress
         tree = progress.trees.get(self._speech.robot_name)
         if tree is not None and tree.mission_name not in self._seen:

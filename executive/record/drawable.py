@@ -11,7 +11,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from executive.record.schemas import BOXES, DETECTIONS, PATH
+from executive.record.schemas import BOXES, DETECTIONS, PATH, stamp
 
 JPEG_QUALITY: Final = 80
 _LINE_LOOP: Final = 2
@@ -81,12 +81,6 @@ def _path(message: Message, now_s: float) -> Message:
 
 def _as_it_is(message: Message, now_s: float) -> Message:
     return message
-
-
-def stamp(time_s: float) -> dict[str, int]:
-    """Seconds as the message formats have them."""
-    nanoseconds = round(time_s * 1e9)
-    return {"sec": nanoseconds // 10**9, "nsec": nanoseconds % 10**9}
 
 
 _FORMS: Final[Mapping[str, Callable[[Message, float], Message]]] = {PATH: _path}

@@ -19,16 +19,22 @@ from mcap.writer import Writer
 
 from executive.record.drawable import drawable
 from executive.record.schemas import TOPIC, WALL, Schema, schema_of
+from executive.run.outcome import RunResult
+from executive.run.visitor import Progress, RunSettings, RunVisitor
 from executive.words.slug import slug
+from skills.api import Worker
 from skills.robot import Clock
 
 FLUSH_EVERY_S = 1.0
+TICKS_EVERY_S = 1.0
 
 Listener = Callable[[str, float, Mapping[str, Any]], None]
 
 
-class EventLog:
-    """An open event log. Call it to log a message (`skills.api.Publish`); `close` it at the end.
+class EventLog(RunVisitor):
+    """An open event log: logs all messages of a run that it visits, and once a second how long its ticks took.
+
+    Call it to log a message (`skills.api.Publish`); `close` it at the end.
 
     Whatever is older than a second of the robot's clock has reached the file, so that a killed process leaves a log
     that can be read. When the disk is full, nothing more is written, and what was written can be read. `bytes` counts
@@ -53,6 +59,34 @@ class EventLog:
         self._closed = False
         self._failure: OSError | None = None
         self._listeners: list[Listener] = []
+        self._tick_limit_s = 0.0
+        self._ticks_s: list[float] = []
+        self._ticks_logged_s = -math.inf
+
+    def begin(self, settings: RunSettings, worker: Worker) -> None:
+        """A tick that takes longer than the tick period overruns."""
+        self._tick_limit_s = settings.tick_period_s
+
+    def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Log it."""
+        self(topic, message)
+        return message
+
+    def tick(self, progress: Progress) -> None:
+        """Gather how long the tick took on the wall's clock."""
+        self._ticks_s.append(progress.tick_wall_s)
+        if progress.now_s - self._ticks_logged_s >= TICKS_EVERY_S:
+            self._ticks_logged_s = progress.now_s
+            self._log_ticks({"overruns": progress.overruns})
+
+    def end(self, result: RunResult) -> None:
+        """Log the ticks that are left, and how long the whole run took."""
+        if self._failure is None:
+            self._log_ticks({"overruns": result.overruns, "wall_time_s": result.wall_time_s})
+
+    def _log_ticks(self, more: Mapping[str, float]) -> None:
+        ticks, self._ticks_s = [round(tick_s, 6) for tick_s in self._ticks_s], []
+        self(WALL, {"tick_s": ticks, "limit_s": self._tick_limit_s, **more})
 
     def listen(self, listener: Listener) -> None:
         """Tell `listener` of every message from now on: topic, the robot's clock (s), and the plain values."""

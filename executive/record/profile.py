@@ -29,20 +29,27 @@ class Profile:
         @functools.wraps(call)
         def timed_call(*arguments: Any, **options: Any) -> ResultT:
             """The call; what it takes, without the timed calls within, is added to the subsystem's time."""
-            calls = self._calls()
-            calls.append(0.0)
-            begun_s = time.thread_time()
+            begun_s = self.enter()
             try:
                 return call(*arguments, **options)
             finally:
-                whole_s = time.thread_time() - begun_s
-                within_s = calls.pop()
-                if calls:
-                    calls[-1] += whole_s
-                with self._lock:
-                    self._spent[name] = self._spent.get(name, 0.0) + whole_s - within_s
+                self.leave(name, begun_s)
 
         return timed_call
+
+    def enter(self) -> float:
+        """A call begins in this thread; its CPU time then (s)."""
+        self._calls().append(0.0)
+        return time.thread_time()
+
+    def leave(self, name: str, begun_s: float) -> None:
+        """The call of a subsystem that began last has ended."""
+        whole_s, calls = time.thread_time() - begun_s, self._calls()
+        within_s = calls.pop()
+        if calls:
+            calls[-1] += whole_s
+        with self._lock:
+            self._spent[name] = self._spent.get(name, 0.0) + whole_s - within_s
 
     def attach(self, name: str, owner: object, *methods: str) -> None:
         """Time methods of one object from now on."""

@@ -13,9 +13,8 @@ from typing import Any, Final
 
 from mcap_ros2.writer import Writer
 
-from executive.record.drawable import stamp
 from executive.record.reader import Event
-from executive.record.schemas import BOXES, DETECTIONS, PATH, POSE
+from executive.record.schemas import BOXES, DETECTIONS, PATH, POSE, stamp
 from executive.words.slug import slug
 from skills.files.errors import InputError
 

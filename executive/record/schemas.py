@@ -69,3 +69,9 @@ def schema_of(topic: str, message: Mapping[str, Any]) -> Schema:
 def _schema(types: Mapping[str, Any], schema: str, **fields: str) -> Schema:
     """A schema from the names of its fields by type, as they stand in the file."""
     return Schema(schema, {name: types[kind] for kind, names in fields.items() for name in names.split()})
+
+
+def stamp(time_s: float) -> dict[str, int]:
+    """Seconds as the message formats have them."""
+    nanoseconds = round(time_s * 1e9)
+    return {"sec": nanoseconds // 10**9, "nsec": nanoseconds % 10**9}

@@ -259,17 +259,20 @@ class Control:
 
     @_locked
     def mission_begun(self, robot_name: str, tree: CompiledTree) -> None:
-        """A mission begins, on top of those that a robot has begun."""
+        """A mission begins, on top of those that a robot has begun. Idempotent."""
+        before = self._missions.get(robot_name, ())
+        if before[-1:] == (tree.mission_name,):
+            return
         self._known |= frozenset(tree.path_ids)
         self._buttons = tuple(dict.fromkeys((*self._buttons, *tree.buttons)))
-        stack = (*self._missions.get(robot_name, ()), tree.mission_name)
+        stack = (*before, tree.mission_name)
         self._missions = MappingProxyType({**self._missions, robot_name: stack})
         self._bump()
 
     @_locked
     def mission_ended(self, robot_name: str) -> None:
         """A robot's topmost mission is over."""
-        self._missions = MappingProxyType({**self._missions, robot_name: self._missions[robot_name][:-1]})
+        self._missions = MappingProxyType({**self._missions, robot_name: self._missions.get(robot_name, ())[:-1]})
         self._bump()
 
     @_locked

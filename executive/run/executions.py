@@ -9,6 +9,7 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from executive.run.outcome import Execution
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.explained import Explained
 from executive.tree.compiler import CompiledTree
@@ -17,23 +18,9 @@ from executive.words.slug import slug
 from skills.api import Part
 from skills.robot import Clock
 
-__all__ = ["Execution", "Executions", "execution_keys", "is_speech"]
+__all__ = ["Executions", "execution_keys", "is_speech"]
 
 _ENDED: Final = (Status.SUCCESS, Status.FAILURE)
-
-
-@dataclass(frozen=True)
-class Execution:
-    """One time that a part of a mission ran, from `began_s` to `ended_s` (s on the robot's clock; None: not over).
-
-    It is `done` when it succeeded and nothing that holds it failed or was stopped in that time: what a failed branch,
-    attempt or round did was done in vain.
-    """
-
-    path_id: str
-    began_s: float
-    ended_s: float | None = None
-    done: bool = False
 
 
 @dataclass(frozen=True)

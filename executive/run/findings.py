@@ -9,36 +9,17 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from executive.record.schemas import SPEECH
+from executive.run.outcome import Finding, Said
+from executive.run.visitor import RunVisitor
 from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.behaviours.board import Board
 from executive.words.slug import slug
-from skills.api import Publish
 from skills.robot import Clock
 
-__all__ = ["Finding", "Findings", "Said", "claim", "finding_keys", "told"]
+__all__ = ["Findings", "claim", "finding_keys", "told"]
 
 MOST_CHARS: Final = 300
 _DENIALS: Final = ("no ", "not ", "nobody ", "nothing ")
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One answer that a mission gave, or was given: by which node, when (s on the robot's clock), and in words."""
-
-    path_id: str
-    t_s: float
-    question: str
-    answer: bool | str | float | None
-    sentence: str
-
-
-@dataclass(frozen=True)
-class Said:
-    """Something that the robot said or `asked`, and when it began to (s on the robot's clock)."""
-
-    t_s: float
-    text: str
-    asked: bool = False
 
 
 @dataclass(frozen=True)
@@ -56,8 +37,8 @@ def finding_keys(robot_name: str, mission_name: str) -> FindingKeys:
     return FindingKeys(f"{base}/findings", f"{base}/said", f"{base}/answered-before")
 
 
-class Findings:
-    """Collects the answers and the speech of one mission; a `Publish` that passes all messages on.
+class Findings(RunVisitor):
+    """Collects the answers and the speech of one mission.
 
     Any node adds a finding by publishing under `ANSWER_TOPIC`: `node`, `question`, `answer` (a truth value, a text or
     a number) and `message`, the sentence. The time and the robot are added here. What is collected stands on the
@@ -65,13 +46,12 @@ class Findings:
     its earlier answer once more, as the key `again` says, makes no second finding.
     """
 
-    def __init__(self, publish: Publish, clock: Clock, board: Board, robot_name: str, mission_name: str) -> None:
-        self._publish, self._clock, self._board = publish, clock, board
-        self._robot_name = robot_name
+    def __init__(self, clock: Clock, board: Board, robot_name: str, mission_name: str) -> None:
+        self._clock, self._board, self._robot_name = clock, board, robot_name
         self._keys = finding_keys(robot_name, mission_name)
 
-    def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
-        """Take note of a message and pass it on."""
+    def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Take note of a message of the mission; an answer gets its time and the robot's name."""
         if topic == ANSWER_TOPIC:
             message = {**message, "robot": self._robot_name, "t": round(self._clock.now(), 6)}
             self._add(_finding(message))
@@ -79,7 +59,7 @@ class Findings:
             now_s = round(self._clock.now(), 6)
             said = Said(now_s, str(message.get("text", "")), bool(message.get("asked", False)))
             self._board.put(self._keys.said, (*self.said, said))
-        self._publish(topic, message)
+        return message
 
     @property
     def findings(self) -> tuple[Finding, ...]:

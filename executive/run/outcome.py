@@ -1,17 +1,19 @@
-"""How a run ended."""
+"""How missions and runs end: by themselves, or by what stops them."""
 
 from __future__ import annotations
 
 import enum
+import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
-from executive.run.executions import Execution
-from executive.run.findings import Finding, Said
+from executive.run.watchdog import VerbHung
+from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
 from executive.tree.snapshot import Snapshot
-from skills.api import Cause
-from skills.robot import Pose2D
+from skills.api import Cause, Publish
+from skills.robot import LeaseError, Pose2D
 
 
 class Outcome(enum.Enum):
@@ -21,6 +23,49 @@ class Outcome(enum.Enum):
     FAILURE = "failure"  # something could not be done
     CANCELLED = "cancelled"  # somebody stopped it
     ERROR = "error"  # a defect: an exception, a hung verb
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One answer that a mission gave, or was given: by which node, when (s on the robot's clock), and in words."""
+
+    path_id: str
+    t_s: float
+    question: str
+    answer: bool | str | float | None
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Said:
+    """Something that the robot said or `asked`, and when it began to (s on the robot's clock)."""
+
+    t_s: float
+    text: str
+    asked: bool = False
+
+
+@dataclass(frozen=True)
+class Execution:
+    """One time that a part of a mission ran, from `began_s` to `ended_s` (s on the robot's clock; None: not over).
+
+    It is `done` when it succeeded and nothing that holds it failed or was stopped in that time: what a failed branch,
+    attempt or round did was done in vain.
+    """
+
+    path_id: str
+    began_s: float
+    ended_s: float | None = None
+    done: bool = False
+
+
+@dataclass(frozen=True)
+class Ending:
+    """An end that a tree did not come to by itself."""
+
+    outcome: Outcome
+    cause: Cause
+    message: str
 
 
 @dataclass(frozen=True)
@@ -46,6 +91,11 @@ class RobotResult:
     stepped_aside: bool = False
     executions: tuple[Execution, ...] = ()
     moved_s: float | None = None
+
+    def message_of_end(self) -> Mapping[str, object]:
+        """What the log says of it."""
+        end = {"robot": self.robot_name, "outcome": self.outcome, "cause": self.cause, "message": self.message}
+        return {**end, "answers": self.answers}
 
 
 @dataclass(frozen=True)
@@ -84,3 +134,20 @@ class RunResult:
     def outcome(self) -> Outcome:
         """Success only when all robots succeeded."""
         return self.worst.outcome
+
+
+def ending_of(stop: BaseException, publish: Publish) -> Ending:
+    """The end of a mission that an exception stopped; the trace of a defect is logged."""
+    for kind, (outcome, cause, sentence) in _ENDINGS.items():
+        if isinstance(stop, kind):
+            return Ending(outcome, cause, str(stop) or sentence)
+    trace = "".join(traceback.format_exception(stop))
+    publish(ERROR_TOPIC, {"node": "runner", "traceback": trace})
+    return Ending(Outcome.ERROR, Cause.ERROR, f"{type(stop).__name__}: {stop}")
+
+
+_ENDINGS: Final[dict[type[BaseException], tuple[Outcome, Cause, str]]] = {
+    KeyboardInterrupt: (Outcome.CANCELLED, Cause.CANCELLED, "cancelled from the keyboard"),
+    LeaseError: (Outcome.FAILURE, Cause.PRECONDITION, "the lease is held by another"),
+    VerbHung: (Outcome.ERROR, Cause.ERROR, "a verb hung"),
+}

@@ -5,71 +5,21 @@ from __future__ import annotations
 import math
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Protocol
 
-from executive.run.guarded_robot import GuardedRobot
+from executive.run.robot import RunRobot
 from executive.run.traffic import TrafficTable
 from executive.run.watchdog import VerbHung, Watchdog
-from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from skills.api import Running, SkillContext
 from skills.navigate.giving_way import GivingWay
 from skills.navigate.ports import NavigateInputs
 from skills.navigate.skill import Navigate
 
-__all__ = ["HOLDER", "Resting", "Spare", "SteppingAside", "WithoutWork"]
+__all__ = ["Resting", "SteppingAside"]
 
-HOLDER = "errand"
 _LOOK_S = 0.5
-
-
-class WithoutWork(Protocol):
-    """A robot that may have no work: one whose mission is over, or that has none."""
-
-    context: RunContext
-
-    @property
-    def name(self) -> str:
-        """The robot's name."""
-
-    def sense(self) -> None:
-        """Bring its estimators up to date."""
-
-    def rest(self) -> SkillContext:
-        """Claim its lease: what may be used to step aside for others. Raises LeaseError."""
-
-    def leave(self) -> None:
-        """Stop it and give the lease back."""
-
-
-@dataclass
-class Spare:
-    """A robot that has no mission in the run, or none yet."""
-
-    context: RunContext
-    robot: GuardedRobot
-
-    @property
-    def name(self) -> str:
-        """The robot's name."""
-        return self.context.robot.name
-
-    def sense(self) -> None:
-        """Bring its estimators up to date."""
-        self.context.localiser.update(self.context.robot)
-        self.context.costmap.update(self.context.robot, self.context.localiser.estimate())
-
-    def rest(self) -> SkillContext:
-        """Claim its lease. Raises LeaseError."""
-        self.context = replace(self.context, lease=self.robot.claim(HOLDER))
-        return self.context
-
-    def leave(self) -> None:
-        """Stop it and give the lease back."""
-        self.context.robot.stop(lease=self.context.lease)
-        self.robot.give_lease_back()
 
 
 class SteppingAside:
@@ -113,7 +63,7 @@ class SteppingAside:
 
 @dataclass
 class _Robot:
-    who: WithoutWork
+    who: RunRobot
     aside: SteppingAside
     own_lease: bool
     sense_due_s: float = -math.inf
@@ -123,22 +73,21 @@ class _Robot:
 class Resting:
     """The robots of a run that have no work now: they wait for their turn, are done, or were given none.
 
-    `sense` brings a robot's estimators up to date. A robot whose verbs fail is left alone from then on.
+    A robot whose verbs fail is left alone from then on.
     """
 
     table: TrafficTable
     watchdog: Watchdog
     tick_limit_s: float
-    sense: Callable[[WithoutWork], None]
     stepped_aside: set[str] = field(default_factory=set)
     _robots: dict[str, _Robot] = field(default_factory=dict)
 
-    def wait(self, who: WithoutWork) -> None:
+    def wait(self, who: RunRobot) -> None:
         """A robot whose mission has not begun; the run senses for it."""
         if who.name not in self._robots:
             self._begin(who, who.context, own_lease=False)
 
-    def rest(self, who: WithoutWork) -> None:
+    def rest(self, who: RunRobot) -> None:
         """A robot whose lease nobody holds, since its mission is over or it has none; it is sensed for as well."""
         self._guarded(who, lambda: self._begin(who, who.rest(), own_lease=True))
 
@@ -153,7 +102,7 @@ class Resting:
         self._guarded(robot.who, robot.aside.end)
         if robot.own_lease:
             self.table.release(name)
-            self._guarded(robot.who, robot.who.leave)
+            robot.who.stop_and_leave()
 
     def close(self) -> None:
         """The run is over."""
@@ -168,7 +117,7 @@ class Resting:
                 if not self._guarded(robot.who, step):
                     self.leave(name)
 
-    def _begin(self, who: WithoutWork, context: SkillContext, *, own_lease: bool) -> None:
+    def _begin(self, who: RunRobot, context: SkillContext, *, own_lease: bool) -> None:
         self._robots[who.name] = _Robot(who, SteppingAside(context), own_lease)
         self.table.rest(who.name, idle=True)
 
@@ -185,11 +134,11 @@ class Resting:
         context = robot.who.context
         if robot.aside.drives or context.clock.now() >= robot.sense_due_s:
             robot.sense_due_s = context.clock.now() + _LOOK_S
-            self.sense(robot.who)
+            robot.who.sense()
         else:
             self.table.heard(robot.who.name, context.known_pose())
 
-    def _guarded(self, who: WithoutWork, call: Callable[[], None]) -> bool:
+    def _guarded(self, who: RunRobot, call: Callable[[], None]) -> bool:
         """Whether the call went well; what it raised goes to the log."""
         try:
             call()

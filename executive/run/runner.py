@@ -3,282 +3,328 @@
 from __future__ import annotations
 
 import time
-import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
-from typing import TypeVar
+from typing import Final, TypeVar, cast
 
-from executive.record.profile import Profile
-from executive.record.schemas import CONTROL, RESERVED_PATH
-from executive.record.ticks import TickMeter
-from executive.record.work import Work
+from executive.record.schemas import CONTROL, OUTCOME, RESERVED_PATH
+from executive.record.work import CountedDetector, Work
 from executive.run.control import Control, ControlRequests, Event
-from executive.run.dispatch import Dispatch, DispatchedSessions, never_began
-from executive.run.endings import CancelledError, LastingLog, TimeOverError, ending_of
-from executive.run.opening import Opening, RunEntry, RunSettings
-from executive.run.outcome import Outcome, RobotStatus, RunResult
-from executive.run.resting import Resting, WithoutWork
+from executive.run.guarded_robot import GuardedRobot
+from executive.run.outcome import Ending, Outcome, RobotResult, RobotStatus, RunResult, ending_of
+from executive.run.resting import Resting
+from executive.run.robot import HOLDER, RunRobot
 from executive.run.session import Session
 from executive.run.traffic import TrafficTable
-from executive.run.tree_run import Ending
-from executive.run.watchdog import VerbHung
-from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
+from executive.run.visitor import (
+    Assigner,
+    MissionEnd,
+    Progress,
+    RunEntry,
+    RunSettings,
+    RunVisitor,
+    TickNote,
+    Visitors,
+)
+from executive.run.watchdog import VerbHung, Watchdog
+from executive.tree.behaviours.board import Board
+from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
-from executive.tree.snapshot import Snapshot
-from skills.api import Cause, Publish, Worker
+from executive.words.slug import slug
+from skills.api import Cause, Worker
 from skills.files.errors import disk_is_full
-from skills.robot import Clock
+from skills.navigate.footprint import Footprint
+from skills.robot import Clock, Lease, Robot
 
-_PATHS_PERIOD_S = 0.5
+__all__ = ["run"]
+
+_PATHS_PERIOD_S: Final = 0.5
+_NO_LEASE: Final = Lease("", "", 0)
 ResultT = TypeVar("ResultT")
-
-__all__ = ["Observer", "Progress", "RunEntry", "RunSettings", "run"]
-
-
-@dataclass(frozen=True)
-class Progress:
-    """The state of a run after each tick, for observers: node states, mission and status of each robot."""
-
-    now_s: float
-    ticks: int
-    overruns: int
-    states: Mapping[str, Snapshot]
-    trees: Mapping[str, CompiledTree] = field(default_factory=dict)
-    robots: Mapping[str, RobotStatus] = field(default_factory=dict)
-
-
-Observer = Callable[[Progress], None]
 
 
 def run(
-    entries: Sequence[RunEntry],
+    missions: Sequence[RunEntry] | Assigner,
     *,
     clock: Clock,
     worker: Worker,
-    publish: Publish,
+    visitors: Sequence[RunVisitor] = (),
     settings: RunSettings | None = None,
     control: Control | None = None,
-    observer: Observer | None = None,
-    work: Work | None = None,
-    profile: Profile | None = None,
-    dispatch: Dispatch | None = None,
     spare: Sequence[RunEntry] = (),
 ) -> RunResult:
-    """Run trees to their end, robots in the order of their names.
+    """Run the missions of any number of robots to their end, robots in the order of their names.
 
-    Each tick: poll `control`, advance the clock by the tick period, update each robot's estimators, tick each tree, log
-    what changed. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree is not
-    ticked, and that time counts against no limit. In every case all trees and robots are stopped and all leases
-    returned before this returns. Without control, equal seeds give equal logs. `work` counts what is computed,
-    `profile` times the skills. With `dispatch`, robots are given missions as long as it has any, one that fails ends
-    only its own, and the result has one entry for each mission. Robots that are `spare` have no mission, or none yet:
-    their trees do not count, and they clear ways that others reserve, as those do whose missions are over. Raises
-    ValueError: no entries, two robots of one name, one that waits for a robot that is not there, or a breakpoint at a
-    node that there is not. Raises OSError, when all is stopped: the disk is full.
+    Each tick: poll `control`, advance the clock by the tick period, update each robot's estimators, tick each tree,
+    tell the `visitors`. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree
+    is not ticked, and that time counts against no limit. A robot that fails ends its own mission, and is no more than
+    an obstacle to the others then. In every case all trees and robots are stopped and all leases returned before this
+    returns. Without control, equal seeds give equal logs.
+
+    An assigner gives missions as long as it has any; the result has one entry for each mission. Robots that are `spare`
+    have no mission, or none yet: their trees do not count, and they clear paths that others reserve, as those do whose
+    missions are over.
+
+    Raises ValueError: no missions, two robots of one name, one that waits for a robot that is not there, or a
+    breakpoint at a node that there is not. Raises OSError, when all is stopped: the disk is full.
     """
+    assigner = missions if isinstance(missions, Assigner) else _AllAtOnce(missions)
+    entries = () if isinstance(missions, Assigner) else missions
     names = [entry.robot.name for entry in (*entries, *spare)]
-    if (not entries and dispatch is None) or len(set(names)) != len(names):
+    if (assigner is not missions and not entries) or len(set(names)) != len(names):
         raise ValueError(f"a run needs robots of different names, not {names}")
     if strangers := {name for entry in entries for name in entry.after} - set(names):
         raise ValueError(f"there is no robot {', '.join(sorted(strangers))} to wait for")
     settings, control = settings or RunSettings(), control or Control(pace=None)
     control.begin({entry.tree.robot_name: entry.tree for entry in entries})
-    traffic = TrafficTable({}, clock.now) if len(names) > 1 or dispatch is not None else None
-    log = LastingLog(publish)
-    made = _Run(Opening(clock, worker, log, settings, control, work or Work(), profile, traffic), log)
-    made.observer, made.spare = observer, spare
-    if dispatch is not None:
-        made.give_out(dispatch)
-    return made.run(entries)
+    all_visitors = Visitors((assigner, *visitors))
+    all_visitors.begin(settings, worker)
+    return _Run(assigner, clock, worker, all_visitors, settings, control).run(spare)
+
+
+class _AllAtOnce(Assigner):
+    """Assigns all missions at the beginning."""
+
+    def __init__(self, entries: Sequence[RunEntry]) -> None:
+        self._entries = sorted(entries, key=lambda entry: entry.robot.name)
+
+    def assign(self) -> Sequence[RunEntry]:
+        """All of them once."""
+        entries, self._entries = self._entries, []
+        return entries
 
 
 class _Run:
-    """The state of one run."""
+    """The state of one run. `_sessions` has each robot's last mission, `_over` all that have ended."""
 
-    def __init__(self, opening: Opening, publish: LastingLog) -> None:
-        clock, settings = opening.clock, opening.settings
-        self._opening, self._clock, self._publish = opening, clock, publish
-        self._settings, self._control, self._traffic = settings, opening.control, opening.traffic
-        self._watchdog = opening.watchdog
-        self.observer: Observer | None = None
-        self.spare: Sequence[RunEntry] = ()
-        self._given: DispatchedSessions | None = None
-        self._sessions: list[Session] = []
+    def __init__(
+        self,
+        assigner: Assigner,
+        clock: Clock,
+        worker: Worker,
+        visitors: Visitors,
+        settings: RunSettings,
+        control: Control,
+    ) -> None:
+        self._assigner, self._clock, self._worker, self._visitors = assigner, clock, worker, visitors
+        self._settings, self._control, self._work = settings, control, Work()
+        self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
+        told_s = settings.time_of_day_s
+        self._day_began_s = (_time_of_day_s() if told_s is None else told_s) - clock.now()
+        self._traffic = TrafficTable({}, clock.now)
+        self._resting = Resting(self._traffic, self._watchdog, settings.tick_limit_s)
+        self._assigned: list[RunEntry] = []
+        self._sessions: dict[str, Session] = {}
+        self._results: dict[str, RobotResult] = {}
+        self._over: list[tuple[RobotResult, CompiledTree]] = []
+        self._ends: list[MissionEnd] = []  # that the visitors are to hear of
+        self._idle: list[Session] = []  # whose missions ended in the last tick
+        self._seen: dict[str, RobotStatus] = {}
+        self._stopping = False
         self._paths_due_s = clock.now()
-        self._resting: Resting | None = None
-        self._after: dict[str, tuple[str, ...]] = {}
-        self._ticks = 0
-        self._meter = TickMeter(publish, clock, limit_s=settings.tick_period_s)
+        self._ticks = self._overruns = 0
         self._begun_s, self._begun_wall_s = clock.now(), time.perf_counter()
         self._time = StoppableTime(clock)
 
-    def give_out(self, dispatch: Dispatch) -> None:
-        """Robots are given missions as long as there are any."""
-        self._given = DispatchedSessions(dispatch, self._sessions, self._control, self._publish, lambda: self._ticks)
-
-    def run(self, entries: Sequence[RunEntry]) -> RunResult:
+    def run(self, spare: Sequence[RunEntry]) -> RunResult:
         """The whole run."""
-        with self._watchdog:
-            return self._watched_run(entries)
-
-    def _watched_run(self, entries: Sequence[RunEntry]) -> RunResult:
-        ending: Ending | None = None
         full: BaseException | None = None
-        try:
-            if self._traffic is not None:
-                tick_limit_s = self._settings.tick_limit_s
-                self._resting = Resting(self._traffic, self._watchdog, tick_limit_s, self._sense)
-                for entry in self.spare:
-                    self._resting.rest(self._opening.spare(entry))
-            for entry in sorted(entries, key=lambda entry: entry.robot.name):
-                self._sessions.append(self._opening.session(entry))
-                self._after[entry.robot.name] = entry.after
-            while self._has_work():
-                self._cycle()
-        except (Exception, VerbHung, KeyboardInterrupt) as stop:
-            self._publish.ending = True
-            ending = ending_of(stop, self._publish)
-            if isinstance(stop, CancelledError | TimeOverError):
-                self._end_early()
-            full = stop if disk_is_full(stop) else None
-        finally:
-            self._publish.ending = True
-            if self._resting is not None:
-                self._resting.close()
-            for session in self._sessions:
-                session.close(ending)
-                if self._given is not None:
-                    self._given.tell(session, None)
-            self._tell(self._control.end())
+        with self._watchdog:
+            ending: Ending | None = None
+            try:
+                for entry in spare:
+                    self._resting.rest(self._robot(entry))
+                while self._has_work():
+                    self._cycle()
+            except (Exception, VerbHung, KeyboardInterrupt) as stop:
+                self._visitors.ending = True
+                ending = ending_of(stop, self._visitors.publish)
+                full = stop if disk_is_full(stop) else None
+            finally:
+                self._end(ending)
         if full is not None:
             raise full
-        return self._result(entries, ending)
+        result = self._result()
+        self._visitors.end(result)
+        return result
+
+    @property
+    def _live(self) -> list[Session]:
+        return [session for session in self._sessions.values() if session.result is None]
 
     def _has_work(self) -> bool:
-        """Whether a mission is under way, after those were begun that are given out now."""
-        if self._given is not None:
-            self._given.begin(self._begin_given)
-        return not all(session.finished for session in self._sessions)
+        """Whether a mission is under way, after those were begun that are assigned now."""
+        while not self._stopping and (assigned := self._assigner.assign()):  # again where one cannot begin
+            self._assigned = list(assigned)
+            while self._assigned:
+                self._begin(self._assigned[0])
+                self._assigned.pop(0)
+            self._tell_ends()
+        return bool(self._live)
 
-    def _begin_given(self, entry: RunEntry) -> Session:
-        """Begin a mission that was given out, of a robot that may be resting. Raises what its verbs raise."""
-        if self._resting is not None:
-            self._resting.leave(entry.robot.name)
-        return self._opening.session(entry)
+    def _begin(self, entry: RunEntry) -> None:
+        """Begin a mission of a robot that may be resting. Raises OSError: the disk is full."""
+        name = entry.robot.name
+        self._resting.leave(name)
+        try:
+            session = self._session(entry)
+        except (Exception, VerbHung) as stop:
+            if disk_is_full(stop):
+                raise
+            ending = ending_of(stop, self._visitors.publish)
+            self._note_end(_never_began(entry, ending), entry.tree, ending.message)
+            return
+        self._sessions = dict(sorted({**self._sessions, name: session}.items()))
+        self._control.mission_begun(name, entry.tree)
 
-    def _for(self, session: Session, call: Callable[[], ResultT], otherwise: ResultT) -> ResultT:
-        """What a call for one robot gives. With several robots, one that fails ends only its own mission.
+    def _robot(self, entry: RunEntry, lease: Lease = _NO_LEASE) -> RunRobot:
+        """A robot without a mission."""
+        guarded = self._guarded(entry)
+        return RunRobot(self._context(entry, guarded, lease), guarded, self._traffic)
 
-        It is no more than an obstacle to the others then. Raises OSError: the disk is full.
-        """
-        if self._traffic is None:
-            return call()
+    def _session(self, entry: RunEntry) -> Session:
+        """The robot's mission, opened with its lease. Raises LeaseError, and what its verbs raise."""
+        guarded = self._guarded(entry)
+        context = self._context(entry, guarded, guarded.claim(HOLDER))
+        try:
+            return Session(entry, context, guarded, self._traffic, self._control, self._visitors)
+        except BaseException:
+            guarded.give_lease_back()
+            raise
+
+    def _guarded(self, entry: RunEntry) -> GuardedRobot:
+        """The robot under the watchdog, known to the others."""
+        limits = self._settings
+        guarded = GuardedRobot(
+            entry.robot, self._watchdog, limit_s=limits.verb_limit_s, image_limit_s=limits.image_limit_s
+        )
+        self._traffic.join(guarded.name, Footprint.of(guarded.capabilities()).discs)
+        return guarded
+
+    def _context(self, entry: RunEntry, robot: GuardedRobot, lease: Lease) -> RunContext:
+        name, publish = entry.robot.name, self._visitors.publish
+        return RunContext(
+            robot=cast(Robot, robot),
+            lease=lease,
+            clock=self._clock,
+            worker=self._worker,
+            localiser=entry.localiser,
+            costmap=entry.costmap,
+            publish=lambda topic, message: publish(topic, {"robot": name, **message}),
+            seed=self._settings.seed,
+            board=Board(slug(entry.tree.robot_name)),
+            ask=lambda question: self._control.ask(question, self._clock, name),
+            stop_pressed=lambda: self._control.stop_pressed(name),
+            presses=lambda: self._control.presses,
+            day_began_s=self._day_began_s,
+            detector=CountedDetector(entry.detector, self._work),
+            work=self._work,
+            stack=entry.stack,
+            doors=entry.tree.doors,
+            traffic=self._traffic.view_of(name),
+        )
+
+    def _cycle(self) -> None:
+        """One period: requests are polled, time passes, estimators see, trees tick, visitors are told."""
+        begun_wall_s = time.perf_counter()
+        live, idle, self._idle = self._live, self._idle, []
+        for session in idle:
+            if self._sessions[session.name] is session:
+                self._resting.rest(session)
+        requests = self._poll(live)
+        if not any(session.result is None for session in live):
+            self._note_ends(live)
+            self._tell_ends()
+            return
+        self._clock.advance(self._settings.tick_period_s)
+        for session in live:
+            self._for(session, session.sense)
+        self._publish_paths()
+        turn = [session for session in live if session.result is None and self._is_its_turn(session)]
+        free = [session for session in turn if self._for(session, session.may_move)]
+        self._rest(live, turn, requests.held)
+        moving = [session for session in free if not requests.held(session.name)]
+        began_wall_s = time.perf_counter()
+        notes = self._tick(moving, requests.breakpoints)
+        tick_wall_s = time.perf_counter() - began_wall_s
+        self._overruns += tick_wall_s > self._settings.tick_period_s
+        self._note_ends(live)
+        self._visitors.tick(self._progress(notes, tick_wall_s))
+        self._tell_ends()
+        self._recall()
+        self._keep_pace(begun_wall_s)
+
+    def _for(self, session: Session, call: Callable[[], ResultT]) -> ResultT | None:
+        """What a call for one robot gives; None where it fails, which ends its mission. Raises OSError: disk full."""
         try:
             return call()
         except (Exception, VerbHung) as stop:
             if disk_is_full(stop):
                 raise
-            ending = ending_of(stop, self._publish)
+            ending = ending_of(stop, self._visitors.publish)
+            session.gone = ending.message
             session.close(ending)
-            session.context.traffic.release()
-            self._end_given(session, ending.message)
-            return otherwise
+            return None
 
-    def _end_early(self) -> None:
-        """Do what missions always do in the end, for `endings_limit_s` at most; a second cancel ends that as well."""
-        until_s = self._clock.now() + self._settings.endings_limit_s
-        try:
-            for session in self._sessions:
-                session.end_early()
-            while any(session.ends for session in self._sessions) and self._clock.now() < until_s:
-                requests = self._control.poll()
-                self._tell(requests.events)
-                if requests.insists:
-                    return
-                self._clock.advance(self._settings.tick_period_s)
-                for session in self._sessions:
-                    if session.ends:
-                        self._sense(session)
-                        if requests.held(session.name):
-                            session.hold()
-                        elif session.may_move():
-                            session.tick_end()
-                self._ticks += 1
-                if self.observer is not None:
-                    self.observer(self._progress())
-        except (Exception, VerbHung, KeyboardInterrupt):
-            self._publish(ERROR_TOPIC, {"node": "runner", "traceback": traceback.format_exc()})
+    def _poll(self, live: Sequence[Session]) -> ControlRequests:
+        """Do what is asked for before time passes."""
+        requests = self._control.poll()
+        self._publish_events(requests.events)
+        if requests.cancel is not None:
+            self._stop(Ending(Outcome.CANCELLED, Cause.CANCELLED, requests.cancel or "cancelled"), requests.insists)
+        for session in (each for each in live if each.result is None):
+            self._for(session, partial(self._obey, session, requests))
+        under_way = [session for session in live if session.result is None]
+        if not under_way:
+            return requests
+        if any(not requests.held(session.name) for session in under_way):
+            self._time.go_on()
+        else:
+            self._time.stop()
+            self._control.held(self._settings.tick_period_s)
+        if self._time.elapsed_s() >= self._settings.time_limit_s:
+            message = f"the mission was not done within {self._settings.time_limit_s:g} s"
+            self._stop(Ending(Outcome.FAILURE, Cause.TIMEOUT, message))
+        return requests
 
-    def _cycle(self) -> None:
-        """One period: requests are polled, time passes, estimators see, trees tick."""
-        begun_wall_s = time.perf_counter()
-        live = [session for session in self._sessions if session.result is None]
-        requests = self._poll(live)
-        self._clock.advance(self._settings.tick_period_s)
-        for session in live:
-            self._for(session, partial(self._sense, session), None)
-        if self._traffic is not None and self._clock.now() >= self._paths_due_s:
+    def _obey(self, session: Session, requests: ControlRequests) -> None:
+        """Do what is asked of one robot."""
+        for request in requests.instead:
+            if request.tree.robot_name == session.name:
+                session.replace(request.tree, request.instead_of)
+        for tree in _for_robot(session, requests.preempts):
+            session.preempt(tree)
+        for tree in _for_robot(session, requests.later):
+            session.later(tree)
+        for _, reason in (each for each in requests.cancels if each[0] == session.name):
+            if session.cancelled:
+                session.close()
+            else:
+                ending = Ending(Outcome.CANCELLED, Cause.CANCELLED, reason)
+                session.cancel(ending, self._settings.endings_limit_s)
+        if session.result is None and requests.held(session.name):
+            session.hold()
+
+    def _stop(self, ending: Ending, at_once: bool = False) -> None:
+        """End all missions, and assign no more. What they always do in the end is done first, unless `at_once`."""
+        self._stopping = True
+        for session in self._live:
+            session.cancel(ending, self._settings.endings_limit_s)
+            if at_once:
+                session.close(ending)
+
+    def _publish_paths(self) -> None:
+        if self._clock.now() >= self._paths_due_s:
             self._paths_due_s = self._clock.now() + _PATHS_PERIOD_S
             for path in self._traffic.news():
-                self._publish(RESERVED_PATH, path)
-        turn = [session for session in live if session.result is None and self._is_its_turn(session)]
-        free = [session for session in turn if self._for(session, session.may_move, False)]
-        moving = [session for session in free if not requests.held(session.name)]
-        self._rest(live, turn, requests.held)
-        self._tick(moving, requests.breakpoints)
-        for session in live:
-            if session.finished:
-                lost = session.result is not None and session.result.outcome is not Outcome.CANCELLED
-                result = session.close()
-                session.context.traffic.release()
-                self._end_given(session, result.message if lost else None)  # its lease was another's for too long
-                if not lost and self._resting is not None and self._others_go_on(session):
-                    self._resting.rest(session)
-            elif self._given is not None:
-                self._for(session, partial(self._given.look, session), None)
-        if self._given is not None:
-            self._given.recall()
-        if self.observer is not None:
-            self.observer(self._progress())
-        self._keep_pace(begun_wall_s)
-
-    def _end_given(self, session: Session, gone: str | None) -> None:
-        """Where missions are given out, the robot has none any more, and is free again unless it is `gone`."""
-        if self._given is not None:
-            self._given.end(session, gone)
-
-    def _others_go_on(self, session: Session) -> bool:
-        """Whether a robot whose mission is over may still be in somebody's way."""
-        return self._given is not None or any(not one.finished for one in self._sessions if one is not session)
-
-    def _rest(self, live: Sequence[Session], turn: Sequence[Session], held: Callable[[str], bool]) -> None:
-        """Let the robots that wait for others, and those whose missions are over, clear ways that are reserved."""
-        if self._resting is None:
-            return
-        for session in live:
-            if session in turn:
-                self._resting.leave(session.name)
-            elif session.result is None:
-                self._resting.wait(session)
-        self._resting.tick(held)
-
-    def _sense(self, session: WithoutWork) -> None:
-        """Bring a robot's estimators up to date, and tell the others where it believes to be."""
-        if self._traffic is not None and (estimators := session.context.leave_others_out):
-            covered_W = self._traffic.covered_W(session.name)
-            for estimator in estimators:
-                estimator.leave_out(covered_W)
-        session.sense()
-        if self._traffic is not None:
-            self._traffic.heard(session.name, session.context.known_pose())
+                self._visitors.publish(RESERVED_PATH, path)
 
     def _is_its_turn(self, session: Session) -> bool:
         """Whether the robots that a mission waits for are done; it ends when one of them has failed."""
-        results = {each.name: each.result for each in self._sessions}
-        for name in self._after.get(session.name, ()):
-            result = results[name]
+        for name in session.after:
+            result = self._results.get(name)
             if result is None:
                 return False
             if result.outcome is not Outcome.SUCCESS:
@@ -287,85 +333,132 @@ class _Run:
                 return False
         return True
 
-    def _poll(self, live: Sequence[Session]) -> ControlRequests:
-        """Do what is asked for before time passes. Raises CancelledError or TimeOverError."""
-        requests = self._control.poll()
-        self._tell(requests.events)
-        if requests.cancel is not None:
-            raise CancelledError(requests.cancel)
+    def _rest(self, live: Sequence[Session], turn: Sequence[Session], held: Callable[[str], bool]) -> None:
+        """Let the robots that wait for others, and those without a mission, clear paths that are reserved."""
         for session in live:
-            for request in requests.instead:
-                if request.tree.robot_name == session.name:
-                    session.replace(request.tree, request.instead_of)
-            for tree in _for_robot(session, requests.preempts):
-                session.preempt(tree)
-            for tree in _for_robot(session, requests.later):
-                session.later(tree)
-            for _, reason in (each for each in requests.cancels if each[0] == session.name):
-                session.cancel(reason, self._settings.endings_limit_s)
-        held = [session for session in live if session.result is None and requests.held(session.name)]
-        if len(held) < len(live):
-            self._time.go_on()
-        else:
-            self._time.stop()
-            self._control.held(self._settings.tick_period_s)
-        for session in held:
-            session.hold()
-        if self._time.elapsed_s() >= self._settings.time_limit_s:
-            raise TimeOverError(f"the mission was not done within {self._settings.time_limit_s:g} s")
-        return requests
+            if session in turn:
+                self._resting.leave(session.name)
+            elif session.result is None:
+                self._resting.wait(session)
+        self._resting.tick(held)
 
-    def _tick(self, moving: Sequence[Session], breakpoints: frozenset[str]) -> None:
-        """Tick the trees of robots that may move."""
-        begun = time.perf_counter()
-        changes = []
+    def _tick(self, moving: Sequence[Session], breakpoints: frozenset[str]) -> Mapping[str, TickNote]:
+        """Tick the trees of robots that may move; what that brought of each."""
+        notes: dict[str, TickNote] = {}
+        changes: list[bool] = []
         for session in moving:
             with self._watchdog.over_tick(session.name, self._settings.tick_limit_s):
-                changes.append(self._for(session, partial(session.tick, breakpoints), False))
+                changed = self._for(session, partial(session.tick, breakpoints))
+            if changed is not None and session.note is not None:
+                changes.append(changed)
+                notes[session.name] = session.note
         self._ticks += 1
-        self._meter(time.perf_counter() - begun)
         if moving:
             self._control.ticked(changed=any(changes))
-        for path_id in filter(None, (session.waiting_at for session in moving if session.result is None)):
+        under_way = (each for each in moving if each.result is None and not each.cancelled)
+        for path_id in filter(None, (session.waiting_at for session in under_way)):
             self._control.arrived_at(path_id)
+        return notes
 
-    def _progress(self) -> Progress:
-        states = {session.name: session.states for session in self._sessions}
-        trees = {session.name: session.tree for session in self._sessions}
-        seen = {session.name: session.status for session in self._sessions} if self._given is None else self._given.seen
-        return Progress(self._clock.now(), self._ticks, self._meter.overruns, states, trees, seen)
+    def _note_ends(self, live: Sequence[Session]) -> None:
+        """See how the robots are, and close the missions that have ended."""
+        for session in live:
+            if not session.finished:
+                self._for(session, partial(self._look, session))
+        for session in live:
+            if session.finished:
+                result = session.close()
+                session.context.traffic.release()
+                if session.gone is None:
+                    self._for(session, partial(self._look, session))
+                if session.gone is None:
+                    self._idle.append(session)
+                self._note_end(result, session.main_tree, session.gone)
+
+    def _look(self, session: Session) -> None:
+        self._seen[session.name] = session.status()
+
+    def _note_end(self, result: RobotResult, tree: CompiledTree, gone: str | None) -> None:
+        name = result.robot_name
+        self._results[name] = result
+        self._over.append((result, tree))
+        self._ends.append(MissionEnd(result, self._seen.get(name), gone))
+
+    def _tell_ends(self) -> None:
+        """Tell of the missions that have ended."""
+        ends, self._ends = self._ends, []
+        for end in ends:
+            self._control.mission_ended(end.result.robot_name)
+            self._visitors.publish(OUTCOME, {**end.result.message_of_end(), "ticks": self._ticks})
+            self._visitors.mission_ended(end)
+
+    def _recall(self) -> None:
+        """End the missions that are recalled now."""
+        why = self._assigner.recall(self._seen)
+        recalled = [session for session in self._live if session.name in why]
+        for session in recalled:
+            session.close(Ending(Outcome.CANCELLED, Cause.CANCELLED, why[session.name]))
+        self._note_ends(recalled)
+        self._tell_ends()
+
+    def _progress(self, notes: Mapping[str, TickNote], tick_wall_s: float) -> Progress:
+        states = {name: session.states for name, session in self._sessions.items()}
+        trees = {name: session.tree for name, session in self._sessions.items()}
+        now_s, seen = self._clock.now(), dict(self._seen)
+        return Progress(now_s, self._ticks, self._overruns, states, trees, seen, notes, tick_wall_s)
 
     def _keep_pace(self, begun_wall_s: float) -> None:
         """Do not let simulated time run ahead of people who have something to decide."""
-        people = self._control.attended and any(session.waits_for_people for session in self._sessions)
+        people = self._control.attended and any(session.waits_for_people for session in self._sessions.values())
         if self._control.pace is None or not (people or self._control.slow):
             return
         left_s = self._settings.tick_period_s / self._control.pace - (time.perf_counter() - begun_wall_s)
         if left_s > 0.0:
             self._control.rest(left_s)
 
-    def _tell(self, events: Sequence[Event]) -> None:
+    def _publish_events(self, events: Sequence[Event]) -> None:
         for event in events:
-            self._publish(CONTROL, {"t": round(self._clock.now(), 6), "what": event.what, "message": event.message})
+            message = {"t": round(self._clock.now(), 6), "what": event.what, "message": event.message}
+            self._visitors.publish(CONTROL, message)
 
-    def _result(self, entries: Sequence[RunEntry], ending: Ending | None) -> RunResult:
-        if self._given is None:
-            for session in self._sessions:
-                session.log_end(self._ticks)
-            over = [(session.close(ending), session.main_tree) for session in self._sessions]
-        else:
-            over = self._given.over
-        stepped_aside = frozenset[str]() if self._resting is None else self._resting.stepped_aside
-        robots = tuple(replace(result, stepped_aside=result.robot_name in stepped_aside) for result, _ in over)
-        wall_time_s = time.perf_counter() - self._begun_wall_s
-        self._meter.close(wall_time_s)
-        began = {session.name for session in self._sessions}
-        absent = tuple(never_began(e, ending) for e in entries if ending is not None and e.robot.name not in began)
-        sim_time_s = self._clock.now() - self._begun_s
-        trees = {result.robot_name: tree for result, tree in over}
-        overruns, work = self._meter.overruns, self._opening.work.totals()
-        return RunResult(robots + absent, self._ticks, overruns, sim_time_s, wall_time_s, trees, work)
+    def _end(self, ending: Ending | None) -> None:
+        """Stop all that is under way."""
+        self._visitors.ending = True
+        self._resting.close()
+        for session in self._sessions.values():
+            if session.name not in self._results or self._results[session.name] is not session.result:
+                result = session.close(ending)
+                self._note_end(result, session.main_tree, session.gone)
+        if ending is not None:
+            for entry in self._assigned:
+                self._note_end(_never_began(entry, ending), entry.tree, None)
+        self._publish_events(self._control.end())
+        self._tell_ends()
+
+    def _result(self) -> RunResult:
+        over = sorted(self._over, key=lambda each: each[0].robot_name)
+        aside = self._resting.stepped_aside
+        return RunResult(
+            robots=tuple(replace(result, stepped_aside=result.robot_name in aside) for result, _ in over),
+            ticks=self._ticks,
+            overruns=self._overruns,
+            sim_time_s=self._clock.now() - self._begun_s,
+            wall_time_s=time.perf_counter() - self._begun_wall_s,
+            trees={result.robot_name: tree for result, tree in over},
+            work=self._work.totals(),
+        )
 
 
 def _for_robot(session: Session, trees: Sequence[CompiledTree]) -> Sequence[CompiledTree]:
     return [tree for tree in trees if tree.robot_name == session.name]
+
+
+def _never_began(entry: RunEntry, ending: Ending) -> RobotResult:
+    """The result of a robot whose mission did not begin."""
+    return RobotResult(entry.robot.name, ending.outcome, ending.cause, ending.message, {}, {})
+
+
+def _time_of_day_s() -> float:
+    """The time of day on this machine (s after midnight)."""
+    now = time.localtime()
+    return 3600.0 * now.tm_hour + 60.0 * now.tm_min + now.tm_sec

@@ -2,62 +2,51 @@
 
 from __future__ import annotations
 
-import math
-import traceback
-from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Final
 
-import numpy as np
-
-from executive.record.drawable import stamp
-from executive.record.profile import Profile
-from executive.record.schemas import NAVIGATION, OUTCOME, POSE, STATE
+from executive.record.schemas import OUTCOME
 from executive.run.control import Control
 from executive.run.guarded_robot import GuardedRobot
-from executive.run.journal import Journal
-from executive.run.outcome import Outcome, RobotResult, RobotStatus
-from executive.run.resting import HOLDER
-from executive.run.tree_run import Ending, TreeRun
-from executive.run.watchdog import VerbHung
+from executive.run.outcome import Ending, Outcome, RobotResult
+from executive.run.robot import RunRobot
+from executive.run.traffic import TrafficTable
+from executive.run.tree_run import TreeRun
+from executive.run.visitor import RunEntry, TickNote, Visitors
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
 from executive.tree.compiling.builder import start_key
 from executive.tree.snapshot import NodeState, Snapshot
 from executive.words.slug import slug
-from skills.api import Cause, LayeredView, LocalisationEstimate, ParticleView, SkillContext
+from skills.api import Cause
 from skills.robot import Pose2D
 
-POSE_PERIOD_S = 0.5
-MOST_PARTICLES = 30
 LEASE_PATIENCE_S = 60.0
-_EPSILON_S = 1e-9
-_NOTHING: Final = np.empty((0, 2))
 
 
-class Session:
-    """One robot. The runner calls `sense`, `may_move` and `tick` or `hold` in turn until `finished`, then `close`."""
+class Session(RunRobot):
+    """One robot with a mission. The runner calls `sense`, `may_move` and `tick` or `hold` in turn until `finished`,
+    then `close`.
+
+    `gone` says why nothing more is asked of the robot once its mission is over: its lease is another's, or a verb
+    failed. `note` is what the last tick brought of the mission that the robot began with.
+    """
 
     def __init__(
         self,
-        tree: CompiledTree,
+        entry: RunEntry,
         context: RunContext,
-        robot: GuardedRobot,
+        guarded: GuardedRobot,
+        traffic: TrafficTable,
         control: Control,
-        journal: Journal | None = None,
-        profile: Profile | None = None,
-        *,
-        speaker_W: Pose2D | None = None,
+        visitors: Visitors,
     ) -> None:
-        """`speaker_W` is where whoever asked for it stands; None: where the robot begins."""
-        self.name: Final = context.robot.name
-        if speaker_W is not None:
-            context.board.put(start_key(tree.robot_name, tree.mission_name), speaker_W)
-        self.context = context
-        self._robot, self._control, self._profile = robot, control, profile
-        self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal, profile),)
+        super().__init__(context, guarded, traffic)
+        if entry.speaker_W is not None:
+            context.board.put(start_key(entry.tree.robot_name, entry.tree.mission_name), entry.speaker_W)
+        self.after = entry.after
+        self._control, self._visitors = control, visitors
+        self._stack: tuple[TreeRun, ...] = (TreeRun(entry.tree, context, visitors),)
         self._given_up: tuple[TreeRun, ...] = ()
         self._held = False
         self._lost_since_s: float | None = None
@@ -65,10 +54,9 @@ class Session:
         self._later: tuple[CompiledTree, ...] = ()
         self._cancelled: tuple[Ending, float] | None = None  # and when it is over at the latest
         self.result: RobotResult | None = None
-        self._pose_due_s = context.clock.now()
+        self.gone: str | None = None
+        self.note: TickNote | None = None
         self._asked_at: Pose2D | None = None
-        self._matched_s = -math.inf
-        self._navigation: Mapping[str, object] = {}
 
     @property
     def tree(self) -> CompiledTree:
@@ -96,72 +84,79 @@ class Session:
         return self._stack[0].tree
 
     @property
-    def status(self) -> RobotStatus:
-        """Where the robot is and whether it holds something."""
-        return RobotStatus(self.context.known_pose(), self.context.robot.gripper().holding)
-
-    @property
     def waiting_at(self) -> str | None:
         """The breakpoint that the mission under way waits at."""
         return self._top.waiting_at
 
     def sense(self) -> None:
         """Bring the estimators up to date, and log pose and state twice a second."""
-        context = self.context
-        context.localiser.update(context.robot)
-        estimate = context.localiser.estimate()
-        context.costmap.update(context.robot, estimate)
-        if estimate.stamp_s != self._matched_s:
-            self._matched_s = estimate.stamp_s
-            context.work.count("scan_matches")
-        self._asked_at = self._asked_at or context.known_pose()
-        if context.clock.now() >= self._pose_due_s - _EPSILON_S:
-            self._pose_due_s += POSE_PERIOD_S
-            self._publish_pose()
-            self._publish_state(estimate)
-            self._publish_navigation()
+        super().sense()
+        self._asked_at = self._asked_at or self.context.known_pose()
+        self.report()
 
     def may_move(self) -> bool:
         """Whether the lease counts. A lost one suspends the mission until it can be had again.
 
         Raises nothing; when that takes longer than LEASE_PATIENCE_S, the session is closed with cause EXECUTION.
         """
-        lost = self._robot.lease_lost()
+        lost, now_s = self._guarded.lease_lost(), self.context.clock.now()
+        if self._cancelled is not None and now_s >= self._cancelled[1]:
+            self.close()
+            return False
         if lost is None:
             return True
-        now_s = self.context.clock.now()
         if self._lost_since_s is None:
             self._lost_since_s = now_s
             self._top.suspend()
             self._control.lease_lost(self.name, lost)
-        if self._robot.regain_lease():
+        if self._guarded.regain_lease():
             self._lost_since_s = None
             self._control.lease_lost(self.name, None)
             return True
         if now_s - self._lost_since_s > LEASE_PATIENCE_S:
             message = f"{lost} and did not give it back within {LEASE_PATIENCE_S:g} s"
             self._control.lease_lost(self.name, None)
+            self.gone = message
             self.close(Ending(Outcome.FAILURE, Cause.EXECUTION, message))
         return False
 
     def tick(self, breakpoints: frozenset[str]) -> bool:
         """Tick the mission under way once; True when a node changed its status. Its end takes up the one before.
 
-        What a mission that was given up always does in the end comes first.
+        What a mission that was given up or cancelled always does in the end comes first.
         """
         self._held = False
+        run = self._top
+        if self._cancelled is not None or self._given_up:
+            run, breakpoints = next(run for run in self._runs if run.ends), frozenset()
+        changed = run.tick(breakpoints)
+        self.note = self._stack[0].note(ticked=run is self._stack[0])
         if self._cancelled is not None:
-            return self._tick_cancelled(*self._cancelled)
-        if self._given_up:
-            return self._tick_given_up(self._given_up[0])
-        changed = self._top.tick(breakpoints)
+            if not self.ends:
+                self.close()
+        elif self._given_up:
+            self._leave_given_up(run)
+        else:
+            self._go_on_after_the_top()
+        return changed
+
+    def _leave_given_up(self, run: TreeRun) -> None:
+        if not run.ends:
+            run.halt(self.attempt)
+            self._given_up = self._given_up[1:]
+
+    def _go_on_after_the_top(self) -> None:
+        """Where the mission under way has ended, take up the one before, or begin the next."""
         if self._top.finished and len(self._stack) > 1:
-            self._take_up_the_one_before()
+            done = self._top
+            done.halt(self.attempt)
+            self._note_end(done.judge(None))
+            self._stack = self._stack[:-1]
+            self._top.show()
         if self._top.finished and self._later:
             tree, *later = self._later
             self._later = tuple(later)
             self._begin(tree, self._start_of(self._top))
-        return changed
 
     @property
     def waits_for_people(self) -> bool:
@@ -171,51 +166,30 @@ class Session:
     @property
     def ends(self) -> bool:
         """True while missions that were ended early still do what is always done in the end."""
-        return self.result is None and any(run.ends for run in (*self._given_up, *self._stack))
+        return self.result is None and any(run.ends for run in self._runs)
 
-    def end_early(self) -> None:
-        """Stop all missions where they are; what is always done in the end is left to `tick_end`."""
-        for run in reversed(self._stack):
-            run.end_early()
+    def cancel(self, ending: Ending, limit_s: float) -> None:
+        """End all missions of this robot where they are; idempotent.
 
-    def tick_end(self) -> None:
-        """Tick once what is always done in the end, of the latest mission first."""
-        self._held = False
-        run = next((run for run in (*self._given_up, *reversed(self._stack)) if run.ends), None)
-        if run is not None:
-            run.tick(frozenset())
-
-    def cancel(self, reason: str, limit_s: float) -> None:
-        """End all missions of this robot; what they always do in the end is done by `tick`, for so long (s) at most.
-
-        Once more: at once.
+        What they always do in the end is done by `tick`, for so long (s) at most.
         """
-        ending = Ending(Outcome.CANCELLED, Cause.CANCELLED, reason)
         if self._cancelled is None:
             self._cancelled = ending, self.context.clock.now() + limit_s
-            self._attempt("stop the trees", self.end_early)
-            if self.ends:
-                return
-        self.close(self._cancelled[0])
+            for run in reversed(self._stack):
+                self.attempt("stop the tree", run.end_early)
+            if not self.ends:
+                self.close()
 
-    def _tick_cancelled(self, ending: Ending, until_s: float) -> bool:
-        self.tick_end()
-        if not self.ends or self.context.clock.now() >= until_s:
-            self.close(ending)
-        return True
-
-    def _tick_given_up(self, run: TreeRun) -> bool:
-        changed = run.tick(frozenset())
-        if not run.ends:
-            run.halt(self._attempt)
-            self._given_up = self._given_up[1:]
-        return changed
+    @property
+    def cancelled(self) -> bool:
+        """Whether the missions were ended early."""
+        return self._cancelled is not None
 
     def hold(self) -> None:
         """Suspend the mission and stop the robot; done once until the next tick."""
         if not self._held:
             self._held = True
-            for run in (*self._given_up, *self._stack):
+            for run in self._runs:
                 run.suspend()
             if self._lost_since_s is None:
                 self.context.robot.stop(lease=self.context.lease)
@@ -244,52 +218,38 @@ class Session:
     def _give_up_for(self, tree: CompiledTree) -> None:
         self.hold()
         given_up = self._top
-        self._attempt("stop the tree", given_up.end_early)
+        self.attempt("stop the tree", given_up.end_early)
         if given_up.ends:
             self._given_up += (given_up,)
         else:
-            given_up.halt(self._attempt)
+            given_up.halt(self.attempt)
         self._stack = self._stack[:-1]
         self._control.mission_ended(self.name)
-        journal = None if self._stack or given_up.journal is None else given_up.journal.replaced(tree)
-        given_up.journal = None
-        self._begin(tree, self._start_of(given_up), journal)
+        self._begin(tree, self._start_of(given_up))
         message = f"given up for '{tree.mission_name}'"
         self._note_result(given_up.judge(Ending(Outcome.CANCELLED, Cause.CANCELLED, message)))
 
     def close(self, ending: Ending | None = None) -> RobotResult:
         """Stop the trees and the robot, give the lease back, log the end. Idempotent; raises nothing."""
         if self.result is None:
-            for run in (*self._given_up, *reversed(self._stack)):
-                run.halt(self._attempt)
-            context = self.context
-            self._attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
-            self._attempt("return the lease", self._robot.give_lease_back)
+            ending = ending if self._cancelled is None else self._cancelled[0]
+            for run in self._runs:
+                run.halt(self.attempt)
+            self.stop_and_leave()
             for run in reversed(self._stack[1:]):
                 self._note_end(run.judge(ending))
             self._stack = self._stack[:1]
             self.result = self._top.judge(ending, self._preempting)
         return self.result
 
-    def rest(self) -> SkillContext:
-        """Claim the lease again after the end: what may be used to step aside for others. Raises LeaseError."""
-        self.context = replace(self.context, lease=self._robot.claim(HOLDER))
-        return self.context
-
-    def leave(self) -> None:
-        """Stop the robot and give back the lease that `rest` claimed."""
-        context = self.context
-        self._attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
-        self._attempt("return the lease", self._robot.give_lease_back)
-
-    def log_end(self, ticks: int) -> None:
-        """Write the outcome to the log."""
-        assert self.result is not None
-        self._publish_outcome(self.result, ticks)
-
     @property
     def _top(self) -> TreeRun:
         return self._stack[-1]
+
+    @property
+    def _runs(self) -> tuple[TreeRun, ...]:
+        """All trees, those that were given up first, then the one under way and those below it."""
+        return (*self._given_up, *reversed(self._stack))
 
     def _start_of(self, run: TreeRun) -> Pose2D | None:
         """Where a mission began: where it noted that, else where the robot stood at first."""
@@ -297,20 +257,13 @@ class Session:
         start: Pose2D | None = run.context.board.get(key) if key in run.context.board else self._asked_at
         return start
 
-    def _begin(self, tree: CompiledTree, start: Pose2D | None = None, journal: Journal | None = None) -> None:
+    def _begin(self, tree: CompiledTree, start: Pose2D | None = None) -> None:
         self._held = False
         context = replace(self.context, board=Board(slug(tree.robot_name)))
         if start is not None:
             context.board.put(start_key(tree.robot_name, tree.mission_name), start)
-        self._stack = (*self._stack, TreeRun(tree, context, journal, self._profile))
+        self._stack = (*self._stack, TreeRun(tree, context, self._visitors))
         self._control.mission_begun(self.name, tree)
-
-    def _take_up_the_one_before(self) -> None:
-        done = self._top
-        done.halt(self._attempt)
-        self._note_end(done.judge(None))
-        self._stack = self._stack[:-1]
-        self._top.show()
 
     def _note_end(self, result: RobotResult) -> None:
         """A mission that came in between is over."""
@@ -319,63 +272,4 @@ class Session:
 
     def _note_result(self, result: RobotResult) -> None:
         self._preempting += (result,)
-        self._publish_outcome(result, None)
-
-    def _publish_outcome(self, result: RobotResult, ticks: int | None) -> None:
-        end = {"robot": self.name, "outcome": result.outcome, "cause": result.cause, "message": result.message}
-        more: Mapping[str, object] = {"mission": result.mission} if ticks is None else {"ticks": ticks}
-        self.context.publish(OUTCOME, {**end, "answers": result.answers, **more})
-
-    def _publish_pose(self) -> None:
-        X_WB, estimate = self.context.X_WB(), self.context.localiser.estimate()
-        p, q = X_WB.translation(), X_WB.rotation().ToQuaternion()
-        flat = Pose2D.from_transform(X_WB)
-        self.context.publish(
-            POSE,
-            {
-                "timestamp": stamp(self.context.clock.now()),
-                "frame_id": "world",
-                "robot": self.name,
-                "pose": {
-                    "position": {"x": p[0], "y": p[1], "z": p[2]},
-                    "orientation": {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()},
-                },
-                "yaw_rad": flat.yaw_rad,
-                "covariance": estimate.covariance.ravel().tolist(),
-            },
-        )
-
-    def _publish_state(self, estimate: LocalisationEstimate) -> None:
-        """What an operator looks at: the gripper, the battery, the speed, and how well the place is known."""
-        robot = self.context.robot
-        self.context.publish(
-            STATE,
-            {
-                "robot": self.name,
-                "holding": robot.gripper().holding,
-                "charge": round(robot.battery().charge, 4),
-                "speed_m_s": round(math.hypot(*robot.odometry().velocity[:2]), 3),
-                "localised": estimate.localised,
-                "localisation_health": round(estimate.health, 3),
-                "position_sigma_m": round(math.sqrt(estimate.covariance[0, 0] + estimate.covariance[1, 1]), 4),
-            },
-        )
-
-    def _publish_navigation(self) -> None:
-        """Where else the robot may be, and what it sees that the map does not have (m); when either is new."""
-        localiser, costmap = self.context.localiser, self.context.costmap
-        particles = localiser.particles_W(MOST_PARTICLES) if isinstance(localiser, ParticleView) else _NOTHING
-        seen = costmap.seen_m() if isinstance(costmap, LayeredView) else _NOTHING
-        columns = np.round(np.concatenate([particles[:, :2].T, seen.T], axis=1), 2)
-        (x, y), count = columns.tolist(), len(particles)
-        new = {"particle_x": x[:count], "particle_y": y[:count], "seen_x": x[count:], "seen_y": y[count:]}
-        if new != self._navigation:
-            self._navigation = new
-            self.context.publish(NAVIGATION, {"robot": self.name, **new})
-
-    def _attempt(self, what: str, call: Callable[[], object]) -> None:
-        """Do it; a defect goes to the log, since the rest of the end must still happen."""
-        try:
-            call()
-        except (Exception, VerbHung):
-            self.context.publish(ERROR_TOPIC, {"node": self.name, "what": what, "traceback": traceback.format_exc()})
+        self.context.publish(OUTCOME, {**result.message_of_end(), "mission": result.mission})

@@ -113,8 +113,10 @@ class TrafficTable:
 
     def news(self) -> Iterator[Mapping[str, Any]]:
         """For each robot whose path has changed since the last call: its name, its turn (None: nothing is reserved),
-        and the path that lies ahead as points x, y (m in the world), for the log.
+        and the path that lies ahead as points x, y (m in the world), for the log. Of a robot that is alone, nothing.
         """
+        if len(self._robots) < 2:
+            return
         for name, robot in self._robots.items():
             path = np.empty((0, 2)) if robot.path is None or self._silent(robot) else _thinned(robot.path[:, :2])
             x, y = np.round(path, 2).T.tolist()

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from py_trees.common import Status
 
-from executive.record.profile import Profile
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.executions import Executions
 from executive.run.findings import Findings, claim, told
-from executive.run.journal import Journal, TickNote
-from executive.run.outcome import Outcome, RobotResult
+from executive.run.outcome import Ending, Outcome, RobotResult
+from executive.run.visitor import TickNote, Visitors
 from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.context import Endings, RunContext
 from executive.tree.behaviours.decisions import Decide, WaitFor, buttons_of
@@ -33,26 +32,18 @@ POSE_NOTE_PERIOD_S = 1.0
 Attempt = Callable[[str, Callable[[], object]], None]
 
 
-@dataclass(frozen=True)
-class Ending:
-    """An end that a tree did not come to by itself."""
-
-    outcome: Outcome
-    cause: Cause
-    message: str
-
-
 class TreeRun:
-    """One tree, built and ticked. Its nodes' last states are in `states`; a journal hears of every tick."""
+    """One tree, built and ticked. Its nodes' last states are in `states`."""
 
-    def __init__(
-        self, tree: CompiledTree, context: RunContext, journal: Journal | None = None, profile: Profile | None = None
-    ) -> None:
+    def __init__(self, tree: CompiledTree, context: RunContext, visitors: Visitors) -> None:
         self.tree = tree
-        names = tree.robot_name, tree.mission_name
-        self._findings = Findings(context.publish, context.clock, context.board, *names)
-        self.context = context = replace(context, publish=self._findings, endings=Endings())
-        self.journal = journal
+        findings, publish = Findings(context.clock, context.board, tree.robot_name, tree.mission_name), context.publish
+        self._findings = findings
+        self.context = context = replace(
+            context,
+            publish=lambda topic, message: publish(topic, findings.message(topic, message)),
+            endings=Endings(),
+        )
         self.root = tree.build(context)
         self._ended_early = self._suspended = False
         self._endings: list[str] = []
@@ -66,12 +57,11 @@ class TreeRun:
         )
         self._skills = {leaf.path_id: leaf for leaf in self._leaves}
         self._running = {path_id: leaf for path_id, leaf in self._skills.items() if leaf.status is Status.RUNNING}
-        if profile is not None:
-            for leaf in self._leaves:
-                profile.attach("skills", leaf, "initialise", "update", "terminate")
+        self._changes: Sequence[Change] = ()
         self._pose_due_s = -math.inf
         self._gates: dict[str, Gate] = {}
         self._breakpoints: frozenset[str] = frozenset()
+        visitors.mission_begun(self._observed.nodes, context)
         self.show()
 
     @property
@@ -105,13 +95,24 @@ class TreeRun:
         if not breakpoints <= self._gates.keys():
             self._set_gates(breakpoints)
         self._tick()
-        changes = self.log_changes()
-        for change in changes:
+        self._changes = self.log_changes()
+        for change in self._changes:
             self._note_running(change)
-        self._executions.after_tick(change.path_id for change in changes)
-        if self.journal is not None:
-            self.journal.note(self._tick_note(changes))
-        return bool(changes)
+        self._executions.after_tick(change.path_id for change in self._changes)
+        return bool(self._changes)
+
+    def note(self, *, ticked: bool) -> TickNote:
+        """What the last tick brought; of a mission that another comes before, nothing was `ticked`."""
+        context, changes = self.context, self._changes
+        now_s, board = context.clock.now(), context.board.values()
+        if not ticked:
+            return TickNote(self.tree, now_s, (), board, None, {})
+        checkpoints = {path_id: kept for path_id, leaf in self._running.items() if (kept := leaf.checkpoint)}
+        pose = charge = None
+        if changes or now_s >= self._pose_due_s:
+            self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.known_pose()
+            charge = context.robot.battery().charge
+        return TickNote(self.tree, now_s, changes, board, pose, checkpoints, charge)
 
     def _note_running(self, change: Change) -> None:
         if change.path_id not in self._skills:
@@ -235,15 +236,6 @@ class TreeRun:
 
     def _closed(self, path_id: str) -> Callable[[], bool]:
         return lambda: path_id in self._breakpoints
-
-    def _tick_note(self, changes: Sequence[Change]) -> TickNote:
-        context = self.context
-        checkpoints = {path_id: kept for path_id, leaf in self._running.items() if (kept := leaf.checkpoint)}
-        now_s, pose, charge = context.clock.now(), None, None
-        if changes or now_s >= self._pose_due_s:
-            self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.known_pose()
-            charge = context.robot.battery().charge
-        return TickNote(now_s, changes, context.board.values(), pose, checkpoints, charge)
 
     def _transition(self, change: Change) -> dict[str, object]:
         after = change.after

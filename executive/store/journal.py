@@ -12,7 +12,7 @@ from typing import Any, Final
 from py_trees.common import Status
 
 from executive.mission.request import Request
-from executive.run.journal import TickNote
+from executive.run.visitor import Progress, RunVisitor, TickNote
 from executive.store.database import transaction
 from executive.store.memory import Recollection, StepRecord
 from executive.store.values import form, to_text
@@ -32,8 +32,8 @@ last_charge = coalesce(:last, last_charge), ended = NULL WHERE id = :id
 """
 
 
-class StoreJournal:
-    """Implements `executive.run.journal.Journal`.
+class StoreJournal(RunVisitor):
+    """Keeps the mission of one robot in the store, from tick to tick.
 
     What cannot be written now, since another program holds the store, is written with a later tick: the robot's work
     does not wait for it. `troubles` lists what could not be kept.
@@ -52,22 +52,22 @@ class StoreJournal:
         self._charges: tuple[float, float] | None = None  # the lowest so far, and the last
         self._recollection: Recollection | None = None
         self._request_of: Callable[[CompiledTree], Request] | None = None
+        self._tree: CompiledTree | None = None
         self.keep_world: Callable[[], None] = _no_world
         self.troubles: list[str] = []
 
-    def replaceable(self, request_of: Callable[[CompiledTree], Request]) -> StoreJournal:
+    def replaceable(self, tree: CompiledTree, request_of: Callable[[CompiledTree], Request]) -> StoreJournal:
         """The journal of a mission whose place another may take; `request_of` gives that one's request."""
-        self._request_of = request_of
+        self._tree, self._request_of = tree, request_of
         return self
 
-    def replaced(self, tree: CompiledTree) -> StoreJournal:
-        """Keep the mission that takes this one's place in its stead, with nothing done of it yet."""
-        journal = StoreJournal(self._connection, self._mission, self._robot, main=self._main)
-        journal.troubles, journal.keep_world = self.troubles, self.keep_world
+    def _replace(self, tree: CompiledTree) -> None:
+        """Keep the mission that has taken the place of another in its stead, with nothing done of it yet."""
+        self._board, self._written, self._steps, self._values, self._checkpoints = {}, {}, {}, {}, {}
+        self._pose = self._charges = self._recollection = None
         if self._request_of is None:
-            return journal
+            return
         text = self._request_of(tree).to_json()
-        journal.replaceable(self._request_of)
         try:
             with transaction(self._connection):
                 for table, key in (("step", "path_id"), ("value", "key")):
@@ -80,15 +80,24 @@ class StoreJournal:
                     self._connection.execute(put, (_json(self._robot), text, self._mission))
         except sqlite3.Error as error:
             self._trouble(f"the mission that took this one's place could not be kept ({error})")
-        return journal
 
-    def remembering(self, recollection: Recollection) -> StoreJournal:
-        """The journal of a run that goes on from an earlier one: what that knew stays until it has been used."""
-        self._recollection = recollection
+    def remembering(self, recollection: Recollection, tree: CompiledTree | None = None) -> StoreJournal:
+        """The journal of a run that goes on from an earlier one with a tree: what that knew stays until it has been
+        used."""
+        self._recollection, self._tree = recollection, tree
         return self
 
-    def note(self, note: TickNote) -> None:
+    def tick(self, progress: Progress) -> None:
         """Keep what a tick brought."""
+        for name, note in progress.notes.items():
+            if self._robot in (None, name):
+                self.note(note)
+
+    def note(self, note: TickNote) -> None:
+        """Keep what a tick brought of the mission."""
+        if self._tree is not None and note.tree is not self._tree:
+            self._replace(note.tree)
+        self._tree = note.tree
         self._take_steps(note)
         self._take_values(note.board)
         self._take_charge(note.charge)

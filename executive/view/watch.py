@@ -10,7 +10,7 @@ from typing import Any, Final
 from py_trees.common import Status
 
 from executive.run.control import Control, Mode
-from executive.run.runner import Progress
+from executive.run.visitor import Progress, RunVisitor
 from executive.tree.snapshot import NodeState, Snapshot
 from executive.view.actions import control_json
 from executive.view.feed import Feed
@@ -20,14 +20,14 @@ SEND_LIMIT_S: Final = 0.2
 _LOOK_AGAIN_S: Final = 0.5
 
 
-class ProgressWatch:
-    """An observer of the runner: tells a few times a second what is done just now, and lets the page keep up."""
+class ProgressWatch(RunVisitor):
+    """Tells a few times a second what is done just now, and lets the page keep up."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
         self._told_s = 0.0
 
-    def __call__(self, progress: Progress) -> None:
+    def tick(self, progress: Progress) -> None:
         """Tell it when it is time again; wait a moment for what was logged to be sent."""
         now = time.perf_counter()
         if now - self._told_s >= PROGRESS_PERIOD_S:

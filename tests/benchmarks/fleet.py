@@ -36,7 +36,8 @@ from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.record.reader import Event, read_events
 from executive.run.outcome import Outcome
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.compiler import compile_mission
@@ -55,6 +56,7 @@ from tests.executive.conftest import (
     StillLocaliser,
     scripted_skill,
 )
+from tests.visitors import OnTick
 
 WORLD = "flat"
 NAMES = ("alice", "bob", "carol", "dave", "erin", "frank")
@@ -194,19 +196,20 @@ def _cycles_s(robots: int) -> list[float]:
     clock, ends = ManualClock(), []
     with tempfile.TemporaryDirectory() as folder, MissionStore(Path(folder) / "missions.sqlite") as store:
         log = EventLog(Path(folder) / "log.mcap", clock)
-        entries = []
+        entries, visitors = [], [log]
         for name in map(str.title, NAMES[:robots]):
             request = Request(name="fetch drink", world_name=WORLD, robot=name, out=Path(folder), commands=FETCH)
-            journal = store.journal(store.add(request, queued=False).id)
+            visitors.append(store.journal(store.add(request, queued=False).id, name))
             robot = ScriptedRobot(clock, name)
-            entries.append(RunEntry(_fetch(name), robot, StillLocaliser(), EmptyCostmap(), journal))
+            entries.append(RunEntry(_fetch(name), robot, StillLocaliser(), EmptyCostmap()))
         with LockStepWorker(clock) as worker:
             settings = RunSettings(tick_period_s=0.05)
 
             def observe(_: object) -> None:
                 ends.append(time.thread_time())
 
-            result = run(entries, clock=clock, worker=worker, publish=log, settings=settings, observer=observe)
+            visitors.append(OnTick(observe))
+            result = run(entries, clock=clock, worker=worker, visitors=visitors, settings=settings)
         log.close()
     assert result.outcome is Outcome.SUCCESS, result.worst.message
     return [after - before for before, after in itertools.pairwise(ends)]

@@ -26,7 +26,7 @@ from executive.app.durable import STORE, new_run
 from executive.app.prepare import prepare
 from executive.app.simulated import run_simulated
 from executive.mission.request import Request
-from executive.run.runner import Progress
+from executive.run.visitor import Progress, RunVisitor
 from executive.store.missions import MissionStore
 
 MISSION = """name: long round
@@ -55,8 +55,8 @@ class Report:
     real_time_factor: float
 
 
-class Watch:
-    """Reports the process every so many seconds of the robot's clock; an observer for the runner."""
+class Watch(RunVisitor):
+    """Reports the process every so many seconds of the robot's clock."""
 
     def __init__(self, period_s: float, *, top: int = 0) -> None:
         self.reports: list[Report] = []
@@ -64,7 +64,7 @@ class Watch:
         self._at_s, self._wall_s, self._written = 0.0, time.monotonic(), written_bytes()
         self._first: tracemalloc.Snapshot | None = None
 
-    def __call__(self, progress: Progress) -> None:
+    def tick(self, progress: Progress) -> None:
         """Report when it is time again."""
         if progress.now_s - self._at_s >= self._period_s:
             self._report(progress.now_s)
@@ -122,7 +122,7 @@ def run(
     with MissionStore(out / STORE) as store:
         mission = store.add(prepared.request.from_anywhere(), queued=False)
         store.begin(mission.id)
-        finished = run_simulated(prepared, observer=watch, durable=new_run(store, mission, prepared))
+        finished = run_simulated(prepared, visitors=[watch], durable=new_run(store, mission, prepared))
     return summary(watch.reports, finished.report.outcome, out)
 
 

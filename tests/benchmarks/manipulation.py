@@ -31,7 +31,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -44,11 +44,11 @@ from errand_train.detector.scoring import Judged
 from executive.app.assembly import run_entry, simulate
 from executive.app.robots import only_robot
 from executive.app.worlds import knowledge_of
-from executive.run.journal import TickNote
 from executive.run.outcome import Outcome, RobotResult
-from executive.run.runner import RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import Progress, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
-from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
 from executive.words.steps import Mission, MissionStep
@@ -63,6 +63,7 @@ from skills.perception.class_forms import THING
 from skills.robot import FloatArray, Picture
 from tests.benchmarks.manipulation_room import SECOND, SURFACES, TAKEN, room
 from tests.benchmarks.shapes import written_shape
+from tests.visitors import OnMessage
 
 ResultT = TypeVar("ResultT")
 ReadT = TypeVar("ReadT")
@@ -159,21 +160,17 @@ class TimedWorker:
 
 
 @dataclass
-class LastSpot:
-    """A journal that keeps where the place skill last lowered something: x and y (m) in the world, None for nowhere."""
+class LastSpot(RunVisitor):
+    """Keeps where the place skill last lowered something: x and y (m) in the world, None for nowhere."""
 
     spot_W: tuple[float, float] | None = None
 
-    def note(self, note: TickNote) -> None:
+    def tick(self, progress: Progress) -> None:
         """Keep the spot of a running skill's checkpoint."""
-        for checkpoint in note.checkpoints.values():
+        for checkpoint in (each for note in progress.notes.values() for each in note.checkpoints.values()):
             if "spot_W" in checkpoint:
                 x, y = checkpoint["spot_W"]
                 self.spot_W = (x, y)
-
-    def replaced(self, tree: CompiledTree) -> LastSpot:
-        """The same."""
-        return self
 
 
 @dataclass(frozen=True)
@@ -192,15 +189,20 @@ def run_texts(simulation: Simulation, world: World, texts: Sequence[str], seed: 
     mission = Mission("trial", str(world.folder), ROBOT, steps)
     tree = compile_mission(mission, knowledge=knowledge_of(world), registry=built_in_skills())
     spot = LastSpot()
-    entry = replace(run_entry(simulation, world, tree), journal=spot)
+    entry = run_entry(simulation, world, tree)
     clock, notes = simulation.clock, list[tuple[float, Mapping[str, Any]]]()
+
+    def note(topic: str, message: Mapping[str, Any]) -> None:
+        if topic == "transitions":
+            notes.append((clock.now(), message))
+
     with LockStepWorker(clock) as lock_step:
         worker = TimedWorker(lock_step)
         result = run(
             [entry],
             clock=clock,
             worker=worker,
-            publish=lambda topic, message: notes.append((clock.now(), message)) if topic == "transitions" else None,
+            visitors=[spot, OnMessage(note)],
             settings=RunSettings(seed=seed, time_limit_s=600.0),
         ).worst
     return Ran(result, notes, spot.spot_W, worker.spent_s)

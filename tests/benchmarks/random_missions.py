@@ -30,9 +30,9 @@ from typing import Any
 from executive.app.goal_conditions import verdict_of
 from executive.mission.request import Request
 from executive.run.control import Control
-from executive.run.journal import TickNote
 from executive.run.outcome import Outcome, RunResult
-from executive.run.runner import Progress, RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import Progress, RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.store.resuming import resumed_tree
@@ -71,6 +71,7 @@ from skills.speak.skill import SpeakInputs
 from tests.benchmarks.scripted_world import WORLD, Clock, ScriptedWorld, expected
 from tests.executive.conftest import PORTS, EmptyCostmap, ManualClock, Script, ScriptedRobot, StillLocaliser
 from tests.executive.conftest import default_end as usual_end
+from tests.visitors import OnMessage
 
 LYING, ACCIDENTS = 0.05, 0.01
 TICK_S, LIMIT_S, ENDINGS_S = 0.5, 120.0, 30.0
@@ -389,7 +390,7 @@ class Robotics:
         return done
 
 
-class Operator:
+class Operator(RunVisitor):
     """Does things at random while a mission runs; every pause ends, and every button is released.
 
     A `calm` one leaves what is in the gripper alone.
@@ -414,7 +415,7 @@ class Operator:
 
         control.ask = ask  # type: ignore[method-assign]
 
-    def __call__(self, progress: Progress) -> None:
+    def tick(self, progress: Progress) -> None:
         """Look at the run after a tick, and perhaps do something."""
         rng, control, ticks = self.rng, self.control, progress.ticks
         if ticks > MOST_TICKS:
@@ -525,15 +526,15 @@ class KilledError(BaseException):
     stops_run = True
 
 
-class KillingJournal:
+class KillingJournal(RunVisitor):
     """Passes notes on, and kills after some of them."""
 
     def __init__(self, journal: Any, kill_after: int) -> None:
         self.journal, self.left = journal, kill_after
 
-    def note(self, note: TickNote) -> None:
+    def tick(self, progress: Progress) -> None:
         """A tick is over."""
-        self.journal.note(note)
+        self.journal.tick(progress)
         self.left -= 1
         if self.left <= 0:
             raise KilledError
@@ -593,10 +594,10 @@ def _run(
 
     with LockStepWorker(clock) as worker:
         result = run(
-            [RunEntry(tree, robot, StillLocaliser(), EmptyCostmap(), journal)],  # type: ignore[arg-type]
+            [RunEntry(tree, robot, StillLocaliser(), EmptyCostmap())],  # type: ignore[arg-type]
             clock=clock,
             worker=worker,
-            publish=publish,
+            visitors=[OnMessage(publish), *([] if journal is None else [journal]), operator],
             settings=RunSettings(
                 seed=seed,
                 tick_period_s=TICK_S,
@@ -605,7 +606,6 @@ def _run(
                 time_of_day_s=8 * 3600.0,
             ),
             control=control,
-            observer=operator,
         )
     told = tuple(entry for entry in log if entry[0] != "wall")
     wrong = tuple(_wrong(result, told, robotics, operator, tree))

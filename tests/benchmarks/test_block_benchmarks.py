@@ -10,7 +10,8 @@ import time
 
 import pytest
 
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.words.blocks import Choose, Group, Handler, Repeat, Set, Together, Try, Wait
@@ -29,6 +30,7 @@ from tests.executive.conftest import (
     StillLocaliser,
     scripted_skill,
 )
+from tests.visitors import OnTick
 
 WORLD = Knowledge.model_validate(KNOWLEDGE)
 FULL = ValueIs(Expression("battery > 0.1 and n < 100000"))
@@ -105,9 +107,8 @@ def test_a_tick_of_a_tree_of_a_thousand_nodes(benchmark):
             [entry],
             clock=clock,
             worker=LockStepWorker(clock),
-            publish=lambda topic, message: None,
             settings=RunSettings(time_limit_s=20.0),
-            observer=ticked,
+            visitors=[OnTick(ticked)],
         )
 
     benchmark.pedantic(whole, rounds=1)

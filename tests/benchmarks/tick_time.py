@@ -20,7 +20,8 @@ import numpy as np
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.run.control import Control
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
@@ -38,6 +39,7 @@ from tests.executive.conftest import (
     StillLocaliser,
     scripted_skill,
 )
+from tests.visitors import OnTick
 
 TICK_S = 0.05
 _FIRST = 5  # ticks in which much begins
@@ -69,13 +71,12 @@ def ticks_of_a_run(tree, folder, most=None):
     with MissionStore(folder / "missions.sqlite") as store, LockStepWorker(clock) as worker:
         journal = store.journal(store.add(request, queued=False).id)
         result = run(
-            [RunEntry(tree, ScriptedRobot(clock), StillLocaliser(), EmptyCostmap(), journal)],
+            [RunEntry(tree, ScriptedRobot(clock), StillLocaliser(), EmptyCostmap())],
             clock=clock,
             worker=worker,
-            publish=log,
+            visitors=[log, journal, OnTick(observe)],
             settings=RunSettings(tick_period_s=TICK_S),
             control=control,
-            observer=observe,
         )
     log.close()
     return result, [after - before for before, after in itertools.pairwise(ends)]

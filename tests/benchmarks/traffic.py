@@ -23,7 +23,7 @@ from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
-from executive.run.runner import Progress
+from executive.run.visitor import Progress, RunVisitor
 from executive.words.robots import RobotConfig
 from skills.robot import Pose2D
 from tests.benchmarks.traffic_cases import meeting, missions
@@ -33,14 +33,14 @@ TIME_LIMIT_S = 400.0
 
 
 @dataclass
-class Standing:
-    """An observer of how long no robot has moved (s)."""
+class Standing(RunVisitor):
+    """Sees how long no robot has moved (s)."""
 
     longest_s: float = 0.0
     _last: dict[str, Pose2D] = field(default_factory=dict)
     _moved_s: float = 0.0
 
-    def __call__(self, progress: Progress) -> None:
+    def tick(self, progress: Progress) -> None:
         """Take in a tick."""
         for name, status in progress.robots.items():
             pose, last = status.pose, self._last.get(name)
@@ -92,7 +92,7 @@ def run_case(what: str, number: int, out: Path) -> Result:
     here = prepared.world if what == "missions" else prepared.world.without_people()
     backend = SimulatedBackend(here, prepared.robots, seed=number, record=False)
     standing = Standing()
-    report = run_request(prepared, backend, observer=standing).report
+    report = run_request(prepared, backend, visitors=[standing]).report
     seen = [each.referee for each in report.robots.values() if each.referee is not None]
     return Result(
         what,

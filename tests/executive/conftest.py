@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
@@ -45,6 +46,7 @@ from skills.robot import (
     Pose2D,
 )
 from skills.testing.robot import BASE_ONLY
+from tests.visitors import OnMessage, OnTick
 
 
 class ManualClock:
@@ -449,15 +451,12 @@ def run_tree(clock: ManualClock, robot: ScriptedRobot, published: list[Any]) -> 
     def runner(tree: CompiledTree, **options: Any) -> Any:
         settings = replace(RunSettings(seed=3), **options.pop("settings", {}))
         localiser = options.pop("localiser", None) or StillLocaliser()
-        entry = RunEntry(tree, robot, localiser, EmptyCostmap(), journal=options.pop("journal", None))  # type: ignore[arg-type]
-        return run(
-            [entry],
-            clock=clock,
-            worker=LockStepWorker(clock),
-            publish=options.pop("publish", lambda topic, message: published.append((topic, message))),
-            settings=settings,
-            **options,
-        )
+        entry = RunEntry(tree, robot, localiser, EmptyCostmap())  # type: ignore[arg-type]
+        observer, log = options.pop("observer", None), options.pop("log", None)
+        log = log or OnMessage(lambda topic, message: published.append((topic, message)))
+        visitors = [log, *options.pop("visitors", ()), *([] if observer is None else [OnTick(observer)])]
+        worker = LockStepWorker(clock)
+        return run([entry], clock=clock, worker=worker, visitors=visitors, settings=settings, **options)
 
     return runner
 

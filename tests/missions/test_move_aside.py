@@ -12,7 +12,8 @@ from pydrake.math import RigidTransform
 from executive.app.assembly import judge, run_entry
 from executive.app.worlds import knowledge_of
 from executive.run.outcome import Outcome
-from executive.run.runner import RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
@@ -22,6 +23,7 @@ from plant import simulation
 from plant.worlds.placement import place_objects
 from plant.worlds.world import load_world
 from tests.benchmarks.manipulation_room import TAKEN, room
+from tests.visitors import OnMessage
 
 pytestmark = [pytest.mark.mission, pytest.mark.nightly]
 
@@ -59,7 +61,7 @@ def test_the_beer_before_it_is_moved_aside_and_the_coke_is_taken(shelf):
             [run_entry(plant, shelf, tree)],
             clock=plant.clock,
             worker=worker,
-            publish=lambda topic, message: said.append(str(message.get("message"))),
+            visitors=[OnMessage(lambda topic, message: said.append(str(message.get("message"))))],
             settings=RunSettings(seed=SEED),
         ).worst
     assert result.outcome is Outcome.SUCCESS, result.message

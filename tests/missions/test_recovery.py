@@ -13,7 +13,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from executive.app.assembly import judge, run_entry
 from executive.app.worlds import knowledge_of, open_world
 from executive.run.outcome import Outcome
-from executive.run.runner import RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
@@ -23,6 +24,7 @@ from plant.diagram import LooseModel
 from plant.models.spot.description import HAND_LINK
 from plant.simulation import Simulation
 from skills.faults.faulty_robot import with_faults
+from tests.visitors import OnMessage, OnTick
 
 FETCH = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
@@ -68,9 +70,8 @@ class FlatMission:
             [entry],
             clock=clock,
             worker=LockStepWorker(clock),
-            publish=self._publish,
             settings=RunSettings(seed=self.seed),
-            observer=observer,
+            visitors=[OnMessage(self._publish), *([] if observer is None else [OnTick(observer)])],
         ).worst
         return result, judge(self.simulation, self.tree, result)
 

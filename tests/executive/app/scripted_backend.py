@@ -1,6 +1,6 @@
 """A backend without plant, referee and recorder, for tests of what runs on it."""
 
-from executive.run.runner import RunEntry
+from executive.run.visitor import RunEntry
 from plant.spot.capabilities import spot_capabilities
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace

@@ -24,7 +24,7 @@ from executive.cli.fleet_command import _to_do, resumable_lines
 from executive.mission.mission import lines_of
 from executive.mission.request import Request
 from executive.record.reader import read_events
-from executive.run.runner import RunEntry
+from executive.run.visitor import RunEntry
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
@@ -58,7 +58,7 @@ class Fleet:
         self.robots = {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
         self.faults, self.make, self.missions, self.judged = {}, make, {}, []
         self.shares, self.since_s = [], []
-        monkeypatch.setattr(fleet_dispatch, "entry_for", lambda prepared, backend, durable, work: self._entry(prepared))
+        monkeypatch.setattr(fleet_dispatch, "entry_for", lambda prepared, backend, durable: self._entry(prepared))
         monkeypatch.setattr(fleet_robots, "bid_for", self._bid)
         self.tables, self.slower_s = None, 0.5
         monkeypatch.setattr(fleet_robots.Offers, "takes_from", self._takes_from)
@@ -407,14 +407,13 @@ def test_the_report_has_each_mission_and_the_steps_of_each_robot(fleet):
 def test_a_mission_that_is_cancelled_on_its_robots_panel_is_over_and_the_robot_goes_on(fleet, script):
     for line in (KITCHEN, BEDROOM, KITCHEN):
         fleet.queue(line)
-    page = PageView(None, Console(file=io.StringIO()))
-    cancelled = []
 
-    def observe(progress):
-        if progress.ticks == 1 and not cancelled:
-            cancelled.append(page.control.cancel("not now", robot="Bob"))
+    class CancellingPage(PageView):
+        def tick(self, progress):
+            if progress.ticks == 1:
+                self.control.cancel("not now", robot="Bob")
 
-    page._progress = observe
+    page = CancellingPage(None, Console(file=io.StringIO()))
     try:
         fleet.run(page)
     finally:

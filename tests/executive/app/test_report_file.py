@@ -16,8 +16,8 @@ from executive.app.report import ReportedAnswer, ReportedObject, RunReport
 from executive.app.report_file import step_rows
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
-from executive.run.findings import Said
-from executive.run.runner import RunEntry
+from executive.run.outcome import Said
+from executive.run.visitor import RunEntry
 from executive.tree.node_view import NodeView
 from executive.tree.snapshot import NodeState
 from plant.spot.capabilities import spot_capabilities
@@ -27,6 +27,7 @@ from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot
 from tests.executive.app.scripted_backend import ScriptedBackend
+from tests.visitors import OnMessage
 
 TALK = """
 name: talk <b>
@@ -47,8 +48,8 @@ def talk(tmp_path, monkeypatch):
 
 def test_what_was_said_is_in_report_and_page(talk):
     heard = []
-    listener = lambda topic, t, message: heard.append(message["text"]) if topic == "speech" else None  # noqa: E731
-    report = run_request(talk, ScriptedBackend(), listener=listener).report
+    speech = OnMessage(lambda topic, message: heard.append(message["text"]) if topic == "speech" else None)
+    report = run_request(talk, ScriptedBackend(), visitors=[speech]).report
     assert [one.text for one in report.said] == heard == ["Hello & <i>welcome</i>", "Here I am"]
     page = (talk.request.out / "report.html").read_text(encoding="utf-8")
     assert "Hello &amp; &lt;i&gt;welcome&lt;/i&gt;" in page
@@ -73,23 +74,24 @@ def test_the_report_is_the_same_after_json():
 
 
 def test_pictures_of_many_answers_are_kept_up_to_a_limit():
-    artifacts = Artifacts(lambda topic, message: None)
+    artifacts = Artifacts()
     noise = np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8)
     for number in range(90):
-        artifacts("detections", {"detections": [], "image": noise})
-        artifacts("answer", {"node": "alice/q", "t": float(number), "question": "q", "answer": False, "message": "m"})
+        artifacts.message("detections", {"detections": [], "image": noise})
+        artifacts.message(
+            "answer", {"node": "alice/q", "t": float(number), "question": "q", "answer": False, "message": "m"}
+        )
     assert 1 < len(artifacts.pictures) < 90
     assert sum(map(len, artifacts.pictures)) <= MOST_BYTES
     assert artifacts.numbers["alice/q", 0.0] == 0
 
 
 def test_an_answer_for_which_nobody_looked_has_no_picture():
-    log = []
-    artifacts = Artifacts(lambda topic, message: log.append(message))
-    artifacts("detections", {"detections": [], "image": np.zeros((48, 64, 3), np.uint8)})
-    artifacts("answer", {"node": "alice/q", "t": 1.0, "question": "q", "answer": False, "message": "m"})
-    artifacts("answer", {"node": "alice/ask", "t": 2.0, "question": "q", "answer": "yes", "message": "m"})
-    assert ["image" in message for message in log[1:]] == [True, False]
+    artifacts = Artifacts()
+    artifacts.message("detections", {"detections": [], "image": np.zeros((48, 64, 3), np.uint8)})
+    looked = {"node": "alice/q", "t": 1.0, "question": "q", "answer": False, "message": "m"}
+    asked = {"node": "alice/ask", "t": 2.0, "question": "q", "answer": "yes", "message": "m"}
+    assert ["image" in artifacts.message("answer", message) for message in (looked, asked)] == [True, False]
     assert list(artifacts.numbers) == [("alice/q", 1.0)]
 
 
@@ -145,7 +147,7 @@ def test_pictures_of_answers_from_before_a_restart_are_found_in_the_log(tmp_path
     picture = np.full((48, 64, 3), 90, np.uint8)
     told = {"node": "alice/q", "t": 4.0, "question": "q", "answer": False, "message": "m"}
     write_log(tmp_path / "log.mcap", ["a"], "answer", {**told, "image": picture})
-    artifacts = Artifacts(lambda topic, message: None)
+    artifacts = Artifacts()
     for _ in range(2):
         artifacts.recall(mission_events(tmp_path / "log.mcap"))
     assert artifacts.numbers == {("alice/q", 4.0): 0}

@@ -7,7 +7,7 @@ import pytest
 
 from executive.app.report import RefereeReport, ReportedAnswer, ReportedObject, RobotReport
 from executive.app.report_file import MissionRow, ReportPage, ReportPart, StepRow
-from executive.run.findings import Said
+from executive.run.outcome import Said
 from executive.view.html import render
 from executive.view.styles import Styles
 

@@ -17,7 +17,7 @@ from executive.app.runs import MOST_STARTS, Ended, MissionRuns, QueueServer
 from executive.cli.entry import app
 from executive.mission.request import Request
 from executive.run.control import Control
-from executive.run.journal import TickNote
+from executive.run.visitor import TickNote
 from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing import StandingMissions
@@ -217,8 +217,8 @@ def test_after_its_time_no_mission_begins(server, store, world):
 def test_a_battery_that_a_mission_has_charged_fires_at_its_end(server, store, standing, world):
     def charge():
         journal = store.journal(2)
-        journal.note(TickNote(1.0, (), {"a": 1}, None, {}, 0.2))
-        journal.note(TickNote(2.0, (), {"a": 2}, None, {}, 0.96))
+        journal.note(TickNote(None, 1.0, (), {"a": 1}, None, {}, 0.2))
+        journal.note(TickNote(None, 2.0, (), {"a": 2}, None, {}, 0.96))
 
     standing.add(REQUEST, trigger_of("battery full"))
     store.add(REQUEST, queued=True)

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from executive.cli.live import fitted, live_view
 from executive.run.control import Control
-from executive.run.runner import Progress
+from executive.run.visitor import Progress
 from executive.tree.snapshot import NodeState
 from skills.api import Cause
 
@@ -40,8 +40,8 @@ def test_the_tree_under_way_is_drawn_on_a_small_terminal(compiled, make):
     states = {path_id: NodeState(Status.RUNNING, message="at it") for path_id in (*first.path_ids, *aside.path_ids)}
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=True, width=80, height=14)
-    with live_view(console, Control()) as observe:
-        observe(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": aside}))
+    with live_view(console, Control()) as view:
+        view.tick(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": aside}))
     assert "at it" in screen.getvalue()
     assert "fetch drink" not in screen.getvalue()
 
@@ -52,7 +52,7 @@ def test_each_skill_that_ended_is_one_line_with_place_result_and_seconds(compile
     detect = drive.replace("navigate", "detect")
     idle = {path_id: NodeState() for path_id in tree.path_ids}
     told = io.StringIO()
-    with live_view(Console(file=told, width=200)) as observe:
+    with live_view(Console(file=told, width=200)) as view:
         for now_s, changes in (
             (1.0, {drive: NodeState(Status.RUNNING, message="on its way")}),
             (3.5, {drive: NodeState(Status.SUCCESS, message="there")}),
@@ -60,7 +60,7 @@ def test_each_skill_that_ended_is_one_line_with_place_result_and_seconds(compile
             (4.0, {detect: NodeState(Status.FAILURE, Cause.PRECONDITION, "saw none")}),
             (4.1, {detect: NodeState(Status.FAILURE, Cause.PRECONDITION, "saw none")}),
         ):
-            observe(Progress(now_s, 20, 0, {"Alice": {**idle, **changes}}, {"Alice": tree}))
+            view.tick(Progress(now_s, 20, 0, {"Alice": {**idle, **changes}}, {"Alice": tree}))
     first, second = told.getvalue().splitlines()
     assert re.match(r"✓ +2.5 s  go to the counter: there$", first)
     assert re.match(r"✗ +0.4 s  detect \(coke, beer; counter\): PRECONDITION: saw none$", second)

@@ -23,7 +23,7 @@ def invoke(*arguments: object):
 def log_path(tmp_path, compiled, run_tree, make, script, clock) -> Path:
     script.ends["approach"] = lambda skill: Failed(Cause.TIMEOUT, "no room to stand")
     log = EventLog(tmp_path / "log.mcap", clock)
-    run_tree(compiled(*make.FETCH), publish=log)
+    run_tree(compiled(*make.FETCH), log=log)
     log.close()
     return log.path
 
@@ -69,7 +69,7 @@ def test_log_shows_the_traceback_of_a_defect(tmp_path, compiled, run_tree, make,
 
     script.ends["approach"] = breaks
     log = EventLog(tmp_path / "log.mcap", clock)
-    run_tree(compiled(*make.FETCH), publish=log)
+    run_tree(compiled(*make.FETCH), log=log)
     log.close()
     told = invoke("log", log.path).stdout
     assert "Traceback (most recent call last):" in told

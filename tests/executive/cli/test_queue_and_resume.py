@@ -15,7 +15,7 @@ from executive.app.mission_run import Finished
 from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry
 from executive.mission.mission import mission_from_commands
-from executive.run.journal import TickNote
+from executive.run.visitor import TickNote
 from executive.store.missions import MissionStore
 from executive.store.wakeup import WakeupPipe
 from executive.tree.compiler import compile_mission
@@ -52,7 +52,7 @@ class Plant:
         for number, each in enumerate(prepared.all):
             done = Change(first_leaf(each.tree), NodeState(), NodeState(Status.SUCCESS, None, "done"))
             pose = Pose2D(float(number), 0.5, 0.0) if prepared.robots else None
-            durable.journals[each.mission.robot_name].note(TickNote(1.0, (done,), {}, pose, {}))
+            durable.journals[each.mission.robot_name].note(TickNote(each.tree, 1.0, (done,), {}, pose, {}))
         outcome = self.outcomes.pop(0) if self.outcomes else "success"
         if outcome == "killed":
             raise GoneError
@@ -65,11 +65,11 @@ def first_leaf(tree):
 
 
 def corrected_to(goal, prepared, robot="Alice"):
-    """The tree of going elsewhere, and a note of that being under way."""
+    """A note of going elsewhere being under way."""
     go = mission_from_commands([Command(goal=goal)], world="flat", robot_name=robot)
     other = compile_mission(replace(go, name=f"go {goal} 2"), knowledge=prepared.knowledge, registry=installed_skills())
     change = Change(first_leaf(other), NodeState(), NodeState(Status.RUNNING, None, "on the way"))
-    return other, TickNote(2.0, (change,), {}, None, {})
+    return TickNote(other, 2.0, (change,), {}, None, {})
 
 
 def report(outcome):
@@ -193,8 +193,7 @@ def test_a_bad_mission_is_not_queued(errand, mission, states):
 def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(errand, mission, plant, monkeypatch):
     def corrected(prepared, *, durable, **_):
         prepared.request.out.mkdir(parents=True, exist_ok=True)
-        other, note = corrected_to("bathroom", prepared)
-        durable.journals["Alice"].replaced(other).note(note)
+        durable.journals["Alice"].note(corrected_to("bathroom", prepared))
         raise GoneError
 
     with monkeypatch.context() as patch, pytest.raises(GoneError):
@@ -235,8 +234,7 @@ def test_a_killed_run_of_two_robots_is_resumed_with_each_where_it_was(errand, tw
 def test_what_took_the_place_of_one_robots_part_is_resumed_beside_the_others(errand, two, plant, monkeypatch):
     def corrected(prepared, *, durable, **_):
         prepared.request.out.mkdir(parents=True, exist_ok=True)
-        other, note = corrected_to("office", prepared, "Bob")
-        durable.journals["Bob"].replaced(other).note(note)
+        durable.journals["Bob"].note(corrected_to("office", prepared, "Bob"))
         raise GoneError
 
     with monkeypatch.context() as patch, pytest.raises(GoneError):

@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from executive.cli.shown import SILENCE, speech_heard, voice_for
+from executive.cli.shown import SILENCE, HeardSpeech, voice_for
 from executive.speech import voice as voices
 from skills.files.errors import InputError
 
@@ -23,9 +23,9 @@ class Heard:
 @pytest.mark.parametrize(("quiet", "shown"), [(False, "Alice: [bold]Hello\n"), (True, "")])
 def test_what_is_said_is_a_line_unless_quiet_and_is_said_by_the_voice(quiet, shown):
     told, voice = io.StringIO(), Heard()
-    hear = speech_heard(Console(file=told, width=80), voice, quiet=quiet)
-    hear("speech", 1.0, {"robot": "Alice", "text": "[bold]Hello", "t": 1.0})
-    hear("pose", 1.0, {"robot": "Alice"})
+    speech = HeardSpeech(Console(file=told, width=80), voice, quiet)
+    speech.message("speech", {"robot": "Alice", "text": "[bold]Hello", "t": 1.0})
+    speech.message("pose", {"robot": "Alice"})
     assert (told.getvalue(), voice.texts) == (shown, ["[bold]Hello"])
 
 

@@ -304,7 +304,7 @@ def test_a_corrected_mission_is_run_to_its_end(talk, speech, control, run_tree, 
     replies = []
 
     def observe(progress):
-        conversation.observe(progress)
+        conversation.tick(progress)
         if progress.ticks in said:
             replies.append(conversation.hear(said.pop(progress.ticks)).text)
 
@@ -324,7 +324,7 @@ def test_an_addition_is_corrected_while_it_waits(talk, speech, control, run_tree
     said = {1: "and to the bathroom?", 2: "no, to the kitchen"}
 
     def observe(progress):
-        conversation.observe(progress)
+        conversation.tick(progress)
         if progress.ticks in said:
             conversation.hear(said.pop(progress.ticks))
 
@@ -341,7 +341,7 @@ def test_what_is_held_is_put_down_before_another_thing_is_fetched(speech, contro
     replies = []
 
     def observe(progress):
-        conversation.observe(progress)
+        conversation.tick(progress)
         if not replies and progress.robots["Alice"].holding:
             replies.append(conversation.hear("no, the beer"))
 
@@ -360,7 +360,7 @@ def test_what_is_held_is_not_fetched_again(speech, control, run_tree):
     replies = []
 
     def observe(progress):
-        conversation.observe(progress)
+        conversation.tick(progress)
         if not replies and progress.robots["Alice"].holding:
             replies.append(conversation.hear("no, to the bedroom"))
 

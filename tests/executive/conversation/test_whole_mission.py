@@ -7,6 +7,7 @@ from executive.app.simulated import run_simulated
 from executive.app.talk import conversation_of
 from executive.mission.request import Request
 from executive.run.control import Control
+from tests.visitors import OnTick
 
 
 @pytest.mark.mission
@@ -18,11 +19,11 @@ def test_a_corrected_mission_is_fulfilled_as_corrected(tmp_path):
     replies = []
 
     def observe(progress):
-        conversation.observe(progress)
+        conversation.tick(progress)
         while said and progress.now_s >= said[0][0]:
             replies.append(conversation.hear(said.pop(0)[1]).text)
 
-    finished = run_simulated(prepared, observer=observe, control=control)
+    finished = run_simulated(prepared, visitors=[OnTick(observe)], control=control)
     assert replies[0] == "I am in the living room"
     assert finished.report.achieved
     assert finished.report.commands == ("Take [Nothing] to [bathroom] and do [Nothing] to [Nothing]",)

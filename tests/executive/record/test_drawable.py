@@ -61,7 +61,7 @@ def test_a_map_comes_back_the_right_way_up(knowledge, tmp_path, clock):
 
 def test_every_topic_of_a_mission_has_a_schema_of_its_own(tmp_path, compiled, run_tree, make, clock):
     log = EventLog(tmp_path / "log.mcap", clock)
-    run_tree(compiled(*make.FETCH), publish=log)
+    run_tree(compiled(*make.FETCH), log=log)
     log.close()
     with log.path.open("rb") as file:
         named = {channel.topic: schema.name for schema, channel, _ in make_reader(file).iter_messages() if schema}

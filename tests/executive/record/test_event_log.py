@@ -19,6 +19,8 @@ from mcap.reader import make_reader
 from executive.record.event_log import EventLog, plain_values
 from executive.record.reader import read_events
 from executive.record.schemas import WALL
+from executive.run.outcome import RunResult
+from executive.run.visitor import Progress, RunSettings
 from skills.api import Cause
 from skills.files.errors import InputError
 
@@ -170,7 +172,7 @@ def test_plain_values(value, plain):
 
 def test_a_whole_mission_is_logged(tmp_path, compiled, run_tree, make, clock):
     log = EventLog(tmp_path / "log.mcap", clock)
-    run_tree(compiled(*make.FETCH), publish=log)
+    run_tree(compiled(*make.FETCH), log=log)
     log.close()
     events = read_events(log.path)
     topics = [event.topic for event in events]
@@ -204,3 +206,30 @@ def test_the_channels_of_a_run_with_one_robot_are_the_topics(tmp_path, clock):
     log.close()
     with log.path.open("rb") as file:
         assert [channel.topic for channel in make_reader(file).get_summary().channels.values()] == ["pose"]
+
+
+@pytest.fixture
+def ticks(tmp_path, clock):
+    """Logs ticks of which every second one takes longer than the tick period; what the log tells of them."""
+
+    def told(count):
+        log = EventLog(tmp_path / "log.mcap", clock)
+        log.begin(RunSettings(tick_period_s=0.05), None)
+        for number in range(count):
+            clock.advance(0.05)
+            log.tick(Progress(clock.now(), number + 1, number // 2, {}, tick_wall_s=0.001 * number))
+        log.end(RunResult((), count, count // 2, 0.05 * count, 12.5))
+        log.close()
+        return [event.data for event in read_events(log.path) if event.topic == "wall"]
+
+    return told
+
+
+def test_the_duration_of_every_tick_is_logged_once_with_the_overruns_so_far(ticks):
+    walls = ticks(100)
+    assert [tick for wall in walls for tick in wall["tick_s"]] == pytest.approx([0.001 * n for n in range(100)])
+    assert (walls[-1]["overruns"], walls[-1]["wall_time_s"], walls[-1]["limit_s"]) == (50, 12.5, 0.05)
+
+
+def test_durations_are_logged_once_a_second_and_at_the_end(ticks):
+    assert len(ticks(200)) == 10 + 1

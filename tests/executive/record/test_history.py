@@ -20,7 +20,7 @@ def failed_run(tmp_path, compiled, run_tree, make, script, clock):
     script.ends["approach"] = lambda skill: Failed(Cause.TIMEOUT, "no room to stand")
     tree = compiled(*make.FETCH)
     log = EventLog(tmp_path / "log.mcap", clock)
-    result = run_tree(tree, publish=log)
+    result = run_tree(tree, log=log)
     log.close()
     return log.path, tree, result
 
@@ -62,7 +62,7 @@ def telling_run(tmp_path, compiled, run_tree, make, script, clock):
     """The log of a mission whose skills say in each step what they do: "turning", then "going, 2 m to go" and 1 m."""
     script.steps, script.says = 4, lambda name, left: "turning" if left == 3 else f"going, {left} m to go"
     log = EventLog(tmp_path / "log.mcap", clock)
-    run_tree(compiled(*make.FETCH), publish=log)
+    run_tree(compiled(*make.FETCH), log=log)
     log.close()
     return read_history(log.path)
 

@@ -20,7 +20,7 @@ def decoded(tmp_path, compiled, run_tree, make, clock):
     picture = np.full((24, 32, 3), 200, np.uint8)
     log("detections", {"image": picture, "source": "hand", "detections": []})
     log("path", {"robot": "Alice", "frame": "world", "poses": [[1.0, 2.0, 0.0], [3.0, 4.0, 0.5]]})
-    run_tree(compiled(*make.FETCH), publish=log)
+    run_tree(compiled(*make.FETCH), log=log)
     log.close()
     events = read_events(log.path)
     bag = tmp_path / "bag.mcap"

@@ -7,7 +7,8 @@ import pytest
 
 from executive.run.control import Control
 from executive.run.outcome import Outcome
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
@@ -18,6 +19,7 @@ from skills.robot import ArmTrajectory
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot
+from tests.visitors import OnTick
 
 CAPABILITIES = spot_capabilities()
 STILL_S = 0.2
@@ -77,10 +79,9 @@ def run_until(mission, tick, act):
         [entry],
         clock=clock,
         worker=LockStepWorker(clock),
-        publish=lambda topic, message: None,
         settings=RunSettings(tick_period_s=TICK_S),
         control=control,
-        observer=lambda progress: act(control, robot, progress) if progress.ticks >= tick else None,
+        visitors=[OnTick(lambda progress: act(control, robot, progress) if progress.ticks >= tick else None)],
     )
     return result, robot, clock
 

@@ -8,6 +8,7 @@ from py_trees.common import Status
 from executive.run.control import Control, Mode
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.outcome import Outcome
+from executive.run.visitor import RunVisitor
 from executive.run.watchdog import Watchdog
 from skills.api import Cause, Failed, Question, Running, Succeeded, nobody_to_ask
 from skills.robot import Lease, Pose2D
@@ -462,50 +463,46 @@ def test_a_mission_can_take_the_place_of_the_one_under_way(compiled, run_tree, m
     assert (given_up.mission, given_up.outcome) == ("fetch drink", Outcome.CANCELLED)
     assert "given up" in given_up.message
     assert ("replace", "instead 'go to the bedroom'") in notes()
-    assert control.state.missions == {"Alice": ("go to the bedroom",)}
+    assert control.state.missions == {"Alice": ()}
 
 
-class Notebook:
-    """A journal that knows which mission it is kept of."""
+class Notebook(RunVisitor):
+    """Keeps what each tick brought of the robot's mission."""
 
-    def __init__(self, name, taken=None):
-        self.name, self.taken, self.notes = name, [] if taken is None else taken, 0
+    def __init__(self):
+        self.notes = []
 
-    def note(self, note):
-        self.notes += 1
+    def tick(self, progress):
+        self.notes += progress.notes.values()
 
-    def replaced(self, tree):
-        self.taken.append(Notebook(tree.mission_name, self.taken))
-        return self.taken[-1]
+    @property
+    def missions(self):
+        return [note.tree.mission_name for note in self.notes]
 
 
-def test_the_journal_is_kept_of_the_mission_that_took_the_place(compiled, run_tree, make, control):
-    other, journal = compiled(GO, name="go to the bedroom"), Notebook("fetch drink")
+def test_notes_are_of_the_mission_that_took_the_place(compiled, run_tree, make, control):
+    other, notebook = compiled(GO, name="go to the bedroom"), Notebook()
     actions = {4: lambda: control.replace(other)}
-    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions), journal=journal)
-    assert ([each.name for each in journal.taken], journal.notes) == (["go to the bedroom"], 4)
-    assert journal.taken[0].notes > 0
+    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions), visitors=[notebook])
+    assert notebook.missions == ["fetch drink"] * 4 + ["go to the bedroom"] * (len(notebook.notes) - 4)
+    assert len(notebook.notes) > 4
 
 
-def test_the_journal_hears_of_the_battery_with_each_change_and_once_a_second(compiled, run_tree, make, robot):
-    class Charges(Notebook):
-        def note(self, note):
-            self.taken.append((bool(note.changes), note.charge))
-
-    journal = Charges("fetch drink")
-    robot.charge = 0.5
-    run_tree(compiled(*make.FETCH), journal=journal)
-    assert all(charge is not None for changed, charge in journal.taken if changed)
-    charges = [charge for _, charge in journal.taken if charge is not None]
-    assert 0 < len(charges) < len(journal.taken)
+def test_notes_tell_of_the_battery_with_each_change_and_once_a_second(compiled, run_tree, make, robot):
+    notebook, robot.charge = Notebook(), 0.5
+    run_tree(compiled(*make.FETCH), visitors=[notebook])
+    assert all(note.charge is not None for note in notebook.notes if note.changes)
+    charges = [note.charge for note in notebook.notes if note.charge is not None]
+    assert 0 < len(charges) < len(notebook.notes)
     assert all(0.4 < charge <= 0.5 for charge in charges)
 
 
-def test_of_a_mission_that_comes_in_between_no_journal_is_kept(compiled, run_tree, make, control):
-    between, other, journal = compiled(GO, name="between"), compiled(GO, name="other"), Notebook("fetch drink")
+def test_notes_tell_nothing_of_missions_that_come_in_between(compiled, run_tree, make, control):
+    between, other, notebook = compiled(GO, name="between"), compiled(GO, name="other"), Notebook()
     actions = {2: lambda: control.preempt(between), 4: lambda: control.replace(other)}
-    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions), journal=journal)
-    assert journal.taken == []
+    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions), visitors=[notebook])
+    assert set(notebook.missions) == {"fetch drink"}
+    assert {change.path_id.split("/")[1] for note in notebook.notes for change in note.changes} == {"fetch-drink"}
 
 
 def test_a_mission_that_came_in_between_is_replaced_and_the_first_taken_up(compiled, run_tree, make, control, script):

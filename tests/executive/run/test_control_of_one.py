@@ -7,13 +7,15 @@ from py_trees.common import Status
 
 from executive.run.control import Control, Mode
 from executive.run.outcome import Outcome
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.words.blocks import Group
 from executive.words.command import parse_command
 from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from skills.api import Question
+from tests.visitors import OnMessage, OnTick
 
 GO = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
 
@@ -52,14 +54,15 @@ def run_pair(clock, knowledge, registry, make, control):
             )
             for name, robot in robots.items()
         ]
+        visitors = [OnMessage(lambda topic, message: log.append((topic, message)))]
+        visitors += [] if observe is None else [OnTick(observe)]
         result = run(
             entries,
             clock=clock,
             worker=LockStepWorker(clock),
-            publish=lambda topic, message: log.append((topic, message)),
             settings=RunSettings(seed=3, time_limit_s=time_limit_s, endings_limit_s=5.0),
             control=control,
-            observer=observe,
+            visitors=visitors,
         )
         return Pair(robots, result, log)
 

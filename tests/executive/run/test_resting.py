@@ -11,7 +11,8 @@ from typing import Any, ClassVar
 import pytest
 
 from executive.run.outcome import Outcome, RunResult
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
@@ -22,6 +23,7 @@ from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot, Start
+from tests.visitors import OnMessage
 
 LANE = (Block(-2.0, -1.0, 4.0, -0.5), Block(-2.0, 0.5, 4.0, 1.0), Block(6.0, -3.0, 6.5, 3.0))
 """A lane 1 m wide from x = -2 to 4 m, and room before a wall at 6 m."""
@@ -133,7 +135,7 @@ class Lane:
             spare=spare,
             clock=self.clock,
             worker=LockStepWorker(self.clock),
-            publish=lambda topic, message: self.published.append((topic, message)),
+            visitors=[OnMessage(lambda topic, message: self.published.append((topic, message)))],
             settings=RunSettings(verb_limit_s=self.verb_limit_s, time_limit_s=120.0),
         )
 

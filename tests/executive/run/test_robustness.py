@@ -13,7 +13,8 @@ from mcap.reader import make_reader
 from executive.record.event_log import EventLog
 from executive.run.guarded_robot import GarbageError, GuardedRobot
 from executive.run.outcome import Outcome
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings
 from executive.run.watchdog import Watchdog
 from executive.run.worker import LockStepWorker, ThreadWorker
 from executive.tree.compiler import CompiledTree
@@ -27,6 +28,7 @@ from skills.robot import ArmTrajectory
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot
+from tests.visitors import OnMessage
 
 CAPABILITIES = spot_capabilities()
 SENSES = ("odometry", "imu", "scan", "image", "joints", "gripper", "battery")
@@ -154,7 +156,7 @@ def spoilt_run(tmp_path, verb, kind, *, worker=LockStepWorker, limit_s=30.0):
     log = EventLog(tmp_path / "log.mcap", clock)
     try:
         settings = RunSettings(**(HANG_LIMITS if kind == "hangs" else {}))
-        result = run([entry], clock=clock, worker=worker(clock), publish=log, settings=settings)
+        result = run([entry], clock=clock, worker=worker(clock), visitors=[log], settings=settings)
     finally:
         log.close()
     clock.advance(0.2)
@@ -228,7 +230,7 @@ def test_a_log_that_breaks_ends_the_run_and_the_robot_stands(compiled, run_tree,
         if next(left, None) is None:
             raise OSError("no space left on device")
 
-    result = run_tree(compiled(*make.FETCH), publish=publish)
+    result = run_tree(compiled(*make.FETCH), log=OnMessage(publish))
     assert (result.outcome, result.worst.cause) == (Outcome.ERROR, Cause.ERROR)
     assert "no space left" in result.worst.message
     assert (robot.driving, robot.holder, script.ended) == (False, None, script.begun)

@@ -8,12 +8,14 @@ from py_trees.common import Status
 
 from executive.run.control import Control
 from executive.run.outcome import Outcome
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
 from skills.api import Cause, Failed, Succeeded
+from tests.visitors import OnMessage
 
 
 def transitions(published):
@@ -189,7 +191,9 @@ def test_a_defect_in_an_estimator_ends_the_run_with_an_error(compiled, make, rob
             raise ZeroDivisionError("no scan")
 
     entry = RunEntry(compiled(*make.FETCH), robot, Broken(), make.EmptyCostmap())
-    result = run([entry], clock=clock, worker=LockStepWorker(clock), publish=lambda *m: published.append(m))
+    result = run(
+        [entry], clock=clock, worker=LockStepWorker(clock), visitors=[OnMessage(lambda *m: published.append(m))]
+    )
     assert (result.outcome, robot.holder) == (Outcome.ERROR, None)
     assert "no scan" in result.worst.message
     assert any(topic == "errors" and "ZeroDivisionError" in m["traceback"] for topic, m in published)
@@ -269,7 +273,7 @@ def run_two(make, knowledge, registry, clock, published):
             entries,
             clock=clock,
             worker=LockStepWorker(clock),
-            publish=lambda *m: published.append(m),
+            visitors=[OnMessage(lambda *m: published.append(m))],
             settings=RunSettings(seed=1),
         )
 
@@ -320,7 +324,7 @@ def test_to_wait_for_a_robot_that_is_not_there_is_refused(run_two):
 def test_robots_of_one_name_are_refused(compiled, make, robot, clock):
     entry = RunEntry(compiled(*make.FETCH), robot, make.StillLocaliser(), make.EmptyCostmap())
     with pytest.raises(ValueError, match="different names"):
-        run([entry, entry], clock=clock, worker=LockStepWorker(clock), publish=lambda *m: None)
+        run([entry, entry], clock=clock, worker=LockStepWorker(clock))
 
 
 def test_progress_of_the_running_skill_reaches_the_observer(compiled, run_tree, make, script):

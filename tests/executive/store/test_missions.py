@@ -11,7 +11,7 @@ from py_trees.common import Status
 
 from executive.mission.request import Request, Start
 from executive.mission.scenario import Scenario
-from executive.run.journal import TickNote
+from executive.run.visitor import TickNote
 from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.snapshot import Change, NodeState
@@ -35,8 +35,8 @@ def changed(path_id, status, cause=None, message=""):
     return Change(path_id, NodeState(), NodeState(status, cause, message))
 
 
-def note(*changes, now_s=1.0, board=None, pose=None, checkpoints=None, charge=None):
-    return TickNote(now_s, changes, board or {}, pose, checkpoints or {}, charge)
+def note(*changes, tree=None, now_s=1.0, board=None, pose=None, checkpoints=None, charge=None):
+    return TickNote(tree, now_s, changes, board or {}, pose, checkpoints or {}, charge)
 
 
 def test_a_simulated_world_is_kept_before_what_a_tick_brought_and_not_for_a_pose(path):
@@ -85,12 +85,12 @@ def test_what_takes_a_missions_place_is_kept_in_its_stead(path):
     other = replace(REQUEST, name="go hall", commands=("Go",), fingerprint="other", sentence=None)
     with MissionStore(path) as store:
         mission = store.add(REQUEST, queued=False)
-        journal = store.journal(mission.id).replaceable(lambda tree: other)
-        journal.note(note(changed("a/b", Status.SUCCESS), board={"alice/x": Pose2D(1.0, 2.0, 0.5)}))
-        second = journal.replaced(None)
+        journal = store.journal(mission.id).replaceable("first", lambda tree: other)
+        journal.note(note(changed("a/b", Status.SUCCESS), tree="first", board={"alice/x": Pose2D(1.0, 2.0, 0.5)}))
+        journal.note(note(tree="second"))
         assert (store.mission(mission.id).request, store.has_steps(mission.id)) == (other, False)
         assert store.memory(mission.id).board == {}
-        second.note(note(changed("a/c", Status.RUNNING)))
+        journal.note(note(changed("a/c", Status.RUNNING), tree="second"))
         assert list(store.memory(mission.id).steps) == ["a/c"]
 
 

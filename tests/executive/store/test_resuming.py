@@ -8,7 +8,8 @@ from py_trees.common import Status
 
 from executive.mission.request import Request
 from executive.run.outcome import Outcome
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.store.memory import Memory, StepRecord
 from executive.store.missions import MissionStore
@@ -149,13 +150,13 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
         script.begun.clear()
         world.work.clear()
         robot.holder = None
-        entry = RunEntry(tree, robot, make.StillLocaliser(), make.EmptyCostmap(), ticks)
+        entry = RunEntry(tree, robot, make.StillLocaliser(), make.EmptyCostmap())
         try:
             result = run(
                 [entry],
                 clock=clock,
                 worker=LockStepWorker(clock),
-                publish=lambda topic, message: None,
+                visitors=[ticks],
                 settings=RunSettings(seed=3),
             )
         except KilledError:
@@ -165,17 +166,18 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
     return one_life
 
 
-class Ticks:
+class Ticks(RunVisitor):
     """Passes notes on, the last few excepted, and kills."""
 
     def __init__(self, journal, kill_after, kill_when, lag):
         self.journal, self.kill_after, self.kill_when, self.lag, self.count = journal, kill_after, kill_when, lag, 0
 
-    def note(self, note):
+    def tick(self, progress):
         self.count += 1
         if self.kill_after is None or self.count <= self.kill_after - self.lag:
-            self.journal.note(note)
-        if self.count == self.kill_after or (self.kill_when is not None and any(map(self.kill_when, note.changes))):
+            self.journal.tick(progress)
+        changes = [change for note in progress.notes.values() for change in note.changes]
+        if self.count == self.kill_after or (self.kill_when is not None and any(map(self.kill_when, changes))):
             raise KilledError
 
 

@@ -8,7 +8,8 @@ import pytest
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.outcome import Outcome
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.store.resuming import resumed_tree
@@ -157,14 +158,14 @@ def live(tmp_path, clock, robot, make, works, registry, knowledge, script, done)
                 journal.remembering(recollection)
             store.begin(mission.id)
             robot.holder = None
-            entry = RunEntry(tree, robot, make.StillLocaliser(), make.EmptyCostmap(), Killing(journal, kill_after))
+            entry = RunEntry(tree, robot, make.StillLocaliser(), make.EmptyCostmap())
             with LockStepWorker(clock) as worker:
                 try:
                     return run(
                         [entry],
                         clock=clock,
                         worker=worker,
-                        publish=lambda topic, message: None,
+                        visitors=[Killing(journal, kill_after)],
                         settings=RunSettings(seed=3, tick_period_s=0.1, time_limit_s=60.0),
                         control=Control(pace=None),
                     )
@@ -174,14 +175,14 @@ def live(tmp_path, clock, robot, make, works, registry, knowledge, script, done)
     return one_life
 
 
-class Killing:
+class Killing(RunVisitor):
     """Passes notes on, and kills after some."""
 
     def __init__(self, journal, kill_after):
         self.journal, self.left = journal, kill_after
 
-    def note(self, note):
-        self.journal.note(note)
+    def tick(self, progress):
+        self.journal.tick(progress)
         if self.left is not None:
             self.left -= 1
             if self.left <= 0:

@@ -6,7 +6,8 @@ import pytest
 
 from executive.mission.request import Request
 from executive.run.outcome import Outcome
-from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.runner import run
+from executive.run.visitor import RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.store.resuming import BEFORE, ended_tree, resumed_tree
@@ -107,17 +108,18 @@ def store(tmp_path):
         yield opened
 
 
-class Killing:
+class Killing(RunVisitor):
     """Passes the notes of one robot on, and kills when both together have made so many."""
 
-    def __init__(self, journal, made, kill_after):
-        self.journal, self.made, self.kill_after = journal, made, kill_after
+    def __init__(self, name, journal, made, kill_after):
+        self.name, self.journal, self.made, self.kill_after = name, journal, made, kill_after
 
-    def note(self, note):
-        self.made.append(note)
-        self.journal.note(note)
-        if len(self.made) == self.kill_after:
-            raise KilledError
+    def tick(self, progress):
+        if self.name in progress.notes:
+            self.made.append(progress.notes[self.name])
+            self.journal.tick(progress)
+            if len(self.made) == self.kill_after:
+                raise KilledError
 
 
 @pytest.fixture
@@ -132,22 +134,22 @@ def live(store, clock, robots, make, handling, knowledge):
             memory = store.memory(mission.id, name)
             tree, recollection = ended_tree(tree, memory) or resumed_tree(tree, memory)
             journal.remembering(recollection)
-        killing = Killing(journal, made, kill_after)
-        return RunEntry(tree, robots[name], make.StillLocaliser(), make.EmptyCostmap(), killing, after=after)
+        entry = RunEntry(tree, robots[name], make.StillLocaliser(), make.EmptyCostmap(), after=after)
+        return entry, Killing(name, journal, made, kill_after)
 
     def one_life(*, kill_after=None, after=()):
         (mission,) = store.missions() or (store.add(REQUEST, queued=False),)
         made = []
-        entries = [
+        given = [
             entry_for(mission, name, made, kill_after, after if name == "Bob" else ()) for name in ("Alice", "Bob")
         ]
         store.begin(mission.id)
         try:
             result = run(
-                entries,
+                [entry for entry, _ in given],
                 clock=clock,
                 worker=LockStepWorker(clock),
-                publish=lambda topic, message: None,
+                visitors=[killing for _, killing in given],
                 settings=RunSettings(seed=3),
             )
         except KilledError:

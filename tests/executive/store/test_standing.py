@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from executive.mission.request import Request
-from executive.run.journal import TickNote
+from executive.run.visitor import TickNote
 from executive.store import standing as standing_module
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing import MOST_WAITING, StandingMissions, TooManyError
@@ -74,8 +74,8 @@ def end_mission(store, *charges):
     store.begin(number)
     journal = store.journal(number)
     for charge in charges:
-        journal.note(TickNote(1.0, (), {}, None, {}, charge))
-    journal.note(TickNote(2.0, (), {"alice/x": len(charges)}, None, {}))
+        journal.note(TickNote(None, 1.0, (), {}, None, {}, charge))
+    journal.note(TickNote(None, 2.0, (), {"alice/x": len(charges)}, None, {}))
     store.finish(number, MissionState.SUCCESS, "done")
 
 

@@ -22,7 +22,7 @@ from executive.record.event_log import EventLog
 from executive.record.history import read_history
 from executive.run.control import Control, Mode
 from executive.run.outcome import RobotStatus
-from executive.run.runner import Progress
+from executive.run.visitor import Progress
 from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
 from executive.view.actions import RefusedError, asked_json, control_actions
@@ -109,7 +109,7 @@ def log_path(tmp_path, compiled, run_tree, make, script, clock, knowledge) -> Pa
     log("run", {"world": "test", "seed": 3, "commands": [], "versions": {}})
     seen = {"class_name": "coke", "score": 0.9, "box": [10, 20, 60, 90]}
     log("detections", {"image": np.full((120, 160, 3), 90, np.uint8), "source": "hand", "detections": [seen]})
-    run_tree(compiled(*make.FETCH), publish=log)
+    run_tree(compiled(*make.FETCH), log=log)
     log.close()
     return log.path
 
@@ -243,7 +243,7 @@ def test_remarks_in_the_sentence_box_are_answered_and_act_at_once(page, compiled
     watch = ControlWatch(control, feed)
     talk = Conversation(Speech(knowledge, "Alice", nothing_else, nothing_else), control)
     robots = {"Alice": RobotStatus(Pose2D(5.0, -0.9, 0.0), holding=False)}
-    talk.observe(Progress(1.0, 20, 0, {"Alice": {}}, {"Alice": tree}, robots))
+    talk.tick(Progress(1.0, 20, 0, {"Alice": {}}, {"Alice": tree}, robots))
     feed("tree", 0.0, {"robot": "Alice", "root": node_view(tree.root).structure()})
     said = {"say": lambda values: talk.hear(values["text"]).text}
     with PageServer(PageContent(feed, {**control_actions(control), **said})) as server:

@@ -12,7 +12,7 @@ from websockets.exceptions import InvalidStatus, WebSocketException
 from websockets.sync.client import connect
 
 from executive.run.control import Control, Mode
-from executive.run.runner import Progress
+from executive.run.visitor import Progress
 from executive.tree.snapshot import NodeState
 from executive.view.actions import RefusedError, control_actions, control_json, text_of
 from executive.view.feed import Feed

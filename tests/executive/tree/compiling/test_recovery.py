@@ -6,7 +6,7 @@ import pytest
 
 from executive.run.control import Control
 from executive.run.outcome import Outcome
-from executive.run.runner import RunSettings
+from executive.run.visitor import RunSettings
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiler import compile_mission
 from executive.tree.compiling.search import surfaces_elsewhere

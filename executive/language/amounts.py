@@ -7,20 +7,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
-from executive.language.lexicon import lexicon
+from executive.language.lexicon import Patterns, lexicon
 
-__all__ = [
-    "AMOUNTS",
-    "SHARE",
-    "SPAN",
-    "TIMES",
-    "TimeOfDay",
-    "count_of",
-    "seconds_of",
-    "share_of",
-    "time_of",
-    "times_of",
-]
+__all__ = ["AMOUNTS", "TimeOfDay", "count_of", "seconds_of", "share_of", "time_of", "times_of"]
 
 
 @cache
@@ -29,27 +18,10 @@ def _number_pattern() -> str:
     return rf"(?:\d+(?:\.\d+)?|(?:{words})(?:[ -](?:{words}))?)"
 
 
-_NUMBER: Final = _number_pattern()
-_UNIT: Final = r"(?:seconds?|secs?|minutes?|mins?|hours?)"
-SPAN: Final = (
-    rf"(?:{_NUMBER} and a half {_UNIT}|half an? {_UNIT}|half hour|(?:a )?quarter(?: of an)? hour"
-    rf"|three quarters of an hour|(?:a couple of|{_NUMBER}|an?) {_UNIT}(?: and a half)?|other minute|hour|minute)"
-)
-"""A span of time, as behind "for" and "every"."""
-TIMES: Final = rf"(?:twice|(?:{_NUMBER}|a couple of) times)(?: in a row)?"
-_DAYTIME: Final = r"(?: ?(?P<half>a\.?m\.?|p\.?m\.?|in the morning|in the afternoon|in the evening|at night|this \w+))?"
-_CLOCK: Final = re.compile(rf"(?P<hour>\d{{1,2}})[:.](?P<minute>\d\d){_DAYTIME}")
-_RELATIVE: Final = re.compile(
-    rf"(?P<part>half|(?:a )?quarter|{_NUMBER})(?: minutes)? (?P<side>past|to|after|before) (?P<hour>{_NUMBER})"
-    rf"(?: o'? ?clock)?{_DAYTIME}"
-)
-_FULL: Final = re.compile(
-    rf"(?P<hour>\d{{1,2}}|[a-z]+)(?: (?P<minute>fifteen|thirty|forty five))?(?: o'? ?clock)?{_DAYTIME}"
-)
+_FORMS: Final = Patterns("amounts.yaml", words={"number": _number_pattern()})
+AMOUNTS: Final = {name: _FORMS.text(name) for name in ("span", "times", "share")}
+"""What stands for them in other tables."""
 _NAMED: Final = {"noon": 12, "midday": 12, "midnight": 0}
-SHARE: Final = rf"(?:(?:{_NUMBER}|fifty) ?percent|half(?: full| charge| of its charge)?)"
-AMOUNTS: Final = {"span": SPAN, "times": TIMES, "share": SHARE}
-"""What stands for them in the tables."""
 _UNITS_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 
@@ -121,7 +93,7 @@ def time_of(text: str) -> TimeOfDay | None:
     words = " ".join(text.lower().replace("o' clock", "o'clock").split())
     if words in _NAMED:
         return TimeOfDay(3600.0 * _NAMED[words])
-    for pattern in (_CLOCK, _RELATIVE, _FULL):
+    for pattern in (_FORMS.clock, _FORMS.relative, _FORMS.full):
         match = pattern.fullmatch(words)
         if match is not None and (found := _time(match, words)) is not None:
             return found

@@ -68,6 +68,11 @@ class Clause:
         return CLAUSES.whatever.search(self.joint) is not None
 
     @property
+    def ends_anyway(self) -> bool:
+        """Whether it says at its end that it is done whatever happens."""
+        return self.kind is None and CLAUSES.ends_anyway.search(self.text) is not None
+
+    @property
     def then(self) -> bool:
         """Whether "then" stands before it."""
         return re.search(r"\bthen\b", self.joint, re.IGNORECASE) is not None

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Final
 
-from executive.language.lexicon import read_table
+from executive.language.lexicon import Patterns, read_table
 from executive.words.command import Command, Task, Thing
 from executive.words.knowledge import Knowledge
 
@@ -68,15 +68,21 @@ class Amendment:
 def follow_up_of(text: str) -> FollowUp | None:
     """How a sentence goes on from the one before; None when it stands for itself."""
     plain = " ".join(text.replace("’", "'").split()).strip(" .!,")
-    if _AGAIN.fullmatch(plain):
+    if _FORMS.again.fullmatch(plain):
         return FollowUp(FollowUpKind.AGAIN)
-    for pattern, kind in _FORMS:
+    for pattern, kind in _kinds():
         match = pattern.fullmatch(plain)
         if match:
             found = {key: (value or "").strip(" ,.!?") for key, value in match.groupdict().items()}
             preposition, said = _split(found["said"])
             return FollowUp(kind, said, preposition, _split(found.get("old", ""))[1])
     return None
+
+
+@cache
+def _kinds() -> tuple[tuple[re.Pattern[str], FollowUpKind], ...]:
+    kinds = (FollowUpKind.CORRECTION, FollowUpKind.ADDITION)
+    return tuple((form, kind) for kind in kinds for form in _FORMS.each(kind.value))
 
 
 def amended(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> tuple[Command, ...]:
@@ -153,39 +159,12 @@ def _place_of(commands: Sequence[Command], by: Amendment) -> int:
 
 def _split(said: str) -> tuple[str, str]:
     """A preposition at the beginning, and the rest."""
-    match = re.fullmatch(rf"({_PREPOSITION})\s+(.+)", said, re.IGNORECASE)
+    match = _FORMS.placed.fullmatch(said)
     return (match.group(1).lower(), match.group(2)) if match else ("", said)
 
 
 _START: Final = "start"
-_PREPOSITION: Final = r"to|into|onto|from|out of|off|in|on|at"
-_NOUN: Final = r"(?P<said>(?:(?:to|into|onto|from|out of|off|in|on|at)\s+)?[\w'\- ]{1,60}?)"
-_NO: Final = r"(?:no|nope|nah|sorry|oops|wait|actually|i mean|i meant|rather|correction|or rather|hold on)"
-_NOT_OLD: Final = r"not\s+(?P<old>[\w'\- ]{1,40}?)"
-_OLD: Final = r"(?P<old>[\w'\- ]{1,40}?)"
-_PLEASE: Final = r"(?:[\s,]+please)?\??"
-_FORMS: Final = tuple(
-    (re.compile(pattern, re.IGNORECASE), kind)
-    for pattern, kind in (
-        (rf"(?:{_NO}[\s,]+)*not\s+{_OLD}\s*(?:,|but|,\s*but)\s*{_NOUN}", FollowUpKind.CORRECTION),
-        (rf"(?:{_NO}[\s,]+)*{_NOUN}\s*,?\s*not\s+{_OLD}", FollowUpKind.CORRECTION),
-        (rf"(?:{_NO}[\s,]+)*{_NOUN}\s+instead(?:\s+of\s+{_OLD})?{_PLEASE}", FollowUpKind.CORRECTION),
-        (rf"(?:{_NO}[\s,]+)+(?:make (?:it|that)\s+)?{_NOUN}{_PLEASE}", FollowUpKind.CORRECTION),
-        (rf"make (?:it|that)\s+{_NOUN}{_PLEASE}", FollowUpKind.CORRECTION),
-        (rf"(?:(?:and|also)\s+)?{_NOUN}[\s,]+(?:too|as well|also){_PLEASE}", FollowUpKind.ADDITION),
-        (
-            rf"(?:and|also|and also|plus|what about|and what about|how about|and then|then)\s+{_NOUN}{_PLEASE}",
-            FollowUpKind.ADDITION,
-        ),
-        (rf"(?:another|one more)\s+{_NOUN}{_PLEASE}", FollowUpKind.ADDITION),
-    )
-)
-_AGAIN: Final = re.compile(
-    r"(?:(?:and|ok|okay|please|bring me|fetch me|get me|give me|i want|i would like|i'd like|can i have)\s+)*"
-    r"(?:another(?: one)?|one more|the same again|again|once more|do (?:it|that) again|the same(?: again)?"
-    r"|one more time|repeat that)(?:[\s,]+please)?",
-    re.IGNORECASE,
-)
+_FORMS: Final = Patterns("followups.yaml")
 
 
 class Remark(enum.Enum):

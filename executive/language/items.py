@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 from typing import Final
 
-from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
+from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind, lexicon
+from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.tokens import Token
 
@@ -30,6 +32,7 @@ __all__ = [
     "Whether",
     "command_position",
     "predicates",
+    "requested",
     "spoken_words",
     "without_name",
 ]
@@ -280,3 +283,88 @@ def without_name(clauses: Sequence[Predicate]) -> tuple[Predicate, ...]:
     comma = isinstance(first.items[-1], Separator) and first.items[-1].word == "," if first.items else False
     called = name is not None and not joined and (name.phrase.named_person or (comma and name.phrase.proper))
     return tuple(rest if first.verb is None and called and rest else clauses)
+
+
+def requested(predicates: Sequence[Predicate], words: Lexicon) -> list[Predicate]:
+    """The predicates as they are meant: a place before the first verb behind it, reasons and "check if" left out."""
+    return list(_without_checks(_without_reasons(_with_fronted(_with_verb(predicates, words)))))
+
+
+def _with_verb(clauses: Sequence[Predicate], words: Lexicon) -> Sequence[Predicate]:
+    """Say "take" where there is no verb at all: "hammer to the kitchen, please"."""
+    items = [item for clause in clauses for item in clause.items if not isinstance(item, Separator)]
+    chunks = [item for item in items if isinstance(item, Chunk)]
+    carried = [chunk.role for chunk in chunks] == [None, PrepositionRole.GOAL] and len(chunks) == len(items)
+    if len(clauses) != 1 or clauses[0].verb is not None or not carried or chunks[0].phrase.kind is not NounKind.THING:
+        return clauses
+    return (replace(clauses[0], verb=Verb(_TAKE, words.verbs[(_TAKE,)])),)
+
+
+def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
+    """Put a place that stands before the first verb behind it: "from the kitchen bring me a spoon"."""
+    if len(clauses) < 2 or clauses[0].verb is not None or not isinstance(clauses[1].verb, Verb | Being):
+        return clauses
+    fronted = [item for item in clauses[0].items if not isinstance(item, Separator)]
+    if _named_first(fronted, clauses[1]):
+        return (replace(clauses[0], verb=Being("", existential=True, asked=False)), *clauses[1:])
+    places = all(isinstance(item, Chunk) and item.role in _FRONTED for item in fronted)
+    first = replace(clauses[1], items=(*clauses[1].items, *fronted))
+    return (first, *clauses[2:]) if places else clauses
+
+
+def _named_first(fronted: Sequence[Item], clause: Predicate) -> bool:
+    """Whether a thing is only named, and then meant by "it": "that vase on the shelf, bring it here"."""
+    chunks = [item for item in fronted if isinstance(item, Chunk)]
+    named = len(chunks) == len(fronted) and bool(chunks) and chunks[0].role is None and not chunks[0].phrase.pronoun
+    placed = named and all(chunk.role in _FRONTED for chunk in chunks[1:]) and not chunks[0].phrase.speaker
+    meant = [item.phrase for item in clause.items if isinstance(item, Chunk)]
+    return placed and any(phrase.pronoun or phrase.text == chunks[0].phrase.text for phrase in meant)
+
+
+def _without_reasons(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
+    """Leave out what the speakers say that they are about to do themselves, before or after what is to be done."""
+    if len(clauses) > 1 and _own_affair(clauses[-1].verb) and isinstance(clauses[-2].verb, Verb):
+        items = clauses[-2].items
+        at = next((n for n in range(len(items) - 1, -1, -1) if isinstance(items[n], Chunk)), None)
+        last = None if at is None else items[at]
+        wants = [item.word for item in items[(at or 0) + 1 :] if isinstance(item, Unknown)]
+        if at is not None and isinstance(last, Chunk) and last.phrase.speaker and at > 0 and wants[-1:] == ["to"]:
+            return (*clauses[:-2], replace(clauses[-2], items=items[:at]))
+    if len(clauses) < 3 or clauses[0].verb is not None or not isinstance(clauses[2].verb, Verb):
+        return clauses
+    first, act = clauses[0].items, clauses[1].verb
+    wants = [item.word for item in first if isinstance(item, Unknown)]
+    speaker = bool(first) and isinstance(first[0], Chunk) and first[0].phrase.speaker
+    return clauses[2:] if speaker and _own_affair(act) and wants[-1:] == ["to"] else clauses
+
+
+def _own_affair(verb: Verb | Being | Outside | None) -> bool:
+    """Whether it is nothing that a robot does, and nothing that it is asked for, either."""
+    return isinstance(verb, Outside) and verb.word.lower() not in lexicon().asks
+
+
+def _without_checks(clauses: Sequence[Predicate]) -> Iterator[Predicate]:
+    """Leave out "see" and "check" before "if there is": the question stands alone."""
+    asks = False
+    for clause, after in zip_longest(clauses, clauses[1:]):
+        bare = _checks(clause) and _only_whether(clause)
+        if clause.whether and not asks:
+            clause = replace(clause, verb=Outside(_IF))
+        asks = bare and after is not None and after.whether
+        if not asks and not (bare and after is not None and isinstance(after.verb, Verb)):
+            yield clause
+
+
+def _checks(clause: Predicate | None) -> bool:
+    """Whether its verb asks how things stand."""
+    return clause is not None and isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
+
+
+def _only_whether(clause: Predicate) -> bool:
+    """Whether nothing but "if" stands behind its verb, as in "see if you can find it"."""
+    return all(isinstance(item, Separator | Whether) for item in clause.items)
+
+
+_FRONTED: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
+_TAKE: Final = "take"
+_IF: Final = "if"

@@ -10,13 +10,15 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
-from executive.language.lexicon import lexicon
+from executive.language.lexicon import Patterns, lexicon
 from executive.language.spelling import sound_distance
 
 __all__ = ["Address", "WakeResult", "addressed_to", "heard_wake", "strip_wake"]
 
+_FORMS: Final = Patterns("wake.yaml")
 SAME_NAME: Final = 0.13
 """How far a misheard name may sound from the name, behind a greeting (see `sound_distance`)."""
 SAME_NAME_ALONE: Final = 0.05
@@ -73,8 +75,7 @@ def strip_wake(text: str, name: str, others: Collection[str] = ()) -> WakeResult
     if address.name is not None:
         own = address.name == name
         return WakeResult(address.text if own else text, addressed=own, other_name=None if own else address.name)
-    other = re.match(rf"\s*(?i:{_GREETING})\b[\s,]+([A-Z][\w'-]*)\s*,", text)
-    bare = re.sub(rf"^\W*{re.escape(name)}\s+(?!{_TOLD_OF})(?=\w)", "", text, count=1, flags=re.IGNORECASE)
+    other, bare = _FORMS.other.match(text), _forms(name).bare.sub("", text, count=1)
     return WakeResult(bare, addressed=False, other_name=other.group(1) if other else None)
 
 
@@ -91,15 +92,21 @@ class _Call:
         return " ".join(f"{text[: self.start].rstrip()} {text[self.end :]}".split()).strip(" ,")
 
 
+@lru_cache(maxsize=64)
+def _forms(name: str) -> Patterns:
+    """The ways of calling a robot of that name."""
+    return _FORMS.filled(own=rf"{re.escape(name)}\b")
+
+
 def _calls(text: str, name: str) -> Iterator[_Call]:
-    own = rf"{re.escape(name)}\b"
-    for match in re.finditer(rf"\b{_GREETING}\b(?:\s+there\b)?[\s,]*{own}(?!['’]\w)", text, re.IGNORECASE):
+    forms = _forms(name)
+    for match in forms.greets.finditer(text):
         if _greets(text[: match.start()], text[match.end() :]):
             yield _whole(match, text, name)
-    first = re.match(rf"\W*(?:(?:{_POLITE})\b[\s,]*)?({own})(?=\s*[,.!:;-]+\s|\s+{_ASKS}|\W*$)", text, re.IGNORECASE)
+    first = forms.begins.match(text)
     if first and _calls_bare(text[first.end() :]):
-        yield _Call(name, first.start(1), first.end() + _pause(text[first.end() :]))
-    last = re.search(rf",\s*{own}(?=\W*$)", text, re.IGNORECASE)
+        yield _Call(name, first.start("name"), first.end() + _pause(text[first.end() :]))
+    last = forms.ends.search(text)
     if last and _may_end_with_name(text[: last.start()]):
         yield _whole(last, text, name)
 
@@ -116,24 +123,22 @@ def _pause(after: str) -> int:
 
 def _greets(before: str, after: str) -> bool:
     """Whether a greeting with the name calls, and is not told of ("I said hi Alice", "hey, Alice is my friend")."""
-    if _matches(rf".*\b(?:{_SAYING})\b[\s\S]{{0,24}}", before) or _story(after):
+    if _FORMS.says_before.fullmatch(before) or _story(after):
         return False
     begins = not before.strip(" ,.!?;:-'\"") or before.rstrip().endswith((",", ".", "!", "?", ";", ":"))
-    return begins or _matches(rf"\W*(?:{_POLITE})\W*", before) or not after.strip(" .!?,")
+    return begins or _FORMS.politely.fullmatch(before) is not None or not after.strip(" .!?,")
 
 
 def _story(after: str) -> bool:
     """Whether what stands behind the name tells something of its bearer."""
-    return _matches(rf"\s*(?:{_TOLD_OF})[\s\S]*", after) or _matches(r"\s*,?\s*(?:and|or)\s+[A-Z][\s\S]*", after, 0)
+    return (_FORMS.story.fullmatch(after) or _FORMS.listed.fullmatch(after)) is not None
 
 
 def _calls_bare(after: str) -> bool:
     """Whether the name at the beginning calls: no apposition, list or relative clause follows."""
-    if _matches(rf"\s*,?\s*(?:{_RELATIVE}|and\b|or\b)[\s\S]*", after) or _story(after):
+    if _FORMS.relates.fullmatch(after) or _story(after):
         return False
-    apposition = rf"\s*,[^,]*,\s*(?:{_TOLD_OF})[\s\S]*"
-    listed = r"\s*,\s*[A-Z]\w*\s*(?:,|and|or)\b[\s\S]*"
-    return not (_matches(apposition, after) or _matches(listed, after, 0))
+    return not (_FORMS.apposition.fullmatch(after) or _FORMS.listed_bare.fullmatch(after))
 
 
 def _may_end_with_name(before: str) -> bool:
@@ -141,11 +146,7 @@ def _may_end_with_name(before: str) -> bool:
     last = re.sub(r"\W+$", "", before).rpartition(" ")[2].lower()
     if last in lexicon().people or re.search(r",\s*[A-Z]\w*\s*$", before):
         return False
-    return not _matches(rf"\W*(?:{_TELLS})\b[\s\S]*", before)
-
-
-def _matches(pattern: str, text: str, flags: int = re.IGNORECASE) -> bool:
-    return re.fullmatch(pattern, text, flags | re.DOTALL) is not None
+    return _FORMS.tells_of.fullmatch(before) is None
 
 
 def _corrected(transcript: str, name: str, others: Collection[str]) -> Iterator[str]:
@@ -168,31 +169,6 @@ def _sounds_like(heard: str, name: str, others: Collection[str], limit: float) -
     return distance <= limit and all(distance < sound_distance(heard, other) for other in others)
 
 
-_GREETING: Final = r"(?:hey|hi|ok|okay|hello)"
 _HEARD_GREETINGS: Final = frozenset({"hey", "hay", "hei", "hi", "high", "ok", "okay", "hello", "he", "ay", "eh", "a"})
 _HEARD_WORDS: Final = 6
 _LATEST_GREETING: Final = 3
-_POLITE: Final = r"please|oh|um|uh|er|so|well|right|now|and|but|listen|sorry|excuse me|thanks|thank you|good \w+"
-_ASKS: Final = r"(?:please|(?:can|could|would|will)\s+you)\b"
-_SAYING: Final = (
-    r"say|says|said|saying|shout(?:s|ed)?|yell(?:s|ed)?|whisper(?:s|ed)?|answer(?:s|ed)|repl(?:ies|ied)|call(?:s|ed)|hear"
-    r"|heard|sings?|sang|wrote|writes?|song|phrase|words?|named|titled|film|movie|book|episode"
-)
-_TOLD_OF: Final = (
-    r"['’]s\b|(?:is|was)\b(?!\s+(?:there|the|a|an|my|any|anyone|it|this|that|everything)\b)"
-    r"|(?:is|was)\s+(?:the|a|an|my|it)\s+(?:\w+\s+)?(?:of|who|friend|girl|boy|woman|man|person|one|robot|name|kind|very)\b"
-    r"|(?:is|was)\s+(?:an?|the|my)\s+(?:\w+\s+)?\w+\W*$"
-    r"|(?:can|could|will|would|should|might|may|must)\s+(?!you\b|i\b|we\b|u\b)\w+"
-    r"|(?:has|had|does|did|told|said|says|asked|asks|likes|liked|loves|loved|wants|wanted|needs|needed|knows|knew|thinks"
-    r"|thought|goes|went|comes|came|gets|got|gives|gave|takes|took|brings|brought|fetched|fetches|makes|made|lives|lived"
-    r"|works|worked|looks|looked|seems|seemed|sees|saw|called|calls|sent|sends|bought|buys|left|leaves|keeps|kept|found"
-    r"|finds|helps|helped|plays|played|writes|wrote|isn't|wasn't|doesn't|didn't|won't|can't|never|always|also|who|whose"
-    r"|whom|which|in wonderland)\b"
-)
-_RELATIVE: Final = r"(?:who|whose|whom|which)\b"
-_TELLS: Final = (
-    r"this is|that is|that's|it is|it's|it was|this was|meet|he|she|they|his|her name|my name|the name"
-    r"|i (?:am|was|went|met|saw|told|asked|know|knew|love|like|think|have|had|spoke|talked|gave|sent|called|live|work)"
-    r"|i'm|i've|we (?:are|were|have|had|met|saw|went|know|love|like|asked|told|live|work)|have you|has|did|do you know"
-    r"|who is|who's|there (?:is|was) (?:a|my) (?:girl|woman|person|friend)"
-)

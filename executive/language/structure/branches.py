@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from executive.language.amounts import SPAN, seconds_of, time_of, times_of
+from executive.language.amounts import seconds_of, time_of, times_of
 from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cut, spoken, verb_positions
 from executive.language.questions import RefusalError
 from executive.language.structure.conditions import suppose
@@ -37,11 +37,7 @@ from executive.words.steps import MissionStep
 
 
 class Branches(Base):
-    """Decides. Its methods raise RefusalError."""
-
-    def modified(self, row: Row, clause: Clause, found: Behind) -> None:
-        """What is done only if something is so, or several times."""
-        raise NotImplementedError
+    """Decides and repeats. Its methods raise RefusalError."""
 
     def always(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
         """What is done at the end, whatever happens."""
@@ -231,15 +227,6 @@ class Branches(Base):
         self.modified(row, main, Behind(main.text, clause.kind or Cue.IF, clause.cue, clause.text))
         return at + 1
 
-
-def ends_anyway(clause: Clause) -> bool:
-    """Whether "whatever happens" stands at the end of a clause."""
-    return clause.kind is None and re.search(rf"{CLAUSES.whatever.pattern}$", clause.text, re.IGNORECASE) is not None
-
-
-class Repeats(Branches):
-    """Repeats. Its methods raise RefusalError."""
-
     def repeated(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
         """ "Every ten minutes", "three times", "as long as ..." before what is to be done."""
         clause, end = clauses[at], end_of(clauses, at + 1, rounds=True)
@@ -297,7 +284,7 @@ class Repeats(Branches):
         """The rounds within "for an hour", "until three o'clock", "five times"."""
         if not text:
             return Rounds(Repeat((), every_s=every_s), state)
-        match = re.fullmatch(rf"for (?:the next )?({SPAN})", text, re.IGNORECASE)
+        match = ACTS.for_span.fullmatch(text)
         if match is not None:
             seconds = seconds_of(match[1])
             if seconds is None or seconds < every_s:

@@ -50,7 +50,8 @@ class State:
 class Supposed:
     """A condition, the words that tell it, and what is known where it holds and where it does not.
 
-    `items` are those of a look, which another condition may leave out.
+    `told` says that the words tell it as it is found, `items` are those of a look, which another condition may leave
+    out.
     """
 
     condition: Condition
@@ -58,11 +59,12 @@ class Supposed:
     holds: State
     fails: State
     notes: tuple[str, ...] = ()
+    told: bool = True
     items: tuple[Item, ...] = field(default=(), repr=False)
 
     def denied(self, said: str) -> Supposed:
         """The contrary, as it is said."""
-        return Supposed(negated(self.condition), said, self.fails, self.holds, self.notes, self.items)
+        return Supposed(negated(self.condition), said, self.fails, self.holds, self.notes, items=self.items)
 
 
 @dataclass(frozen=True)
@@ -200,7 +202,7 @@ class Leaves:
         known = self.seen(leaf, replace(state, goal=leaf.state.goal, at=leaf.state.at))
         fails = replace(known, memory=replace(known.memory, where=None, told=state.memory.told))
         condition = looks[0] if len(looks) == 1 else AllOf(looks)
-        return Supposed(condition, text, known, fails, leaf.trace.notes, tuple(items))
+        return Supposed(condition, text, known, fails, leaf.trace.notes, items=tuple(items))
 
     def _by_name(self, item: Item, state: State) -> Item:
         """The person who was spoken of in place of "he"."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
-from executive.language.amounts import AMOUNTS, SPAN, seconds_of, share_of, time_of
+from executive.language.amounts import AMOUNTS, seconds_of, share_of, time_of
 from executive.language.clauses import ACTS, CLAUSES
 from executive.language.lexicon import Patterns
 from executive.language.nouns import NounKind
@@ -50,7 +50,7 @@ Done = tuple[tuple[MissionStep, ...], State, tuple[str, ...]]
 def waited(text: str, state: State, leaves: Leaves) -> Done | None:
     """A wait for something to be so; None where it is none, or only for some time. Raises RefusalError."""
     match = _WAITING.wait.fullmatch(text)
-    if match is None or re.fullmatch(rf"(?:about |another )?{SPAN}", match["what"], re.IGNORECASE):
+    if match is None or ACTS.only_span.fullmatch(match["what"]):
         return None
     return wait(match["where"].strip(), match["how"].lower(), match["what"], state, leaves)
 

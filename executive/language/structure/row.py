@@ -92,15 +92,13 @@ def same(one: Condition, other: Condition) -> bool:
 
 def turned(supposed: Supposed) -> Supposed:
     """The contrary, with what is known then."""
-    return supposed.denied(f"not {supposed.said}")
+    return replace(supposed.denied(f"not {supposed.said}"), told=False)
 
 
 def sentence_of(supposed: Supposed) -> str | None:
     """What was found, as it is told; None where it was said otherwise."""
     said = supposed.said
-    plain = (
-        not said.startswith("not ") and not CLAUSES.deictic.search(said) and not re.match(r"it\b|there is one", said)
-    )
+    plain = supposed.told and not CLAUSES.deictic.search(said) and not re.match(r"it\b|there is one", said)
     return said if said and plain else None
 
 

@@ -15,7 +15,7 @@ from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.structure.branches import Repeats, ends_anyway
+from executive.language.structure.branches import Branches
 from executive.language.structure.conditions import suppose
 from executive.language.structure.leaves import Leaves, State, at_start, named, placed, verb
 from executive.language.structure.requests import (
@@ -44,8 +44,36 @@ from executive.words.steps import MissionStep
 __all__ = ["Structured", "structured"]
 
 
-class Acts(Repeats):
-    """Reads one clause. Its methods raise RefusalError."""
+class Builder(Branches):
+    """Puts the steps of one sentence together. Its methods raise RefusalError."""
+
+    def sequence(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
+        """The steps of clauses, one after the other."""
+        row, at = Row(state), 0
+        while at < len(clauses):
+            last = row.steps[-1].block if row.steps and not row.plain else None
+            if isinstance(last, Repeat) and last.times is None and last.until is None and last.while_ is None:
+                raise RefusalError(
+                    "nothing can come after what is repeated without end; say how often", [clauses[at].text]
+                )
+            at = self._next(row, clauses, at)
+        self.flush(row)
+        return tuple(row.steps), row.state
+
+    def _next(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
+        """Take the clause at `at`, and those that belong to it; the index of the one behind."""
+        clause = clauses[at]
+        if clause.anyway or clause.ends_anyway:
+            return self.always(row, clauses, at)
+        if clause.kind in (Cue.IF, Cue.UNLESS):
+            return self.decided(row, clauses, at)
+        if clause.kind in (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED):
+            return self.attached(row, clauses, at)
+        if clause.kind is Cue.SOON:
+            return self.soon(row, clauses, at)
+        if clause.kind is not None:
+            return self.repeated(row, clauses, at)
+        return self.one_clause(row, clauses, at)
 
     def one_clause(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
         """Take the clause at `at`, which begins with what is to be done; the index of the one behind."""
@@ -366,35 +394,3 @@ def _depth(step: MissionStep) -> int:
     inner = max(map(_depth, () if step.block is None else steps_of(step.block)), default=0)
     holds = isinstance(step.block, Choose | Repeat | Try | Together | Ask)
     return inner + holds
-
-
-class Builder(Acts):
-    """Puts the steps of one sentence together. Its methods raise RefusalError."""
-
-    def sequence(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
-        """The steps of clauses, one after the other."""
-        row, at = Row(state), 0
-        while at < len(clauses):
-            last = row.steps[-1].block if row.steps and not row.plain else None
-            if isinstance(last, Repeat) and last.times is None and last.until is None and last.while_ is None:
-                raise RefusalError(
-                    "nothing can come after what is repeated without end; say how often", [clauses[at].text]
-                )
-            at = self._next(row, clauses, at)
-        self.flush(row)
-        return tuple(row.steps), row.state
-
-    def _next(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
-        """Take the clause at `at`, and those that belong to it; the index of the one behind."""
-        clause = clauses[at]
-        if clause.anyway or ends_anyway(clause):
-            return self.always(row, clauses, at)
-        if clause.kind in (Cue.IF, Cue.UNLESS):
-            return self.decided(row, clauses, at)
-        if clause.kind in (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED):
-            return self.attached(row, clauses, at)
-        if clause.kind is Cue.SOON:
-            return self.soon(row, clauses, at)
-        if clause.kind is not None:
-            return self.repeated(row, clauses, at)
-        return self.one_clause(row, clauses, at)

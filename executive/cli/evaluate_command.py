@@ -7,36 +7,28 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
-from rich.console import Console
 
-from executive.app.evaluate.cluster import Pool
-from executive.app.evaluate.evaluation import Evaluated, evaluate_runs, refuse_impossible_runs
-from executive.app.evaluate.random_missions import random_missions as drawn_missions
-from executive.app.evaluate.runs import Evaluation, RunSpec, seed_range
-from executive.app.evaluate.scenario import files_of, is_evaluation, load_evaluation
-from executive.app.evaluate.summary import Case, groups_of, totals_of
-from executive.app.feasibility import refuse_impossible
-from executive.app.prepare import prepare
-from executive.app.report import VERDICTS, RunReport
 from executive.cli.number_options import quantity_option
 from executive.cli.options import ANYWAY, AS_JSON, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
-from executive.cli.report_command import show_cases, standings_json
 from executive.cli.terminal import terminal_answerer
 from executive.mission.request import Request
-from executive.mission.scenario import NO_SCENARIO, Scenario
-from executive.words.slug import slug
-from executive.words.steps import DEFAULT_WORLD
 from skills.files.errors import InputError
 from skills.quantities import Count
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from executive.app.evaluate.evaluation import Evaluated
+    from executive.app.evaluate.runs import Evaluation
+    from executive.app.evaluate.summary import Case
 
 __all__ = ["evaluate"]
 
 RESULTS: Final = "results.sqlite"
-CONDITION: Final = "condition"
 
 
 @takes_request(without=("file", "seed", "record"), out=Path("out/evaluate"))
@@ -63,7 +55,7 @@ def evaluate(
     ] = False,
     anyway: ANYWAY = False,
     random_missions: Annotated[
-        int | None, quantity_option(Count, help="Run so many random English missions; each seed draws one.")
+        int | None, quantity_option(Count, help="Runs so many random English missions; each seed draws one.")
     ] = None,
     worlds: Annotated[
         str | None, typer.Option(metavar="WORLD,...", help="The worlds of random missions, in turn; flat unless said.")
@@ -76,6 +68,12 @@ def evaluate(
     file, and the same command goes on where it stopped. Of a mission, faults and scenarios are all in each run, unless
     each is to be tried alone.
     """
+    from executive.app.evaluate.cluster import Pool
+    from executive.app.evaluate.evaluation import evaluate_runs, refuse_impossible_runs
+    from executive.app.evaluate.random_missions import random_missions as drawn_missions
+    from executive.app.evaluate.scenario import is_evaluation, load_evaluation
+    from executive.words.steps import DEFAULT_WORLD
+
     console, out, request = console_for(as_json), request.out, replace(request, out=Request.out)
     has_own = each_fault or request != Request()
     with refusals():
@@ -96,7 +94,8 @@ def evaluate(
         else:
             if worlds is not None:
                 raise InputError("--worlds is for --random-missions", hint="name one world by --world")
-            evaluation = _at_seeds(replace(request, file=file), seeds or "1-20", each_fault=each_fault, anyway=anyway)
+            asked = replace(request, file=file)
+            evaluation = _at_seeds(asked, seeds or "1-20", each_fault=each_fault, anyway=anyway)
             with _file_of(results) as kept_in:
                 found = evaluate_runs(evaluation, pool, kept_in, out=out, console=console)
             _show_seeds(found.cases, console, as_json=as_json)
@@ -107,7 +106,7 @@ def evaluate(
 
 def _end(cases: Sequence[Case]) -> None:
     """End with status 1 unless every run has achieved its mission."""
-    raise typer.Exit(0 if all(case.outcome.achieved for case in cases) else NOT_ACHIEVED)
+    raise typer.Exit(0 if all(case.report.achieved for case in cases) else NOT_ACHIEVED)
 
 
 @contextmanager
@@ -122,43 +121,24 @@ def _file_of(results: Path | None) -> Iterator[Path]:
 
 def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> Evaluation:
     """A request at many seeds, its questions answered once. Raises InputError: it cannot be done."""
-    chosen = seed_range(seeds)
-    prepared = prepare(asked, ask=terminal_answerer())
+    from executive.app.evaluate.runs import seed_range
+    from executive.app.evaluate.scenario import evaluation_at_seeds
+    from executive.app.feasibility import refuse_impossible
+    from executive.app.prepare import prepare
+
+    chosen, prepared = seed_range(seeds), prepare(asked, ask=terminal_answerer())
     if not anyway:
         refuse_impossible(prepared)
     if asked.file is None:
         asked = replace(asked, sentence=prepared.request.sentence, answers=(), questions=None)
-    asked = replace(asked, file=prepared.request.file).from_anywhere()
-    name = asked.sentence or (asked.file.stem if asked.file is not None else "")
-    runs: dict[str, RunSpec] = {}
-    for number, (condition, request) in enumerate(_conditions(asked, each_fault=each_fault)):
-        folder, files = f"{number}-{slug(condition)}/" if each_fault else "", files_of(request)
-        for seed in chosen:
-            each = replace(request, seed=seed, out=Request.out)
-            run = RunSpec(each, name, {CONDITION: condition} if condition else {}, files, f"{folder}seed-{seed:03d}")
-            runs.setdefault(run.id, run)
-    return Evaluation(name, tuple(runs.values()))
-
-
-def _conditions(asked: Request, *, each_fault: bool) -> Sequence[tuple[str, Request]]:
-    """The request under each condition by name: with all its faults and scenarios, or without, and with each alone.
-
-    Raises InputError: there are none to try alone.
-    """
-    if not each_fault:
-        return [("", asked)]
-    scenario, plain = asked.scenario, replace(asked, scenario=NO_SCENARIO, scenario_files=())
-    alone = [(words, replace(plain, scenario=Scenario((words,)))) for words in scenario.faults]
-    alone += [(str(path), replace(plain, scenario_files=(path,))) for path in asked.scenario_files]
-    if scenario.random:
-        alone.append((f"{scenario.random} random faults", replace(plain, scenario=Scenario(random=scenario.random))))
-    if not alone:
-        raise InputError("there is no fault to try alone", hint="give some by --fault, --random-faults or --scenario")
-    return [("no fault", plain), *alone]
+    return evaluation_at_seeds(replace(asked, file=prepared.request.file), chosen, each_fault=each_fault)
 
 
 def _show_seeds(cases: Sequence[Case], console: Console, *, as_json: bool) -> None:
     """Show a mission at many seeds: a row for each run, under several conditions a row for each of those."""
+    from executive.app.evaluate.scenario import CONDITION
+    from executive.app.evaluate.summary import totals_of
+
     conditions: dict[str, list[Case]] = {}
     for case in cases:
         conditions.setdefault(case.run.varied.get(CONDITION, ""), []).append(case)
@@ -167,7 +147,7 @@ def _show_seeds(cases: Sequence[Case], console: Console, *, as_json: bool) -> No
             console.print(f"\n{name}", style="bold", markup=False)
         header = ("seed", "tree", "referee", "collisions", "drops", "sim s", "x real", "message")
         show_table(console, header, map(_seed_row, own))
-    result: dict[str, Any] = {"runs": [case.outcome.report for case in cases], **totals_of(cases)}
+    result: dict[str, Any] = {"runs": [case.report.to_json() for case in cases], **totals_of(cases)}
     if "" not in conditions:
         told = [{CONDITION: name, "runs": len(own), **totals_of(own)} for name, own in conditions.items()]
         console.print()
@@ -181,8 +161,9 @@ def _show_seeds(cases: Sequence[Case], console: Console, *, as_json: bool) -> No
 
 
 def _seed_row(case: Case) -> tuple[str, ...]:
-    report = RunReport.from_json(case.outcome.report)
-    seen = report.seen
+    from executive.app.report import VERDICTS
+
+    report, seen = case.report, case.report.seen
     return (
         str(report.seed),
         report.outcome,
@@ -197,6 +178,10 @@ def _seed_row(case: Case) -> tuple[str, ...]:
 
 def _show(evaluation: Evaluation, found: Evaluated, kept_in: Path, console: Console, *, as_json: bool) -> None:
     """Show a scenario or random missions: success by groups, claims against verdicts, what is to be looked at."""
+    from executive.app.evaluate.scenario import CONDITION
+    from executive.app.evaluate.summary import groups_of, totals_of
+    from executive.cli.report_command import show_cases, standings_json
+
     cases, logs = found.cases, found.about.get("logs")
     show_cases(console, cases, logs=logs)
     console.print(f"Results: {kept_in}; a report: errand report {kept_in} --html report.html", markup=False)
@@ -210,7 +195,7 @@ def _show(evaluation: Evaluation, found: Evaluated, kept_in: Path, console: Cons
     ]
     print_json(
         {
-            "runs": [{**case.outcome.report, "id": case.outcome.run_id} for case in cases],
+            "runs": [{**case.report.to_json(), "id": case.outcome.run_id} for case in cases],
             **totals_of(cases),
             **({"conditions": conditions} if conditions else {}),
             **standings_json(cases, logs),

@@ -164,7 +164,7 @@ def show_cases(console: Console, cases: Sequence[Case], *, logs: str | None) -> 
 
 def _to_look_at_row(case: Case, logs: str | None) -> tuple[str, ...]:
     folder = log_folder(case, logs)
-    world, seed = str(case.outcome.report.get("world") or ""), str(case.run.request.seed)
+    world, seed = case.report.world, str(case.run.request.seed)
     return case.label, world, seed, case.asked, case.why, "" if folder is None else str(folder)
 
 
@@ -189,11 +189,11 @@ def standings_json(cases: Sequence[Case], logs: str | None) -> dict[str, Any]:
             {
                 "id": case.outcome.run_id,
                 "standing": case.outcome.standing.value,
-                "world": case.outcome.report.get("world"),
+                "world": case.report.world,
                 "seed": case.run.request.seed,
                 "mission": case.run.mission,
                 "asked": case.asked,
-                "cause": case.outcome.report.get("cause"),
+                "cause": case.report.cause,
                 "why": case.why,
                 "log": None if (folder := log_folder(case, logs)) is None else str(folder),
                 "command": command_of(case.run),

@@ -105,20 +105,26 @@ class Request:
     world: Annotated[str | None, Option("World by name or folder; flat unless said.")] = None
     require_wake: Annotated[
         bool | None,
-        Option("Must the robot's name be said? If spoken, or where the world asks for it.", "--wake/--no-wake"),
+        Option(
+            "Whether the robot's name must be said; by default if spoken, or where the world asks for it.",
+            "--wake/--no-wake",
+        ),
     ] = None
     answers: Annotated[
-        tuple[str, ...], Option("An answer to a question that is asked back; in their order.", "--answer")
+        tuple[str, ...],
+        Option(
+            "Answers a question that the sentence leaves open; repeat it for further ones, in their order.", "--answer"
+        ),
     ] = ()
     questions: Annotated[
         QuestionPolicy | None,
-        Option("What becomes of other questions; asked at a terminal, else refused, unless a file says."),
+        Option("How to answer further questions; by default as the mission file says, else at the terminal, else not."),
     ] = None
-    seed: Annotated[Seed, Option("Sets the things in the world and all noise.")] = 1
+    seed: Annotated[Seed, Option("Sets the objects in the world and all noise.")] = 1
     out: Annotated[Path, Option("Folder for log, tree, recording and pictures.")] = Path("out")
-    record: Annotated[bool, Option("No recording and no pictures.", "--no-record", read=operator.not_, typed=bool)] = (
-        True
-    )
+    record: Annotated[
+        bool, Option("Leaves no recording and no pictures.", "--no-record", read=operator.not_, typed=bool)
+    ] = True
     stack: Annotated[
         Path | None,
         Option(
@@ -127,17 +133,25 @@ class Request:
             typed=Path,
         ),
     ] = None
-    map: Annotated[Path | None, Option("The robot's map, a folder of `errand map build`; else the world's own.")] = None
+    map: Annotated[
+        Path | None, Option("The robot's map, a folder of `errand map build`; by default the world's own.")
+    ] = None
     start: Annotated[
         Start | None,
         Option(
-            "Where the robot stands (m, rad); 'unknown': anywhere, and it finds out.", metavar="X Y YAW", read=Start.of
+            "Where the robot stands (m, rad); 'unknown' puts it anywhere, and it finds out where.",
+            metavar="X Y YAW",
+            read=Start.of,
         ),
     ] = None
     scenario: Scenario = NO_SCENARIO
     scenario_files: Annotated[
         tuple[Path, ...],
-        Option("Faults and events: people walk, doors close, objects are moved.", "--scenario", metavar="FILE"),
+        Option(
+            "Adds the faults and events of a file: people walk, doors close, objects are moved.",
+            "--scenario",
+            metavar="FILE",
+        ),
     ] = ()
     variation: Variation = NO_VARIATION
     given: Annotated[
@@ -148,10 +162,12 @@ class Request:
     ] = field(default_factory=dict)
     time_of_day: Annotated[
         str | None,
-        Option("When the run begins; the time on this machine.", metavar="HH:MM", read=_time_of_day),
+        Option(
+            "Time of day when the run begins; by default the time on this machine.", metavar="HH:MM", read=_time_of_day
+        ),
     ] = None
     time_limit_s: Annotated[
-        LongDuration | None, Option('The run ends after so long: seconds, or "2 h"; 20 min.', "--time-limit")
+        LongDuration | None, Option('Ends the run after so long: seconds, or "2 h"; by default 20 min.', "--time-limit")
     ] = None
     robots: Annotated[
         tuple[RobotConfig, ...],

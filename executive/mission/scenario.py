@@ -25,9 +25,11 @@ class Scenario:
 
     faults: Annotated[
         tuple[str, ...],
-        Option('A fault, as in "camera.hand: dropout 5 s at 20 s"; may be repeated.', "--fault", metavar="WORDS"),
+        Option(
+            'Adds a fault, such as "camera.hand: dropout 5 s at 20 s"; may be repeated.', "--fault", metavar="WORDS"
+        ),
     ] = ()
-    random: Annotated[RandomFaults, Option("So many faults, by the seed.", "--random-faults")] = 0
+    random: Annotated[RandomFaults, Option("Adds so many faults that the seed draws.", "--random-faults")] = 0
     people: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     doors: tuple[Mapping[str, Any], ...] = ()
     moves: tuple[Mapping[str, Any], ...] = ()

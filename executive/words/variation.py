@@ -86,9 +86,9 @@ class Variation:
     light: Annotated[
         str, Option("normal, dim, bright, evening, low sun, or a brightness (1 is day light).", metavar="NAME")
     ] = NORMAL_LIGHT
-    clutter: Annotated[Clutter, Option("So many more objects lie about, by the seed.")] = 0
-    people: Annotated[MorePeople, Option("So many more people walk about, by the seed.")] = 0
-    friction: Annotated[Friction, Option("A factor on the friction of loose objects and robots.")] = 1.0
+    clutter: Annotated[Clutter, Option("Adds so many objects; the seed chooses where they lie.")] = 0
+    people: Annotated[MorePeople, Option("Adds so many walking people; the seed chooses their routes.")] = 0
+    friction: Annotated[Friction, Option("Multiplies the friction of loose objects and robots.")] = 1.0
 
     def __post_init__(self) -> None:
         light_called(self.light)

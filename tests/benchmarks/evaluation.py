@@ -28,6 +28,7 @@ from executive.app.evaluate.page import EvaluationPage, to_page
 from executive.app.evaluate.results import ResultsFile
 from executive.app.evaluate.runs import Evaluation, RunSpec
 from executive.app.evaluate.summary import Case
+from executive.app.report import RefereeReport, RunReport
 from executive.cli.report_command import command_of
 from executive.mission.request import Request
 
@@ -42,11 +43,10 @@ def made_outcome(run: RunSpec) -> RunOutcome:
     """A made result; every tenth has failed and has a timeline and a picture."""
     rng = random.Random(run.request.seed)
     failed = run.request.seed % 10 == 0
-    report = {
-        **{"outcome": "failure" if failed else "success", "cause": "PLANNING" if failed else None},
-        **{"message": "no path" if failed else "done", "world": "flat", "seed": run.request.seed, "sim_time_s": 60.0},
-        **{"referee": {"success": not failed, "why": "so it is"}, "work": {"plant_steps": rng.randrange(9999)}},
-    }
+    referee = RefereeReport(not failed, "so it is", 0, 0)
+    ended = ("failure", "PLANNING", "no path") if failed else ("success", None, "done")
+    report = RunReport(*ended, referee, (), "flat", run.request.seed, 60.0, 6.0, 10.0, 1200, "")
+    report = replace(report, work={"plant_steps": rng.randrange(9999)})
     picture = np.random.default_rng(run.request.seed).integers(0, 255, (240, 320, 3), dtype=np.uint8)
     jpeg = cv2.imencode(".jpg", cv2.GaussianBlur(picture, (9, 9), 0), [cv2.IMWRITE_JPEG_QUALITY, 60])[1].tobytes()
     lines = tuple((float(t), "alice/go", "RUNNING: on the way") for t in range(40))
@@ -68,7 +68,7 @@ def report(count: int) -> None:
             page = EvaluationPage("made", (), cases, kept.evidence, lambda case: command_of(case.run), cases, "itself")
             html = Path(folder) / "report.html"
             html.write_text(to_page(page))
-        failed = sum(not case.outcome.achieved for case in cases)
+        failed = sum(not case.report.achieved for case in cases)
         print(f"{count} results ({failed} failures): {time.perf_counter() - began:.2f} s, {html.stat().st_size} bytes")
 
 

@@ -107,7 +107,7 @@ def give_out_runs(runs: Sequence[RunSpec], workers: Workers, *, checked: bool = 
     """
     for finished in workers.give_out(partial(run_one, checked=checked), runs):
         outcome = finished.result or lost_outcome(finished.item, finished.lost)
-        if outcome.report["outcome"] != _CANCELLED:
+        if outcome.report.outcome != _CANCELLED:
             yield outcome
 
 
@@ -119,7 +119,7 @@ def _with_files(outcome: RunOutcome, folder: Path) -> RunOutcome:
     folder.mkdir(parents=True, exist_ok=True)
     for name, data in files.items():
         (folder / Path(name).name).write_bytes(data)
-    return replace(outcome, report={**outcome.report, "log": str(folder / "log.mcap")})
+    return replace(outcome, report=replace(outcome.report, log=str(folder / "log.mcap")))
 
 
 def refuse_impossible_runs(runs: Sequence[RunSpec]) -> None:

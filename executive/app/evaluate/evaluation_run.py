@@ -64,13 +64,13 @@ def _ran(spec: RunSpec, folder: Path, checked: bool) -> RunOutcome:
             refuse_impossible(prepared)
         report = run_simulated(prepared).report
     except InputError as error:
-        return RunOutcome(spec.id, _report(spec, "refused", REFUSED, str(error)).to_json())
+        return RunOutcome(spec.id, _report(spec, "refused", REFUSED, str(error)))
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
-        kept = RunOutcome(spec.id, _report(spec, "error", "ERROR", what).to_json())
+        kept = RunOutcome(spec.id, _report(spec, "error", "ERROR", what))
         return replace(kept, evidence=replace(kept.evidence, timeline=((0.0, "error", traceback.format_exc()),)))
     events = read_events(folder / "out" / "log.mcap")
-    outcome = RunOutcome(spec.id, {**report.to_json(), "log": ""}, steps_of(events))
+    outcome = RunOutcome(spec.id, replace(report, log=""), steps_of(events))
     failed = outcome.standing is not Standing.FULFILLED
     if not failed and not spec.folder:
         return outcome
@@ -111,7 +111,7 @@ def _is_text(path: Path, text: str) -> bool:
 
 def lost_outcome(spec: RunSpec, why: str) -> RunOutcome:
     """The outcome of a run with which worker after worker has died."""
-    return RunOutcome(spec.id, _report(spec, "error", "ERROR", why).to_json())
+    return RunOutcome(spec.id, _report(spec, "error", "ERROR", why))
 
 
 def _report(spec: RunSpec, outcome: str, cause: str, message: str) -> RunReport:

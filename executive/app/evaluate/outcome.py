@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from executive.app.report import RunReport
+
 __all__ = ["Evidence", "RunOutcome", "Standing", "same_everywhere"]
 
 _OF_THE_MACHINE: Final = ("wall_time_s", "real_time_factor", "log")
@@ -42,54 +44,32 @@ class Evidence:
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """The report of a run as JSON values with the keys of `errand run --json`, and what a page shows of it.
+    """The report of a run, and what a page shows of it.
 
     `steps_s` tells how long each skill ran, on the robot's clock. `spent_s` is the wall's time from the beginning of
     the work on it to its end, `worker` where it ran.
     """
 
     run_id: str
-    report: Mapping[str, Any]
+    report: RunReport
     steps_s: Mapping[str, float] = field(default_factory=dict)
     evidence: Evidence = Evidence()
     spent_s: float = 0.0
     worker: str = ""
 
     @property
-    def claimed(self) -> bool:
-        """The tree says that the mission is achieved."""
-        return bool(self.report["outcome"] == "success")
-
-    @property
-    def fulfilled(self) -> bool | None:
-        """What the referee says; None: not judged."""
-        referee = self.report.get("referee")
-        success: bool | None = None if referee is None else referee["success"]
-        return success
-
-    @property
-    def holds(self) -> bool | None:
-        """Whether the referee sees all that was asked for, however the run ended; None: not judged."""
-        return (self.report.get("referee") or {}).get("holds")
-
-    @property
-    def achieved(self) -> bool:
-        """The tree says so, and no referee denies it."""
-        return self.claimed and self.fulfilled is not False
-
-    @property
     def standing(self) -> Standing:
         """The claim against the verdict."""
-        if self.claimed:
-            return _CLAIMED[self.fulfilled]
-        if self.report["outcome"] in _NO_CLAIM:
-            return _NO_CLAIM[self.report["outcome"]]
-        return Standing.FULFILLED_YET_FAILED if self.holds else Standing.FAILED
+        if self.report.claimed:
+            return _CLAIMED[self.report.seen.success]
+        if self.report.outcome in _NO_CLAIM:
+            return _NO_CLAIM[self.report.outcome]
+        return Standing.FULFILLED_YET_FAILED if self.report.seen.holds else Standing.FAILED
 
     @property
     def digest(self) -> str:
         """Equal for equal results, wherever and however fast they came."""
-        text = json.dumps([same_everywhere(self.report), dict(self.steps_s)], sort_keys=True)
+        text = json.dumps([same_everywhere(self.report.to_json()), dict(self.steps_s)], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

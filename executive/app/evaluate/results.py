@@ -10,6 +10,7 @@ from typing import Final
 
 from executive.app.evaluate.outcome import Evidence, RunOutcome
 from executive.app.evaluate.runs import Evaluation, RunSpec
+from executive.app.report import RunReport
 from executive.store.database import Database, FileKind
 from executive.store.values import form
 from skills.files.errors import InputError
@@ -101,10 +102,10 @@ class ResultsFile(Database):
         with self.writing() as connection:
             row = (
                 run_id,
-                outcome.report["outcome"],
-                outcome.achieved,
+                outcome.report.outcome,
+                outcome.report.achieved,
                 outcome.digest,
-                json.dumps(outcome.report),
+                json.dumps(outcome.report.to_json()),
                 json.dumps(outcome.steps_s),
                 outcome.spent_s,
                 outcome.worker,
@@ -132,7 +133,12 @@ class ResultsFile(Database):
             "ORDER BY number"
         )
         return [
-            (number, RunOutcome(run_id, json.loads(report), json.loads(steps), Evidence(), spent_s, worker))
+            (
+                number,
+                RunOutcome(
+                    run_id, RunReport.from_json(json.loads(report)), json.loads(steps), Evidence(), spent_s, worker
+                ),
+            )
             for number, run_id, report, steps, spent_s, worker in self.rows(query)
         ]
 

@@ -1,4 +1,4 @@
-"""Reads a scenario file of `errand evaluate` (missions, worlds, and what is varied) and multiplies it into runs."""
+"""Makes the runs of an evaluation: a scenario file (missions, worlds, variations) multiplied out, or many seeds."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from executive.app.evaluate.runs import Evaluation, RunSpec, seed_range
 from executive.app.mission_files import mission_file
 from executive.mission.request import Request
-from executive.mission.scenario import RandomFaults, Scenario
+from executive.mission.scenario import NO_SCENARIO, RandomFaults, Scenario
 from executive.mission.stack_file import stack_file
 from executive.words.robots import NamedRobot, RobotConfig, robots_in
+from executive.words.slug import slug
 from executive.words.variation import (
     NORMAL_LIGHT,
     Brightness,
@@ -33,16 +34,19 @@ from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import LongDuration, Seed
 
 __all__ = [
+    "CONDITION",
     "EvaluationFile",
     "FaultsFile",
     "MissionEntry",
     "VariationsFile",
-    "files_of",
+    "evaluation_at_seeds",
     "is_evaluation",
     "load_evaluation",
 ]
 
 MOST_RUNS: Final = 200_000
+CONDITION: Final = "condition"
+"""What runs with one fault or scenario alone vary by."""
 _NOTHING: Final = ("none", "default")
 FileFinder = Callable[[Path], Path]
 """The file that a path means: itself, or one of that name that comes with Errand. Raises InputError."""
@@ -72,6 +76,40 @@ def load_evaluation(path: Path) -> Evaluation:
     return Evaluation(str(path), runs)
 
 
+def evaluation_at_seeds(asked: Request, seeds: Sequence[int], *, each_fault: bool) -> Evaluation:
+    """A request at many seeds; with `each_fault` first without any, then with each fault and scenario file alone.
+
+    Raises InputError: there is none to try alone.
+    """
+    asked = asked.from_anywhere()
+    name = asked.sentence or (asked.file.stem if asked.file is not None else "")
+    runs: dict[str, RunSpec] = {}
+    for number, (condition, request) in enumerate(_conditions(asked, each_fault=each_fault)):
+        folder, files = f"{number}-{slug(condition)}/" if each_fault else "", _files_of(request)
+        for seed in seeds:
+            each = replace(request, seed=seed, out=Request.out)
+            run = RunSpec(each, name, {CONDITION: condition} if condition else {}, files, f"{folder}seed-{seed:03d}")
+            runs.setdefault(run.id, run)
+    return Evaluation(name, tuple(runs.values()))
+
+
+def _conditions(asked: Request, *, each_fault: bool) -> Sequence[tuple[str, Request]]:
+    """The request under each condition by name: with all its faults and scenarios, or without, and with each alone.
+
+    Raises InputError: there are none to try alone.
+    """
+    if not each_fault:
+        return [("", asked)]
+    scenario, plain = asked.scenario, replace(asked, scenario=NO_SCENARIO, scenario_files=())
+    alone = [(words, replace(plain, scenario=Scenario((words,)))) for words in scenario.faults]
+    alone += [(str(path), replace(plain, scenario_files=(path,))) for path in asked.scenario_files]
+    if scenario.random:
+        alone.append((f"{scenario.random} random faults", replace(plain, scenario=Scenario(random=scenario.random))))
+    if not alone:
+        raise InputError("there is no fault to try alone", hint="give some by --fault, --random-faults or --scenario")
+    return [("no fault", plain), *alone]
+
+
 @dataclass(frozen=True)
 class _Reader:
     """One scenario file."""
@@ -86,7 +124,7 @@ class _Reader:
         seeds, variations = self._seeds(), [*self._variations(self.file.variations)]
         for (name, asked), world, robots, (changes, varied) in product(missions, worlds, self._robots(), variations):
             first = replace(asked, world=world, robots=robots, time_limit_s=self.file.time_limit, **changes)
-            files = files_of(first)
+            files = _files_of(first)
             yield from (RunSpec(replace(first, seed=seed), name, varied, files) for seed in seeds)
 
     def _robots(self) -> Sequence[tuple[RobotConfig, ...]]:
@@ -186,7 +224,7 @@ def _label(file: str, given: Mapping[str, Any]) -> str:
     return Path(file).stem + (f" ({values})" if values else "")
 
 
-def files_of(request: Request) -> Mapping[str, str]:
+def _files_of(request: Request) -> Mapping[str, str]:
     """The texts of a request's files and of all that they use, by path."""
     others = (path for path in (request.stack, *request.scenario_files) if path is not None)
     used = {} if request.file is None else dict(_with_used(request.file))

@@ -11,6 +11,7 @@ from scipy.stats import binomtest, fisher_exact
 
 from executive.app.evaluate.outcome import RunOutcome, Standing
 from executive.app.evaluate.runs import RunSpec
+from executive.app.report import RunReport
 
 __all__ = [
     "COLUMNS",
@@ -57,22 +58,21 @@ class Case:
     outcome: RunOutcome
 
     @property
-    def false_claim(self) -> bool:
-        """The tree claims what the referee denies."""
-        return self.outcome.claimed and self.outcome.fulfilled is False
+    def report(self) -> RunReport:
+        """How the run ended."""
+        return self.outcome.report
 
     @property
     def cause(self) -> str:
         """Why it is no success; empty where it is one."""
-        if self.outcome.achieved:
+        if self.report.achieved:
             return ""
-        return FALSE_CLAIM if self.false_claim else str(self.outcome.report.get("cause") or "ERROR")
+        return FALSE_CLAIM if self.report.false_claim else self.report.cause or "ERROR"
 
     @property
     def why(self) -> str:
         """The sentence that goes with the cause, or says why it was not judged."""
-        referee = self.outcome.report.get("referee") or {}
-        return str(referee.get("why", "") if self.outcome.claimed else self.outcome.report["message"])
+        return self.report.seen.why if self.report.claimed else self.report.message
 
     @property
     def label(self) -> str:
@@ -84,7 +84,7 @@ class Case:
     def failure_cause(self) -> str:
         """The cause that a run which failed gives; empty for all others."""
         failed = self.outcome.standing in (Standing.FAILED, Standing.FULFILLED_YET_FAILED)
-        return str(self.outcome.report.get("cause") or "") if failed else ""
+        return self.report.cause or "" if failed else ""
 
     @property
     def asked(self) -> str:
@@ -133,7 +133,7 @@ def groups_of(cases: Sequence[Case]) -> Sequence[Group]:
 
 def _keys(case: Case) -> Iterator[tuple[str, str]]:
     yield "mission", case.run.mission
-    yield "world", str(case.outcome.report.get("world") or case.run.request.world or "")
+    yield "world", case.report.world or case.run.request.world or ""
     yield "robots", case.run.robot_words
     yield from case.run.varied.items()
     if len(case.run.varied) > 1:
@@ -151,9 +151,9 @@ def _group(dimension: str, name: str, cases: Iterable[Case]) -> Group:
         dimension,
         name or PLAIN,
         len(found),
-        sum(case.outcome.achieved for case in found),
-        sum(case.outcome.fulfilled is True for case in found),
-        sum(case.outcome.claimed for case in found),
+        sum(case.report.achieved for case in found),
+        sum(case.report.seen.success is True for case in found),
+        sum(case.report.claimed for case in found),
         Counter(case.outcome.standing for case in found),
     )
 
@@ -252,7 +252,7 @@ class TimeRow:
 
 def time_rows(cases: Sequence[Case]) -> Sequence[TimeRow]:
     """Where the time goes, the most first; the rest is what no skill took."""
-    total_s = sum(float(case.outcome.report["sim_time_s"]) for case in cases)
+    total_s = sum(case.report.sim_time_s for case in cases)
     spent, runs = Counter[str](), Counter[str]()
     for case in cases:
         for skill, seconds in case.outcome.steps_s.items():
@@ -267,7 +267,7 @@ def mean_work(cases: Sequence[Case]) -> Sequence[tuple[str, float]]:
     """The mean of each work counter, by name."""
     work = Counter[str]()
     for case in cases:
-        work.update(case.outcome.report.get("work", {}))
+        work.update(case.report.work)
     return [(name, count / max(1, len(cases))) for name, count in sorted(work.items())]
 
 
@@ -302,8 +302,8 @@ def _compared(
 ) -> Comparison | None:
     if pairs:
         mine = [(one, two) for one, two in pairs if _is_in(one, key)]
-        only_first = sum(one.outcome.achieved and not two.outcome.achieved for one, two in mine)
-        only_second = sum(two.outcome.achieved and not one.outcome.achieved for one, two in mine)
+        only_first = sum(one.report.achieved and not two.report.achieved for one, two in mine)
+        only_second = sum(two.report.achieved and not one.report.achieved for one, two in mine)
         rates = (_rate(one for one, _ in mine), _rate(two for _, two in mine))
         return Comparison(*key, True, *rates, only_first, only_second, mcnemar(only_first, only_second))
     rates = (_rate(case for case in first if _is_in(case, key)), _rate(case for case in second if _is_in(case, key)))
@@ -317,7 +317,7 @@ def _is_in(case: Case, key: tuple[str, str]) -> bool:
 
 
 def _rate(cases: Iterable[Case]) -> Rate:
-    found = [case.outcome.achieved for case in cases]
+    found = [case.report.achieved for case in cases]
     return Rate(sum(found), len(found))
 
 

@@ -20,7 +20,7 @@ IMPORTS = [
     (["parse", "Hey Alice, fetch me a drink"], {"spacy"}),
     (["check", str(MISSIONS / "fetch_drink.yaml")], {"pydrake"}),
     (["run", "--help"], set()),
-    (["evaluate", "--help"], {"pydrake"}),
+    (["evaluate", "--help"], set()),
     (["queue", "--help"], {"pydrake"}),
     (["log", "--help"], {"cv2"}),
     (["new-skill", "--help"], set()),

@@ -7,6 +7,7 @@ import pytest
 from executive.app.evaluate.outcome import Evidence, RunOutcome
 from executive.app.evaluate.results import ResultsFile
 from executive.app.evaluate.runs import Evaluation, RunSpec
+from executive.app.report import RunReport
 from executive.mission.request import Request
 from skills.files.errors import InputError
 
@@ -15,7 +16,7 @@ EVALUATION = Evaluation("scenario.yaml", RUNS)
 
 
 def outcome(run, result="success"):
-    report = {"outcome": result, "cause": None, "message": "", "referee": None, "sim_time_s": 1.0}
+    report = RunReport(result, None, "", None, (), "flat", run.request.seed, 1.0, 1.0, 1.0, 20, "")
     return RunOutcome(run.id, report, {"navigate": 1.0}, Evidence(((0.5, "go", "went"),), (("map", b"jpeg"),)))
 
 
@@ -26,7 +27,7 @@ def test_results_are_kept_once_and_read_back(tmp_path):
     with ResultsFile(tmp_path / "r.sqlite") as kept:
         kept.begin(EVALUATION, code="1")
         ((number, found),) = kept.outcomes()
-        assert (number, found.run_id, found.achieved, kept.done()) == (1, RUNS[1].id, True, {RUNS[1].id})
+        assert (number, found.run_id, found.report.achieved, kept.done()) == (1, RUNS[1].id, True, {RUNS[1].id})
         assert (tuple(kept.runs()), kept.evidence(RUNS[1].id)) == (RUNS, outcome(RUNS[1]).evidence)
 
 
@@ -55,5 +56,5 @@ def test_what_is_no_results_file_is_refused(tmp_path):
 
 def test_wall_times_do_not_change_the_digest():
     slow = outcome(RUNS[0])
-    fast = replace(slow, report={**slow.report, "wall_time_s": 3.0, "log": "elsewhere"}, spent_s=9.0, worker="b")
+    fast = replace(slow, report=replace(slow.report, wall_time_s=3.0, log="elsewhere"), spent_s=9.0, worker="b")
     assert (slow.digest == fast.digest, slow.digest == outcome(RUNS[0], "failure").digest) == (True, False)

@@ -16,14 +16,15 @@ from executive.app.evaluate.summary import (
     standing_texts,
     to_look_at,
 )
+from executive.app.report import RefereeReport, RunReport
 from executive.mission.request import Request
 
 
 def case(seed, outcome, success=None, *, cause=None, holds=None, kind="fetch", world="flat"):
-    referee = {"success": success, "why": "the hammer is on the floor", "holds": holds}
-    report = {"outcome": outcome, "cause": cause, "message": "no path", "referee": referee, "sim_time_s": 9.0}
+    referee = RefereeReport(success, "the hammer is on the floor", 0, 0, holds=holds)
+    report = RunReport(outcome, cause, "no path", referee, (), world, seed, 9.0, 1.0, 9.0, 90, "")
     run = RunSpec(Request(f"fetch me the hammer {seed}", world=world, seed=seed), kind)
-    return Case(run, RunOutcome(run.id, {**report, "world": world}))
+    return Case(run, RunOutcome(run.id, report))
 
 
 CASES = (

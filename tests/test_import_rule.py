@@ -98,9 +98,9 @@ def test_no_module_breaks_the_import_rule(package: str) -> None:
         ("executive/run/runner.py", "def f():\n    import plant.simulation", ["plant.simulation"]),
         ("executive/run/runner.py", "from executive.cli.entry import app", ["executive.cli.entry.app"]),
         ("executive/run/runner.py", "from skills.api import Cause", []),
-        ("executive/app/assembly.py", "from plant.simulation import Simulation", []),
+        ("executive/app/simulated.py", "from plant.simulation import Simulation", []),
         (
-            "executive/app/assembly.py",
+            "executive/app/simulated.py",
             "from executive.cli.output import console_for",
             ["executive.cli.output.console_for"],
         ),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
-from executive.app.prepare import Setting, instead, prepare
+from executive.app.prepare import Setting, prepare
 from executive.app.prepared import Prepared, compiled_request
 from executive.language.questions import Answerer
 from executive.mission.request import Request
@@ -140,7 +140,7 @@ def _with_replacement(store: MissionStore, mission: StoredMission, prepared: Pre
         return prepared
     asked = replace(prepared.request, name=other.name, commands=other.commands, robot=name)
     commanded = Setting(asked, prepared.world, prepared.knowledge, prepared.robots).commanded()
-    own = instead(replace(prepared, request=asked), commanded)
+    own = replace(prepared, request=asked).with_mission(commanded)
     if own.request.fingerprint != other.fingerprint:
         raise _other_version(store, mission)
     return replace(prepared, mission=own.mission, tree=own.tree)

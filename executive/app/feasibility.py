@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from executive.app.prepared import Prepared
-from executive.app.robots import DEFAULT_KIND, PlacedRobot
+from executive.app.robots import DEFAULT_KIND, PlacedRobot, shared_detector
 from executive.app.worlds import refuse_unusable
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
 from executive.tree.estimate import Route, RoutePlanner, load_estimates
@@ -122,8 +122,6 @@ def _by_sight(abilities: Abilities, robot: PlacedRobot) -> Abilities:
     """The abilities with only those classes that the detector of the robot's stack knows. Raises InputError."""
     if robot.stack_file is None or robot.stack.detector == default_component("detector"):
         return abilities
-    from executive.app.assembly import shared_detector
-
     return replace(abilities, classes=abilities.classes & frozenset(shared_detector(robot.stack).class_names))
 
 

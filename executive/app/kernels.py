@@ -127,7 +127,7 @@ def _see_cells() -> None:
 
 def _survey() -> None:
     """Begin to make a map, and look for a place in it."""
-    from executive.app.assembly import simulate
+    from executive.app.simulated import simulate
     from skills.mapping.closures import Window
     from skills.mapping.mapper import Mapper
     from skills.mapping.survey import Survey

@@ -2,38 +2,49 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from py_trees.behaviour import Behaviour
 
 from executive.app.artifacts import Artifacts, draw_answer
 from executive.app.backend import Backend
 from executive.app.durable import Durable, mission_events
-from executive.app.found_out import with_found_out
 from executive.app.goal_conditions import Share
-from executive.app.happening_log import HappeningLog
 from executive.app.page_view import PageView, log_map
-from executive.app.preload import preload
 from executive.app.prepared import Prepared
-from executive.app.profiling import RunProfile
 from executive.app.report import RefereeReport, RobotReport, RunReport
-from executive.app.report_file import EndedTree, write_report
-from executive.app.signals import HUNG_UP, cancelled_by_signals
+from executive.app.report_file import EndedTree, with_found_out, write_report
+from executive.app.signals import cancelled_by_signals
 from executive.mission.request import Request
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
 from executive.record.profile import Profile
-from executive.record.schemas import WORK
+from executive.record.schemas import CONTROL, WORK
+from executive.record.work import CountedDetector
 from executive.run.control import Control
 from executive.run.outcome import RobotResult, RunResult
 from executive.run.runner import run
-from executive.run.visitor import RunEntry, RunSettings, RunVisitor
+from executive.run.visitor import Assigner, Progress, RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
-from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
+from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviours.skill_leaf import ERROR_TOPIC, SkillLeaf
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView, node_view
-from skills.faults.faulty_robot import with_faults
+from skills.api import PlanningError, Publish, Worker
+from skills.faults.faulty_robot import FaultyRobot, with_faults
 from skills.faults.words import Fault, parse_fault
+from skills.navigate.footprint import Footprint
+from skills.navigate.planner import plan_path
+from skills.robot import Pose2D, Robot
+
+__all__ = ["Finished", "entry_for", "opened_log", "return_memory", "robot_report", "run_request", "run_watched"]
 
 
 @dataclass(frozen=True)
@@ -42,11 +53,6 @@ class Finished:
 
     report: RunReport
     tree: NodeView
-
-    @property
-    def hung_up(self) -> bool:
-        """Whether it ended since its terminal was closed."""
-        return self.report.message == HUNG_UP
 
 
 def run_request(
@@ -69,12 +75,8 @@ def run_request(
     scenario = prepared.request.scenario
     entries = [entry_for(each, backend, durable) for each in prepared.all]
     spare = _spare(prepared, backend)
-    log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock, apart=prepared.several)
-    artifacts = Artifacts()
-    try:
-        if page is not None:
-            page.serve(log, backend.show_live())
-        log_map(log, prepared)
+    path, artifacts = out / ("log.mcap" if durable is None else durable.log), Artifacts()
+    with opened_log(path, backend, prepared, page, apart=prepared.several) as log:
         world, seed = prepared.world.name, prepared.request.seed
         kinds = {name: robot.kind for name, robot in prepared.robots.items()} if prepared.several else {}
         for each in prepared.all:
@@ -83,25 +85,16 @@ def run_request(
         journals = () if durable is None else durable.journals.values()
         watching = [artifacts, log, *journals, *visitors, *([] if page is None else [page])]
         if scenario:
-            watching.append(HappeningLog(log, entries[0].robot, backend.happened))
+            watching.append(DisturbanceLog(log, entries[0].robot, backend.happened))
         if profile is not None:
             watching.append(RunProfile(profile, backend, (artifacts, log), journals))
-        with cancelled_by_signals(control or Control(pace=None)) as controlled, LockStepWorker(clock) as worker:
-            result = run(
-                entries,
-                clock=clock,
-                worker=worker,
-                visitors=watching,
-                settings=_settings(prepared.request),
-                control=controlled,
-                spare=spare,
-            )
+        result = run_watched(
+            entries, backend, watching, settings=_settings(prepared.request), control=control, spare=spare
+        )
         if durable is not None:
             _keep(durable, log, prepared.tree.robot_name)
         counts = dict(sorted(Counter({**result.work, **backend.work(), "bytes_logged": log.bytes}).items()))
         log(WORK, counts)
-    finally:
-        log.close()
     events = mission_events(log.path)
     artifacts.recall(events)
     finished, ended = _judged(prepared, backend, result, log)
@@ -112,6 +105,44 @@ def run_request(
     if page is not None:
         page.offer(recording)
     return replace(finished, report=report)
+
+
+@contextmanager
+def opened_log(
+    path: Path, backend: Backend, first: Prepared | None, page: PageView | None, *, apart: bool
+) -> Iterator[EventLog]:
+    """The log of a run, which a page serves from its beginning, and which begins with the map that `first` knows."""
+    log = EventLog(path, backend.clock, apart=apart)
+    try:
+        if page is not None:
+            page.serve(log, backend.show_live())
+        if first is not None:
+            log_map(log, first)
+        yield log
+    finally:
+        log.close()
+
+
+def run_watched(
+    missions: Sequence[RunEntry] | Assigner,
+    backend: Backend,
+    visitors: Sequence[RunVisitor],
+    *,
+    settings: RunSettings,
+    control: Control | None,
+    spare: Sequence[RunEntry],
+) -> RunResult:
+    """Run missions, or all that an assigner gives, on a backend's clock; signals of the process cancel them."""
+    with cancelled_by_signals(control or Control(pace=None)) as controlled, LockStepWorker(backend.clock) as worker:
+        return run(
+            missions,
+            clock=backend.clock,
+            worker=worker,
+            visitors=visitors,
+            settings=settings,
+            control=controlled,
+            spare=spare,
+        )
 
 
 def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> RunEntry:
@@ -205,3 +236,113 @@ def _report(prepared: Prepared, worst: RobotReport, result: RunResult, *, log: s
         log=log,
         scenario=(*prepared.request.scenario.lines(), *prepared.request.variation.lines()),
     )
+
+
+def preload(entry: RunEntry) -> None:
+    """Take in the robot's first scan and plan a short way; the first time on a machine this takes some seconds."""
+    robot, localiser, costmap = entry.robot, entry.localiser, entry.costmap
+    localiser.update(robot)
+    estimate = localiser.estimate()
+    costmap.update(robot, estimate)
+    here = Pose2D.from_transform(estimate.X_WO @ robot.odometry().X_OB)
+    there = Pose2D(here.x_m, here.y_m, here.yaw_rad + 0.5)
+    with suppress(PlanningError):
+        plan_path(costmap, Footprint.of(robot.capabilities()), here, there)
+    _spare_the_collector()
+
+
+def _spare_the_collector() -> None:
+    """Keep what lives as long as the run out of garbage collections; what an earlier run left is collected first."""
+    if gc.get_freeze_count():
+        gc.unfreeze()
+        gc.collect()
+    gc.freeze()
+
+
+class RunProfile(RunVisitor):
+    """Times the parts of a run; what none of them takes is the executive's own."""
+
+    def __init__(
+        self, profile: Profile, backend: Backend, logs: Iterable[RunVisitor], journals: Iterable[RunVisitor]
+    ) -> None:
+        """`logs` are those that write the log, `journals` those that write the store."""
+        self._profile, self._backend = profile, backend
+        self._begun_s = 0.0
+        for each in logs:
+            profile.attach("log", each, "message", "tick")
+        for each in journals:
+            profile.attach("journal", each, "tick")
+
+    def begin(self, settings: RunSettings, worker: Worker) -> None:
+        """Time the backend's subsystems and what the worker does."""
+        self._backend.attach(self._profile)
+        submit, timed = worker.submit, self._profile.timed
+
+        def submit_timed(work: Callable[[], Any], *, latency_s: float, name: str) -> Any:
+            return submit(timed("planning", work), latency_s=latency_s, name=name)
+
+        vars(worker)["submit"] = submit_timed
+        self._profile.begin()
+        self._begun_s = self._profile.enter()
+
+    def mission_begun(self, nodes: Sequence[Behaviour], context: RunContext) -> None:
+        """Time what a robot's estimators, detector and skills do."""
+        attach = self._profile.attach
+        attach("localiser", context.localiser, "update")
+        attach("costmap", context.costmap, "update", "add_points", "clearance_m")
+        if isinstance(context.detector, CountedDetector):
+            attach("detector", context.detector, *context.detector.methods)
+        for leaf in nodes:
+            if isinstance(leaf, SkillLeaf):
+                attach("skills", leaf, "initialise", "update", "terminate")
+
+    def end(self, result: RunResult) -> None:
+        """The executive has done its part."""
+        self._profile.leave("executive", self._begun_s)
+
+
+Happened = Callable[[], Sequence[tuple[float, str]]]
+FAULT: Final = "fault"
+EVENT: Final = "event"
+
+
+class DisturbanceLog(RunVisitor):
+    """Logs after each tick which faults begin and end, and what happens in the world whatever the robot does."""
+
+    def __init__(self, publish: Publish, robot: Robot, happened: Happened) -> None:
+        """`happened` gives all that has happened in the world so far: times (s) and sentences."""
+        self._publish, self._happened = publish, happened
+        self._robot = robot if isinstance(robot, FaultyRobot) else None
+        self._at_work: tuple[str, ...] = ()
+        self._told = len(happened())
+
+    def tick(self, progress: Progress) -> None:
+        """Log what has begun, ended or happened since the last tick."""
+        for now_s, sentence in self._happened()[self._told :]:
+            self._log(now_s, EVENT, sentence)
+        self._told = len(self._happened())
+        now = () if self._robot is None else self._robot.faults_at_work()
+        for words in now:
+            if words not in self._at_work:
+                self._log(progress.now_s, FAULT, f"{words}: begins")
+        for words in self._at_work:
+            if words not in now:
+                self._log(progress.now_s, FAULT, f"{words}: is over")
+        self._at_work = now
+
+    def _log(self, now_s: float, what: str, message: str) -> None:
+        self._publish(CONTROL, {"t": round(now_s, 6), "what": what, "message": message})
+
+
+_LIBRARY: Final = ctypes.CDLL(None)
+
+
+def return_memory() -> None:
+    """Return what no mission needs any more to the system.
+
+    The C library keeps what was freed, in pieces that the next mission hardly fits into; a worker would grow by some
+    hundred megabytes with each mission. It does nothing where the C library has no `malloc_trim`.
+    """
+    gc.collect()
+    with suppress(AttributeError):
+        _LIBRARY.malloc_trim(0)

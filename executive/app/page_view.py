@@ -7,8 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-
 from executive.app.backend import Scene
 from executive.app.feasibility import refuse_impossible
 from executive.app.mission_files import shipped_missions
@@ -38,13 +36,19 @@ class PageView(RunVisitor):
     """The page of one run: `serve` before it, `offer` and `stay` after it."""
 
     def __init__(
-        self, prepared: Prepared | None, console: Console, *, port: int = 0, later: Callable[[str], str] | None = None
+        self,
+        prepared: Prepared | None,
+        tell: Callable[[str], None],
+        *,
+        port: int = 0,
+        later: Callable[[str], str] | None = None,
     ) -> None:
-        """`prepared` is what robots are asked for who can be spoken to; without it the page hears no sentences.
+        """`prepared` is what robots are asked for who can be spoken to; without it the page hears no sentences. `tell`
+        shows a line.
 
         `later` queues a sentence and says so; without it the page offers no queue.
         """
-        self._console, self._port, self._later = console, port, later
+        self._tell, self._port, self._later = tell, port, later
         self.control = Control(attended=True)
         self._feed = Feed()
         self._progress = ProgressWatch(self._feed)
@@ -69,7 +73,7 @@ class PageView(RunVisitor):
         content = PageContent(self._feed, actions, scene_url=None if scene is None else scene.url)
         self._server = serve(content, self._port)
         self._watch = ControlWatch(self.control, self._feed)
-        self._console.print(f"The page: {self._server.url}", markup=False)
+        self._tell(f"The page: {self._server.url}")
 
     def tick(self, progress: Progress) -> None:
         """Tell how far the run is."""
@@ -86,9 +90,7 @@ class PageView(RunVisitor):
 
         try:
             if self._server is not None:
-                self._console.print(
-                    "The page stays until Ctrl-C." if limit_s is None else f"The page: {limit_s:g} s more."
-                )
+                self._tell("The page stays until Ctrl-C." if limit_s is None else f"The page: {limit_s:g} s more.")
                 wait(limit_s)
         finally:
             self.close()

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from executive.language.robots import Addressed, Part
     from executive.language.understand import Understanding
 
-__all__ = ["Setting", "instead", "prepare", "prepare_alone"]
+__all__ = ["Setting", "prepare", "prepare_alone"]
 
 
 def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
@@ -79,13 +79,6 @@ def prepare_alone(request: Request) -> Prepared:
     """A request understood for one robot, whichever robots it names; nobody is asked. Raises InputError."""
     request, loaded, world, knowledge = _opened(replace(request, robots=()))
     return _for_the_only_robot(_standing(request, world, knowledge, None), loaded)
-
-
-def instead(prepared: Prepared, mission: Mission) -> Prepared:
-    """Another mission in the place of a robot's own. Raises InputError: it cannot be carried out."""
-    tree = compile_mission(mission, knowledge=prepared.knowledge, registry=installed_skills())
-    request = compiled_request(prepared.request, tree)
-    return replace(prepared, request=request, mission=mission, tree=tree, meant=None)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from executive.app.robots import PlacedRobot
 from executive.mission.mission import lines_of
 from executive.mission.request import Request
-from executive.tree.compiler import CompiledTree
+from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge
 from executive.words.steps import Mission
 from plant.worlds.world import World
@@ -52,6 +53,12 @@ class Prepared:
     def robot(self) -> PlacedRobot:
         """The robot of this mission."""
         return self.robots[self.mission.robot_name]
+
+    def with_mission(self, mission: Mission) -> Prepared:
+        """Another mission in the place of the robot's own. Raises InputError: it cannot be carried out."""
+        tree = compile_mission(mission, knowledge=self.knowledge, registry=installed_skills())
+        request = compiled_request(self.request, tree)
+        return replace(self, request=request, mission=mission, tree=tree, meant=None)
 
     @property
     def several(self) -> bool:

@@ -18,14 +18,18 @@ from executive.app.prepared import Prepared
 from executive.app.report import Ending, ReportedAnswer, ReportedObject, RobotReport, RunReport, counts_text
 from executive.record.reader import Event
 from executive.record.schemas import TRANSITIONS
-from executive.run.outcome import Said
-from executive.tree.compiler import CompiledTree
+from executive.record.sightings import seen_objects
+from executive.run.outcome import Finding, RunResult, Said
+from executive.tree.compiler import CompiledTree, StepPart
 from executive.tree.node_view import NodeView
 from executive.view.collapse import DRAWN_NODES, executed_tree, fold_to
 from executive.view.html import render
 from executive.view.map_picture import map_picture
 from executive.view.styles import ROBOT_COLOURS, NodeStyle, Styles, style_of
 from executive.view.svg import to_svg
+from executive.words.geometry import inside
+from executive.words.knowledge import Knowledge
+from skills.api import ObjectObservation
 from skills.files.errors import InputError
 
 __all__ = [
@@ -39,6 +43,7 @@ __all__ = [
     "part_of",
     "save_report",
     "step_rows",
+    "with_found_out",
     "write_report",
 ]
 
@@ -300,3 +305,41 @@ def _pictures(artifacts: Artifacts, robot: str, robots: Sequence[str]) -> Iterat
 
 def _drawn(artifacts: Artifacts, name: str) -> bytes | None:
     return to_jpeg(read_picture(artifacts.drawn[name])) if name in artifacts.drawn else None
+
+
+def with_found_out(
+    report: RunReport, knowledge: Knowledge, result: RunResult, artifacts: Artifacts, events: Sequence[Event]
+) -> RunReport:
+    """The report with what all missions of the run found out and said, in order, and what they saw."""
+    results = [each for robot in result.robots for each in (*robot.preempting, robot)]
+    parts = [part for tree in result.trees.values() for part in tree.parts]
+    findings = sorted((one for each in results for one in each.findings), key=lambda one: one.t_s)
+    said = sorted((one for each in results for one in each.said), key=lambda one: one.t_s)
+    return replace(
+        report,
+        answers=tuple(_answer(one, parts, artifacts) for one in findings),
+        said=tuple(said),
+        seen_objects=tuple(_object(seen, knowledge) for seen in seen_objects(events)),
+    )
+
+
+def _answer(finding: Finding, parts: Sequence[StepPart], artifacts: Artifacts) -> ReportedAnswer:
+    """A finding with the place of the command to which its node belongs, and its picture."""
+    path_id = finding.path_id
+    commands = (part.command for part in parts if f"{path_id}/".startswith(f"{part.path_id}/"))
+    return ReportedAnswer(
+        question=finding.question,
+        answer=finding.answer,
+        sentence=finding.sentence,
+        t_s=finding.t_s,
+        place=next((command.goal for command in commands if command is not None), None),
+        picture=artifacts.numbers.get((path_id, finding.t_s)),
+    )
+
+
+def _object(seen: ObjectObservation, knowledge: Knowledge) -> ReportedObject:
+    """An object that was seen, with the room that it is in."""
+    x_m, y_m, _ = seen.position_W
+    rooms = (name for name, room in knowledge.places.items() if inside(room.polygon, (x_m, y_m)))
+    place = knowledge.room(seen.surface) if seen.surface in knowledge.surfaces else next(rooms, None)
+    return ReportedObject(str(seen.thing), seen.surface, place, seen.position_W, seen.stamp_s)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -20,12 +20,13 @@ from plant.worlds.world import World
 from skills.files.errors import InputError
 from skills.navigate.footprint import Footprint
 from skills.robot import Capabilities, FloatArray, Pose2D
-from skills.stack import RobotStack
+from skills.stack import DetectorComponent, RobotStack, default_stack
 
 if TYPE_CHECKING:
+    from skills.detection import Detector
     from skills.estimate.grid_map import GridMap
 
-__all__ = ["DEFAULT_KIND", "PlacedRobot", "knowledge_for", "only_robot", "placed_robots", "stand_at"]
+__all__ = ["DEFAULT_KIND", "PlacedRobot", "knowledge_for", "only_robot", "placed_robots", "shared_detector", "stand_at"]
 
 DEFAULT_KIND: Final = "spot"
 TURNING_M: Final = 0.7
@@ -195,3 +196,18 @@ def stand_at(world: World, start: Start, seed: int) -> Pose2D:
     rng = np.random.default_rng([seed, _START_STREAM])
     x, y = places[rng.integers(len(places))]
     return Pose2D(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
+
+
+def shared_detector(stack: RobotStack | None = None) -> Detector:
+    """The detector of a stack, or the default one, loaded once in this process. Raises InputError."""
+    return _built((stack or default_stack()).detector)
+
+
+@cache
+def _built(component: DetectorComponent) -> Detector:
+    from skills.perception.detector.network_file import ModelFileError  # which loads what runs networks
+
+    try:
+        return component.build()
+    except ModelFileError as error:
+        raise InputError(error.message, hint=error.hint, file=error.file) from error

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any, Final, Protocol
 
 from executive.app.durable import Durable, as_it_was, new_run, next_run, plant_file, same_world, take_up
-from executive.app.memory import return_memory
-from executive.app.mission_run import Finished
+from executive.app.mission_run import Finished, return_memory
 from executive.app.prepare import prepare
 from executive.app.prepared import Prepared
 from executive.app.report import RunReport

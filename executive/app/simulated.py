@@ -1,4 +1,4 @@
-"""The simulated backend: robots in the plant, with its referee and its recorder."""
+"""The simulated backend: robots with their estimators in the plant of a world, with its referee and its recorder."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from pathlib import Path
 from typing import Final
 
 from executive.app.artifacts import Artifacts, draw_artifacts
-from executive.app.assembly import judge, run_entry, simulate, take_up_plant
 from executive.app.backend import Scene
 from executive.app.durable import Durable
-from executive.app.goal_conditions import Share
+from executive.app.goal_conditions import Share, verdict_of
 from executive.app.mission_run import Finished, run_request
 from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.report import RefereeReport
-from executive.app.robots import PlacedRobot
+from executive.app.robots import PlacedRobot, shared_detector
 from executive.record.profile import Profile
 from executive.run.control import Control
 from executive.run.outcome import RobotResult
@@ -28,14 +27,17 @@ from executive.run.worker import WorkThread
 from executive.tree.compiler import CompiledTree
 from executive.words.variation import NO_VARIATION, Variation
 from plant.pipeline import Pipeline
-from plant.referee import Referee
+from plant.referee import Referee, Verdict
 from plant.simulation import Simulation
-from plant.worlds.world import World
+from plant.snapshot.file import SnapshotError
+from plant.worlds.world import World, WorldError
+from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
 from skills.navigate.lattice import search
-from skills.robot import Clock
+from skills.robot import Clock, Pose2D
+from skills.stack import RobotStack, default_stack
 
-__all__ = ["SimulatedBackend", "compile_first", "run_simulated"]
+__all__ = ["SimulatedBackend", "compile_first", "judge", "run_entry", "run_simulated", "simulate"]
 
 _LOG: Final = logging.getLogger(__name__)
 
@@ -90,10 +92,16 @@ class SimulatedBackend:
         return replace(entry, robot=driven)
 
     def _keeping(self, durable: Durable) -> Callable[[], None]:
-        """Keeps the plant's state, which the first robot to be had takes up where `durable` says so."""
+        """Keeps the plant's state, which the first robot to be had takes up where `durable` says so.
+
+        Raises InputError: it cannot be taken up.
+        """
         if self._keep is None:
             if durable.take_up:
-                take_up_plant(self._simulation, durable.plant, label=durable.take_up_label)
+                try:
+                    self._simulation.restore(durable.plant, label=durable.take_up_label)
+                except SnapshotError as error:
+                    raise InputError(str(error)) from error
             keep = self._simulation.keep_in(durable.plant, label=durable.label)
 
             def keep_settled() -> None:
@@ -194,3 +202,80 @@ def compile_first(cache: Path | None = None) -> None:
 def _kernel_cache() -> Path:
     """Where numba keeps the planner's search."""
     return Path(search.machine_code.stats.cache_path)  # type: ignore[attr-defined]
+
+
+def simulate(
+    world: World,
+    robots: Mapping[str, PlacedRobot],
+    *,
+    seed: int,
+    record: bool,
+    variation: Variation = NO_VARIATION,
+    spared: Collection[str] = (),
+) -> Simulation:
+    """The plant of a world, objects set by the seed. Raises InputError when they do not fit into it."""
+    logging.getLogger("drake").setLevel(logging.WARNING)  # Drake sets its own level when it is imported
+    try:
+        return Simulation(
+            world,
+            seed=seed,
+            robots={name: robot.kind for name, robot in robots.items()},
+            record=record,
+            locomotion={name: robot.stack.locomotion for name, robot in robots.items()},
+            starts={name: robot.start for name, robot in robots.items()},
+            docks={name: robot.dock for name, robot in robots.items() if robot.dock is not None},
+            variation=variation,
+            spared=spared,
+        )
+    except WorldError as error:
+        raise InputError(str(error)) from error
+
+
+def run_entry(
+    simulation: Simulation,
+    world: World,
+    tree: CompiledTree,
+    stack: RobotStack | None = None,
+    *,
+    believed: Pose2D | None = None,
+    told: bool = True,
+) -> RunEntry:
+    """The robot of a tree's name with the components of its stack.
+
+    `believed` is where the robot believed to be before a restart; it looks for its place in a wide circle then. When it
+    is not `told` where it stands either, it looks everywhere.
+
+    Raises:
+        InputError: there is no such robot, or the world's maps or the detector's model cannot be read.
+    """
+    stack = stack or default_stack()
+    if tree.robot_name not in simulation.robots:
+        known = ", ".join(simulation.robots)
+        raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", hint=f"known: {known}")
+    seen_from_m = simulation.robots[tree.robot_name].capabilities().lidar_height_m
+    scan_map, keepout_map = load_grid_map(world.scan_map_seen_from(seen_from_m)), load_grid_map(world.keepout_map_path)
+    start = believed or (simulation.starts[tree.robot_name] if told else None)
+    try:
+        localiser = stack.localiser.build(scan_map, start, surely=told and believed is None)
+    except InputError as error:
+        raise InputError(error.message, hint=error.hint, file=world.scan_map_path) from error
+    return RunEntry(
+        tree=tree,
+        robot=simulation.robots[tree.robot_name],
+        localiser=localiser,
+        costmap=stack.costmap.build(keepout_map),
+        detector=shared_detector(stack),
+        stack=stack,
+    )
+
+
+def judge(
+    simulation: Simulation,
+    tree: CompiledTree,
+    result: RobotResult,
+    *,
+    before: Sequence[Share] = (),
+    since_s: float = 0.0,
+) -> Verdict:
+    """What the referee says of the mission's goal conditions, those included that other robots fulfilled `before`."""
+    return verdict_of(tree, result, simulation.referee.judge, before=before, since_s=since_s)

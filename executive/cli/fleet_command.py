@@ -11,7 +11,7 @@ import typer
 from executive.app.durable import STORE as STORE_NAME
 from executive.app.report import VERDICTS
 from executive.cli.options import AS_JSON, QUIET, VIEW, VIEW_FOR, VIEW_PORT, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
+from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, refusals, show_table
 from executive.mission.request import Request
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
@@ -52,18 +52,17 @@ def run(
     A fault is for the robot named before it ("bob: robot dies at 20 s"), else for all.
     """
     console = console_for(as_json)
-    store = _store(queue)
+    store, tell = _store(queue), plain_lines(console)
     with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
-        from executive.app.fleet_report import told
-        from executive.app.fleet_run import run_fleet
-        from executive.app.fleet_setup import simulated_fleet
+        from executive.app.dispatch import silence
+        from executive.app.fleet import missions_json
+        from executive.app.fleet_run import run_fleet, simulated_fleet
         from executive.app.page_view import PageView
 
         if not request.robots:
             raise InputError("a fleet needs its robots", hint="name them, as in --robots alice=spot,bob=spot")
         queued = _to_do(missions)
         faults = _faults(request.scenario.faults, [each.name for each in request.robots])
-        lines = None if quiet else console
         dispatch = simulated_fleet(
             missions,
             queued,
@@ -71,16 +70,14 @@ def run(
             world=request.world,
             seed=request.seed,
             faults=faults,
-            console=lines,
+            tell=silence if quiet else tell,
             record=request.record,
         )
-        folder, first = (
-            out or store.parent / "fleet",
-            next(iter(next(iter(dispatch.missions.values())).options.values())),
-        )
-        page = PageView(None, console, port=view_port) if view or view_for is not None else None
+        folder = out or store.parent / "fleet"
+        first = next(iter(next(iter(dispatch.missions.values())).options.values()))
+        page = PageView(None, tell, port=view_port) if view or view_for is not None else None
         run_fleet(dispatch, out=folder, seed=request.seed, time_limit_s=request.time_limit_s, page=page, first=first)
-        results = told(missions, [each.id for each in queued])
+        results = missions_json(missions, [each.id for each in queued])
         left = resumable_lines(missions, queue)
     achieved = [_achieved(each) for each in results if each["part_of"] is None]
     console.print(f"{sum(achieved)} of {len(achieved)} missions achieved")
@@ -98,9 +95,9 @@ def run(
 def status(queue: Queue, as_json: AS_JSON = False) -> None:
     """Show which robot has which mission, also while they run."""
     with refusals(), MissionStore(_store(queue), create=False) as missions:
-        from executive.app.fleet_report import told
+        from executive.app.fleet import missions_json
 
-        results = told(missions, [each.id for each in missions.missions() if each.queued])
+        results = missions_json(missions, [each.id for each in missions.missions() if each.queued])
         names = {each.id: each.request.name for each in missions.missions()}
     header = ("mission", "name", "robot", "state", "after", "referee", "reassigned", "message")
     show_table(console_for(as_json), header, [_row(each, names) for each in results])

@@ -99,8 +99,8 @@ class _Building:
         out: Path,
         console: Console,
     ) -> None:
-        from executive.app.assembly import simulate
         from executive.app.robots import only_robot
+        from executive.app.simulated import simulate
         from skills.geometry import compose
         from skills.mapping.survey import Survey
         from skills.robot import Pose2D

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
@@ -30,6 +30,11 @@ def console_for(as_json: bool) -> Console:
     from rich.console import Console
 
     return Console(stderr=as_json, highlight=False, soft_wrap=True)
+
+
+def plain_lines(console: Console) -> Callable[[str], None]:
+    """Writes lines on a console, their brackets as they are."""
+    return lambda line: console.print(line, markup=False)
 
 
 def print_json(value: Mapping[str, Any] | Sequence[Any]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from executive.cli.options import ANYWAY, AS_JSON, QUIET, STORE, VIEW, VIEW_FOR, VIEW_PORT, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, refusals
 from executive.cli.terminal import terminal_answerer
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.request import Request
@@ -53,7 +53,9 @@ def run(
     timing = Profile() if profile else None
 
     def page_of(prepared: Prepared) -> PageView:
-        return PageView(prepared, console, port=view_port, later=queueing(prepared, store=kept_in, out=request.out))
+        return PageView(
+            prepared, plain_lines(console), port=view_port, later=queueing(prepared, store=kept_in, out=request.out)
+        )
 
     with refusals(), voice_for(aloud) as voice:
         if listen_to is not None:

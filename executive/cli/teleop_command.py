@@ -12,11 +12,11 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from executive.app.assembly import simulate
 from executive.app.backend import Scene
 from executive.app.mission_files import save_pose
 from executive.app.page_view import scene_actions
 from executive.app.robots import only_robot
+from executive.app.simulated import simulate
 from executive.app.worlds import open_world, refuse_blocked
 from executive.cli.keys import keys_pressed
 from executive.cli.number_options import quantity_option

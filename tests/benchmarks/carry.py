@@ -22,8 +22,8 @@ from typing import Any, Final
 import numpy as np
 import shapely
 
-from executive.app.assembly import simulate
 from executive.app.robots import only_robot
+from executive.app.simulated import simulate
 from executive.run.outcome import Outcome
 from plant.simulation import Simulation
 from plant.worlds.world import World, load_world

@@ -26,10 +26,9 @@ from typing import Any
 
 import numpy as np
 
-from executive.app.fleet_dispatch import FleetDispatch
-from executive.app.fleet_report import told
-from executive.app.fleet_run import run_fleet
-from executive.app.fleet_setup import simulated_fleet
+from executive.app.dispatch import Dispatch
+from executive.app.fleet import missions_json
+from executive.app.fleet_run import run_fleet, simulated_fleet
 from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
@@ -97,7 +96,7 @@ def sentences(seed: int, count: int, carries: int) -> list[str]:
 
 def fleet_run(
     seed: int, robots: Mapping[str, str], said: Sequence[str], out: Path, faults: Mapping[str, Sequence[str]]
-) -> tuple[FleetDispatch, list[dict[str, Any]], float]:
+) -> tuple[Dispatch, list[dict[str, Any]], float]:
     """Run sentences with a fleet: the dispatch afterwards, the missions as they were told, and the wall time (s)."""
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
@@ -108,10 +107,10 @@ def fleet_run(
         queued = [store.add(prepare(request, ask=None).request, queued=True) for request in requests]
         dispatch = simulated_fleet(store, queued, configs, seed=seed, faults=faults)
         run_fleet(dispatch, out=out, seed=seed)
-        return dispatch, told(store, [each.id for each in queued]), time.perf_counter() - begun_s
+        return dispatch, missions_json(store, [each.id for each in queued]), time.perf_counter() - begun_s
 
 
-def result_of(what: str, seed: int, dispatch: FleetDispatch, rows: Sequence[dict[str, Any]], wall_s: float) -> Result:
+def result_of(what: str, seed: int, dispatch: Dispatch, rows: Sequence[dict[str, Any]], wall_s: float) -> Result:
     """The figures of a run."""
     backend = dispatch.backend
     assert isinstance(backend, SimulatedBackend)

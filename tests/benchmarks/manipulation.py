@@ -41,8 +41,8 @@ from pydrake.math import RigidTransform
 
 from errand_train.commands.worst_sheet import Shown, contact_sheet
 from errand_train.detector.scoring import Judged
-from executive.app.assembly import run_entry, simulate
 from executive.app.robots import only_robot
+from executive.app.simulated import run_entry, simulate
 from executive.app.worlds import knowledge_of
 from executive.run.outcome import Outcome, RobotResult
 from executive.run.runner import run

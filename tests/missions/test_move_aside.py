@@ -9,7 +9,7 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform
 
-from executive.app.assembly import judge, run_entry
+from executive.app.simulated import judge, run_entry
 from executive.app.worlds import knowledge_of
 from executive.run.outcome import Outcome
 from executive.run.runner import run

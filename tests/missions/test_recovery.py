@@ -10,7 +10,7 @@ import pytest
 from py_trees.common import Status
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from executive.app.assembly import judge, run_entry
+from executive.app.simulated import judge, run_entry
 from executive.app.worlds import knowledge_of, open_world
 from executive.run.outcome import Outcome
 from executive.run.runner import run

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from executive.app.evaluate.outcome import Evidence, RunOutcome, Standing
 from executive.app.evaluate.runs import RunSpec
 from executive.app.feasibility import refuse_impossible
-from executive.app.memory import return_memory
+from executive.app.mission_run import return_memory
 from executive.app.prepare import prepare
 from executive.app.report import RefereeReport, RunReport
 from executive.app.simulated import run_simulated

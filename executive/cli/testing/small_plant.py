@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from executive.app.assembly import shared_detector
+from executive.app.robots import shared_detector
 from executive.testing.bench import SkillBench
 from executive.testing.small_room import write_small_room
 from plant.simulation import Simulation

@@ -1,20 +1,17 @@
 """A fleet's run with scripted robots: who does what, and what becomes of the mission of a robot that dies."""
 
-import io
 import json
 import signal
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import pytest
-from rich.console import Console
 from typer.testing import CliRunner
 
-from executive.app import fleet_dispatch, fleet_missions, fleet_robots
 from executive.app.auction import Bid
-from executive.app.fleet_dispatch import FleetDispatch
-from executive.app.fleet_missions import FleetMission
-from executive.app.fleet_report import told
+from executive.app.dispatch import Dispatch
+from executive.app.fleet import FleetMission, Offers, missions_json
 from executive.app.fleet_run import run_fleet
 from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
@@ -30,8 +27,7 @@ from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
 from executive.words.command import Command, Task, parse_command
 from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
-from skills.api import Cause, Failed, Running, Succeeded
-from skills.faults.faulty_robot import with_faults
+from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 from tests.benchmarks.fleet import begun_again
@@ -46,10 +42,29 @@ START = Pose2D(0.0, 0.0, 0.0)
 ROBOTS = ("Alice", "Bob")
 
 
+@dataclass(frozen=True)
+class ScriptedMission(Prepared):
+    """A mission of scripted skills."""
+
+    registry: Mapping[str, type[Skill]] = field(default_factory=dict)
+
+    def with_mission(self, mission):
+        tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
+        return replace(self, request=replace(self.request, commands=lines_of(tree.steps)), mission=mission, tree=tree)
+
+
+class ScriptedOffers(Offers):
+    """What the scripted robots offer, as a test says."""
+
+    def __init__(self, fleet, *of):
+        super().__init__(*of, bid=fleet.bid)
+        self.takes_from = fleet.takes_from
+
+
 class Fleet:
     """Scripted robots with a store, an auction in which Alice is a little faster, and faults by robot."""
 
-    def __init__(self, store, clock, knowledge, registry, make, script, monkeypatch, out):
+    def __init__(self, store, clock, knowledge, registry, make, script, out):
         self.script = script
         self.store, self.clock, self.registry, self.out = store, clock, registry, out
         battery = knowledge.battery.model_copy(update={"low": 0.05})
@@ -58,31 +73,26 @@ class Fleet:
         self.robots = {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
         self.faults, self.make, self.missions, self.judged = {}, make, {}, []
         self.shares, self.since_s = [], []
-        monkeypatch.setattr(fleet_dispatch, "entry_for", lambda prepared, backend, durable: self._entry(prepared))
-        monkeypatch.setattr(fleet_robots, "bid_for", self._bid)
         self.tables, self.slower_s = None, 0.5
-        monkeypatch.setattr(fleet_robots.Offers, "takes_from", self._takes_from)
-        monkeypatch.setattr(fleet_missions, "instead", lambda old, mission: self._prepared(old.request, mission))
 
-    def _entry(self, prepared):
-        name = prepared.tree.robot_name
-        robot = with_faults(self.robots[name], self.clock, self.faults.get(name, ()), since_s=0.0)
-        return RunEntry(prepared.tree, robot, self.make.StillLocaliser(), self.make.EmptyCostmap())
+    def entry(self, tree, durable):
+        return RunEntry(tree, self.robots[tree.robot_name], self.make.StillLocaliser(), self.make.EmptyCostmap())
 
-    def _bid(self, mission, name, now):
+    def bid(self, mission, name, now):
         prepared = mission.options.get(name)
         commands = () if prepared is None else prepared.tree.commands
         unable = name in self.unable or any(self.cannot(name, command) for command in commands)
         problems = ("out of reach",) if unable else ()
         return Bid(mission.stored.id, name, 0.0, 1.0 + self.slower_s * ROBOTS.index(name), problems=problems)
 
-    def _takes_from(self, name, table):
+    def takes_from(self, name, table):
         return self.tables is None or table.place in self.tables
 
     def _prepared(self, request, mission):
         tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
         world = SimpleNamespace(name="scripted", dock=START)
-        return Prepared(replace(request, commands=lines_of(tree.steps)), mission, world, self.knowledge, tree, {})
+        asked = replace(request, commands=lines_of(tree.steps))
+        return ScriptedMission(asked, mission, world, self.knowledge, tree, {}, registry=self.registry)
 
     def queue(self, *lines):
         request = Request(commands=lines, name="work", world_name="scripted")
@@ -106,9 +116,17 @@ class Fleet:
     def run(self, page=None):
         placed = {name: PlacedRobot(name, "spot", START) for name in ROBOTS}
         docks = {name: self._docking(name) for name in ROBOTS}
-        dispatch = FleetDispatch(self.store, dict(self.missions), placed, self, docks=docks)
+        dispatch = Dispatch(
+            self.store,
+            dict(self.missions),
+            placed,
+            self,
+            self.faults,
+            docks,
+            offers=lambda *of: ScriptedOffers(self, *of),
+        )
         run_fleet(dispatch, out=self.out, seed=3, page=page)
-        self.rows = rows = told(self.store, list(self.missions))
+        self.rows = rows = missions_json(self.store, list(self.missions))
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
 
     def _docking(self, name):
@@ -140,9 +158,9 @@ class Fleet:
 
 
 @pytest.fixture
-def fleet(tmp_path, clock, knowledge, registry, make, script, monkeypatch):
+def fleet(tmp_path, clock, knowledge, registry, make, script):
     with MissionStore(tmp_path / "missions.sqlite") as store:
-        yield Fleet(store, clock, knowledge, registry, make, script, monkeypatch, tmp_path / "out")
+        yield Fleet(store, clock, knowledge, registry, make, script, tmp_path / "out")
 
 
 def test_three_missions_are_done_by_two_robots(fleet, script):
@@ -413,7 +431,7 @@ def test_a_mission_that_is_cancelled_on_its_robots_panel_is_over_and_the_robot_g
             if progress.ticks == 1:
                 self.control.cancel("not now", robot="Bob")
 
-    page = CancellingPage(None, Console(file=io.StringIO()))
+    page = CancellingPage(None, lambda line: None)
     try:
         fleet.run(page)
     finally:
@@ -517,7 +535,7 @@ def test_two_robots_do_not_put_things_on_one_surface_at_once(fleet, script, regi
     at_work = []
 
     def put_down(skill):
-        at_work.append({row["robot"] for row in told(fleet.store, [1, 2]) if row["outcome"] == "running"})
+        at_work.append({row["robot"] for row in missions_json(fleet.store, [1, 2]) if row["outcome"] == "running"})
         return fleet.put_down(skill)
 
     script.ends.update(grasp=fleet.hold, place=put_down)

@@ -1,6 +1,5 @@
 """`errand run --view`: sentences from the page are done first or queued; a whole mission is told while it runs."""
 
-import io
 import json
 import re
 import subprocess
@@ -8,7 +7,6 @@ import sys
 from contextlib import suppress
 
 import pytest
-from rich.console import Console
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
@@ -29,7 +27,7 @@ def prepared():
 
 @pytest.fixture
 def page(prepared):
-    page = PageView(prepared, Console(file=io.StringIO()))
+    page = PageView(prepared, lambda line: None)
     page.control.begin({"Alice": prepared.tree})
     page.talk.begun()
     yield page

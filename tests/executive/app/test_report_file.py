@@ -11,7 +11,7 @@ from py_trees.common import Status
 from executive.app.artifacts import MOST_BYTES, Artifacts
 from executive.app.durable import mission_events
 from executive.app.mission_run import run_request
-from executive.app.prepare import instead, prepare
+from executive.app.prepare import prepare
 from executive.app.report import ReportedAnswer, ReportedObject, RunReport
 from executive.app.report_file import step_rows
 from executive.mission.request import Request
@@ -166,7 +166,7 @@ class TwoRobots(ScriptedBackend):
 def test_a_run_with_two_robots_leaves_the_tree_and_the_steps_of_each(talk):
     def named(name):
         mission = replace(talk.mission, robot_name=name)
-        return replace(instead(talk, mission), robots=robots)
+        return replace(talk.with_mission(mission), robots=robots)
 
     robots = dict.fromkeys(("Alice", "Bob"), SimpleNamespace(kind="spot"))
     run_request(replace(named("Alice"), others=(named("Bob"),)), TwoRobots())

@@ -62,7 +62,7 @@ GOOD: Final[Mapping[str, Mapping[str, str]]] = {
 WORK: Final = (
     "executive.app.simulated.simulate",
     "executive.cli.teleop_command.simulate",
-    "executive.app.assembly.simulate",
+    "executive.app.simulated.simulate",
     "executive.app.evaluate.cluster.Pool.opened",
     "errand_train.dataset.shards.render",
     "plant.worlds.builder.own.world_from_grid",

@@ -8,9 +8,9 @@ import pytest
 from pydrake.math import RollPitchYaw
 from typer.testing import CliRunner
 
-from executive.app.assembly import simulate
 from executive.app.mission_files import save_pose
 from executive.app.robots import only_robot
+from executive.app.simulated import simulate
 from executive.app.worlds import open_world
 from executive.cli.entry import app
 from executive.cli.teleop_command import TerminalKeys, context_for, page_actions, period

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.app.memory import return_memory
+from executive.app.mission_run import return_memory
 
 MB = 1_000_000
 

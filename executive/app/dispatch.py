@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from rich.console import Console
-
-from executive.app.auction import Bid
+from executive.app.auction import Auction, Bid
 from executive.app.backend import Backend
-from executive.app.dispatcher import Dispatcher
-from executive.app.fleet_chain import chained
-from executive.app.fleet_missions import FleetMission, charging_time_s, rest_of, surfaces_of
-from executive.app.fleet_progress import Progress, ProgressJournal, is_lost, is_plain
-from executive.app.fleet_report import EndedMission, missions_message, told
-from executive.app.fleet_robots import FleetRobot, Offers
+from executive.app.chain import chained
+from executive.app.fleet import (
+    EndedMission,
+    FleetMission,
+    FleetRobot,
+    MissionProgress,
+    Offers,
+    ProgressJournal,
+    charging_time_s,
+    is_lost,
+    is_plain,
+    missions_json,
+    missions_message,
+    rest_of,
+    surfaces_of,
+)
 from executive.app.goal_conditions import Share
 from executive.app.mission_run import entry_for, robot_report
 from executive.app.prepared import Prepared
@@ -27,8 +35,7 @@ from executive.record.announce import announce
 from executive.record.event_log import EventLog
 from executive.record.schemas import MISSIONS
 from executive.run.outcome import Outcome, RobotResult, RobotStatus
-from executive.run.visitor import Assigner, MissionEnd, RunEntry
-from executive.run.visitor import Progress as RunProgress
+from executive.run.visitor import Assigner, MissionEnd, Progress, RunEntry
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.node_view import node_view
@@ -36,20 +43,23 @@ from executive.words.knowledge import BatteryFacts, SurfaceFacts
 from skills.files.errors import listing
 from skills.robot import Pose2D
 
-__all__ = ["FleetDispatch"]
-
+__all__ = ["Dispatch", "silence"]
 
 LEFT_M: Final = 1.5
 """A robot that has come so far has left the table where it put something down for another."""
 
 
+def silence(line: str) -> None:
+    """Shows nothing."""
+
+
 @dataclass
-class FleetDispatch(Assigner):
-    """Gives the missions of a store to robots of a backend, and keeps in the store
-    whose each is, how it ended and what a referee saw.
+class Dispatch(Assigner):
+    """Assigns the missions of a store to robots of a backend by an auction, and keeps in the store whose each is, how
+    it ended and what a referee saw.
 
     A robot whose `battery` is low gives its mission back once it has nothing in hand, and charges by its mission of
-    `docks`.
+    `docks`. `tell` shows a line, `offers` makes what the robots offer.
     """
 
     store: MissionStore
@@ -59,21 +69,22 @@ class FleetDispatch(Assigner):
     faults: Mapping[str, Sequence[str]] = field(default_factory=dict)
     docks: Mapping[str, Prepared] = field(default_factory=dict)
     battery: BatteryFacts = field(default_factory=BatteryFacts)
-    console: Console | None = None
+    tell: Callable[[str], None] = field(default=silence)
     log: EventLog | None = None
+    offers: Callable[[Mapping[str, FleetRobot], BatteryFacts, Callable[[], float]], Offers] = field(default=Offers)
 
     def __post_init__(self) -> None:
         self._given = GivenMissions(self.store)
-        self._dispatcher = Dispatcher((), self.robots, self._surfaces)
+        self._auction = Auction((), self.robots, self._surfaces)
         self._parts = {number: each for number, each in self._given.all().items() if each.part_of is not None}
         for number in self.missions:
             follows = self._parts[number].follows if number in self._parts else None
-            self._dispatcher.add(number, after=follows if follows in self.missions else None)
+            self._auction.add(number, after=follows if follows in self.missions else None)
         self._robots = {
             name: FleetRobot(placed, placed.start, dock=self.docks.get(name), faults=tuple(self.faults.get(name, ())))
             for name, placed in self.robots.items()
         }
-        self._offers = Offers(self._robots, self.battery, self.backend.clock.now)
+        self._offers = self.offers(self._robots, self.battery, self.backend.clock.now)
         self._gone: dict[str, str] = {}
         self._recalled: set[str] = set()
         self._to_dock: list[str] = []
@@ -88,13 +99,13 @@ class FleetDispatch(Assigner):
     @property
     def waiting(self) -> tuple[int, ...]:
         """The missions that no robot has."""
-        return self._dispatcher.waiting
+        return self._auction.waiting
 
     def assign(self) -> Sequence[RunEntry]:
         """The missions that begin now."""
         entries: list[RunEntry] = []
         self._let_follow({})
-        given = self._dispatcher.assign(self._bid)
+        given = self._auction.assign(self._bid)
         refused = {number: why for number, why in given.refused.items() if not self._split(number)}
         for number, why in refused.items():
             self._finish(number, MissionState.FAILURE, why)
@@ -105,13 +116,13 @@ class FleetDispatch(Assigner):
             self.store.begin(award.mission)
             if mission.since_s is None:
                 self.missions[award.mission] = replace(mission, since_s=self._now_s)
-            self._tell(f"{award.robot} has mission {award.mission}: {mission.stored.request.name}")
+            self.tell(f"{award.robot} has mission {award.mission}: {mission.stored.request.name}")
             entries.append(self._entry(award.robot, mission))
         if given.begun:
             self._log_missions()
         self._to_dock += given.charging
-        if self._dispatcher.waiting or self._dispatcher.under_way:
-            entries += [self._dock_entry(name) for name in self._to_dock if name in self._dispatcher.resting]
+        if self._auction.waiting or self._auction.under_way:
+            entries += [self._dock_entry(name) for name in self._to_dock if name in self._auction.resting]
             self._to_dock = []
         return entries if len(refused) == len(given.refused) else [*entries, *self.assign()]
 
@@ -128,21 +139,21 @@ class FleetDispatch(Assigner):
             request = replace(request, sentence=None, file=None, text=None, name=name)
             stored = self.store.add(request, queued=True)
             self.missions[stored.id] = FleetMission(stored, options)
-            self._dispatcher.add(stored.id, after=added[0] if added else None)
+            self._auction.add(stored.id, after=added[0] if added else None)
             added.append(stored.id)
         self._given.split(number, added)
         self._parts = {part: each for part, each in self._given.all().items() if each.part_of is not None}
         self.store.begin(number)
         by = "" if chain.table is None else f", by the {chain.table}"
-        self._tell(f"No robot can do mission {number} alone: missions {added[0]} and then {added[1]} do it{by}")
+        self.tell(f"No robot can do mission {number} alone: missions {added[0]} and then {added[1]} do it{by}")
         return True
 
     def recall(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
         """The robots that are low and have nothing in hand; and those that charge when nothing is left to do."""
         self._let_follow(seen)
-        under_way = self._dispatcher.under_way
+        under_way = self._auction.under_way
         low = {name: each for name, each in seen.items() if name in under_way and self._may_leave(name, each)}
-        idle = self._dispatcher.resting if not under_way and not self._dispatcher.waiting else ()
+        idle = self._auction.resting if not under_way and not self._auction.waiting else ()
         self._recalled = {*low, *idle}
         why = {name: f"its battery is at {each.charge:.0%}" for name, each in low.items()}
         return {**why, **dict.fromkeys(idle, "nothing is left to do")}
@@ -152,9 +163,9 @@ class FleetDispatch(Assigner):
         for name, (number, from_W) in tuple(self._leaving.items()):
             pose = seen[name].pose if name in seen else None
             gone_m = 0.0 if pose is None else math.hypot(pose.x_m - from_W.x_m, pose.y_m - from_W.y_m)
-            if name not in self._dispatcher.resting or gone_m > LEFT_M:
+            if name not in self._auction.resting or gone_m > LEFT_M:
                 del self._leaving[name]
-                self._dispatcher.done(number)
+                self._auction.done(number)
 
     def _may_leave(self, name: str, seen: RobotStatus) -> bool:
         """Whether a robot is low, can charge, and leaves nothing half done."""
@@ -162,7 +173,7 @@ class FleetDispatch(Assigner):
         low = seen.charge is not None and seen.charge < self.battery.low
         return low and robot.dock is not None and not seen.holding and not robot.progress.begun
 
-    def tick(self, progress: RunProgress) -> None:
+    def tick(self, progress: Progress) -> None:
         """See how far the missions are."""
         for name, note in progress.notes.items():
             journal = self._robots[name].journal
@@ -177,9 +188,9 @@ class FleetDispatch(Assigner):
         gone = self._look(robot, end)
         if gone is not None:
             self._gone[name] = gone
-            self._dispatcher.lose(name)
-            self._tell(f"{name} is given no more work: {gone}")
-        if name not in self._dispatcher.under_way:
+            self._auction.lose(name)
+            self.tell(f"{name} is given no more work: {gone}")
+        if name not in self._auction.under_way:
             self._charged(name, end.result, recalled=recalled)
             return
         if self._stopped is not None and end.result.outcome is Outcome.CANCELLED:
@@ -193,7 +204,7 @@ class FleetDispatch(Assigner):
                 self._over(name, end.result)
             return
         why = self._stuck(name, holding=end.seen is not None and end.seen.holding)
-        if why is not None or not self._dispatcher.robots:
+        if why is not None or not self._auction.robots:
             reason = f"{name} failed ({gone})"
             self._over(name, replace(end.result, message=f"{reason}; {why or 'there is no other robot'}"))
             return
@@ -207,18 +218,18 @@ class FleetDispatch(Assigner):
         if why is not None:
             self._over(name, replace(end.result, message=f"{end.result.message}; {why}"))
             return
-        number = self._dispatcher.hand_back(name)
+        number = self._auction.hand_back(name)
         self._go_on_later(number, self._robots[name], end.result)
-        self._tell(f"Mission {number} stays in the queue: {end.result.message}")
+        self.tell(f"Mission {number} stays in the queue: {end.result.message}")
 
     def _given_to_another(self, name: str, end: MissionEnd) -> bool:
         """Offer to the others, once, what one robot did not manage: it has nothing in its gripper, and has put nothing
         down anywhere. Whether another can do it."""
-        number, robot = self._dispatcher.under_way[name], self._robots[name]
+        number, robot = self._auction.under_way[name], self._robots[name]
         mission = self.missions[number]
         clear = end.seen is not None and not end.seen.holding and not robot.progress.put
         again = replace(mission, tried={name: f"it tried: {end.result.message}"})
-        others = (other for other in self._dispatcher.robots if other != name)
+        others = (other for other in self._auction.robots if other != name)
         if (
             end.result.outcome is not Outcome.FAILURE
             or mission.tried
@@ -232,13 +243,13 @@ class FleetDispatch(Assigner):
 
     def _hand_on(self, name: str, result: RobotResult) -> None:
         """What is left of a robot's mission waits for another."""
-        number = self._dispatcher.hand_back(name)
+        number = self._auction.hand_back(name)
         self._go_on_later(number, self._robots[name], result)
-        self._tell(f"Mission {number} waits for another robot: {result.message}")
+        self.tell(f"Mission {number} waits for another robot: {result.message}")
 
     def _leave_for_dock(self, name: str) -> None:
         """A robot is to go to its dock."""
-        self._dispatcher.rest(name)
+        self._auction.rest(name)
         self._to_dock.append(name)
 
     def _look(self, robot: FleetRobot, end: MissionEnd) -> str | None:
@@ -251,7 +262,7 @@ class FleetDispatch(Assigner):
         if end.gone is not None or end.result.outcome is Outcome.SUCCESS:
             return end.gone
         states = end.result.states
-        number = self._dispatcher.under_way.get(end.result.robot_name)
+        number = self._auction.under_way.get(end.result.robot_name)
         prepared = robot.dock if number is None else self.missions[number].options[end.result.robot_name]
         lost = prepared is not None and is_lost(
             prepared.tree, lambda path: states[path].status if path in states else None
@@ -260,11 +271,11 @@ class FleetDispatch(Assigner):
 
     def _charged(self, name: str, result: RobotResult, *, recalled: bool) -> None:
         """A robot's way to its dock is over. Where it could not charge, it is not sent there again."""
-        self._dispatcher.wake(name)
+        self._auction.wake(name)
         robot = self._robots[name]
         if result.outcome is not Outcome.SUCCESS and not recalled:
             robot.dock = None
-        self._tell(f"{name} is at {robot.charge:.0%}: {result.message}")
+        self.tell(f"{name} is at {robot.charge:.0%}: {result.message}")
 
     def close(self) -> None:
         """What no robot has at the end stays in the queue; what was handed back is told as failed."""
@@ -285,13 +296,13 @@ class FleetDispatch(Assigner):
         return surfaces_of(next(iter(self.missions[number].options.values())))
 
     def _bid(self, mission: int, name: str) -> Bid:
-        resting = name in self._dispatcher.resting
-        busy = resting or name in self._dispatcher.under_way
+        resting = name in self._auction.resting
+        busy = resting or name in self._auction.under_way
         return self._offers.known(self.missions[mission], name, busy=busy, resting=resting)
 
     def _offer(self, wanted: FleetMission, name: str) -> Bid:
-        resting = name in self._dispatcher.resting
-        busy = resting or name in self._dispatcher.under_way
+        resting = name in self._auction.resting
+        busy = resting or name in self._auction.under_way
         return self._offers.new(wanted, name, busy=busy, resting=resting)
 
     def _takes_from(self, name: str, table: SurfaceFacts) -> bool:
@@ -303,7 +314,7 @@ class FleetDispatch(Assigner):
         assert robot.dock is not None
         robot.free_at_s = self._now_s + charging_time_s(robot.charge, self.battery.charged)
         robot.journal = None
-        self._tell(f"{name} goes to its dock: its battery is at {robot.charge:.0%}")
+        self.tell(f"{name} goes to its dock: its battery is at {robot.charge:.0%}")
         self._announce(robot.dock)
         return replace(self._robot_entry(name, robot.dock), tree=robot.dock.tree)
 
@@ -328,7 +339,7 @@ class FleetDispatch(Assigner):
             robot.entry = entry_for(replace(prepared, request=disturbed), self.backend, None)
         return robot.entry
 
-    def _progress(self, mission: FleetMission, progress: Progress) -> None:
+    def _progress(self, mission: FleetMission, progress: MissionProgress) -> None:
         done = mission.done + progress.done
         self._given.progress(mission.stored.id, done, "it was begun" if progress.begun else None)
 
@@ -342,7 +353,7 @@ class FleetDispatch(Assigner):
 
     def _stuck(self, name: str, *, holding: bool) -> str | None:
         """Why no other robot can go on with the mission of one that is gone; None: one can."""
-        robot, mission = self._robots[name], self.missions[self._dispatcher.under_way[name]]
+        robot, mission = self._robots[name], self.missions[self._auction.under_way[name]]
         progress = robot.progress
         if not progress.begun:
             return None
@@ -366,7 +377,7 @@ class FleetDispatch(Assigner):
 
     def _over(self, name: str, result: RobotResult) -> None:
         """A mission has come to its end."""
-        number = self._dispatcher.over(name)
+        number = self._auction.over(name)
         mission = self.missions[number]
         tree, since_s = mission.options[name].tree, mission.since_s or 0.0
         report = self.backend.judge(tree, result, before=mission.shares, since_s=since_s)
@@ -393,7 +404,7 @@ class FleetDispatch(Assigner):
             shares = (*mission.shares, share)
             self.missions[part] = replace(self.missions[part], since_s=mission.since_s, shares=shares)
         name = share.tree.robot_name
-        if following and name in self._dispatcher.robots and self._robots[name].dock is not None:
+        if following and name in self._auction.robots and self._robots[name].dock is not None:
             self._leave_for_dock(name)
             self._leaving[name] = (number, self._robots[name].pose)
         if whole is not None and not following:
@@ -401,20 +412,16 @@ class FleetDispatch(Assigner):
 
     def _finish(self, number: int, state: MissionState, message: str) -> None:
         self.store.finish(number, state, message)
-        self._tell(f"Mission {number}: {state.value}: {message}")
+        self.tell(f"Mission {number}: {state.value}: {message}")
         if state is MissionState.SUCCESS:
             if all(number != part for part, _ in self._leaving.values()):
-                self._dispatcher.done(number)
+                self._auction.done(number)
         else:
-            self._dispatcher.drop(number)
+            self._auction.drop(number)
         self._given.settle()
         self._log_missions()
 
     def _log_missions(self) -> None:
         """Log whose each mission is by now."""
         if self.log is not None:
-            self.log(MISSIONS, missions_message(self.store, told(self.store, list(self.missions))))
-
-    def _tell(self, line: str) -> None:
-        if self.console is not None:
-            self.console.print(line, markup=False)
+            self.log(MISSIONS, missions_message(self.store, missions_json(self.store, list(self.missions))))

@@ -1,0 +1,434 @@
+"""Missions and robots as a fleet sees them: who can do what, how far it is, and what a robot offers for it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+from py_trees.common import Status
+
+from executive.app.auction import Bid
+from executive.app.durable import as_it_was
+from executive.app.feasibility import check_prepared, route_planner_of
+from executive.app.goal_conditions import Share
+from executive.app.prepare import Setting, prepare_alone
+from executive.app.prepared import Prepared
+from executive.app.report_file import EndedTree
+from executive.app.robots import PlacedRobot
+from executive.language.robots import Part, Whom
+from executive.mission.mission import mission_from_lines
+from executive.mission.request import Request
+from executive.run.visitor import RunEntry, TickNote
+from executive.store.given import GivenMission, GivenMissions
+from executive.store.missions import MissionStore, StoredMission
+from executive.tree.behaviours.conditions import KnowsPlace
+from executive.tree.check import Checked
+from executive.tree.compiler import CompiledTree
+from executive.tree.estimate import RoutePlanner, load_estimates
+from executive.tree.node import NodeSpec
+from executive.words.command import Command, Task
+from executive.words.knowledge import BatteryFacts, Knowledge, SurfaceFacts
+from executive.words.steps import Mission
+from plant.kinds import robot_kind
+from plant.worlds.world import World
+from skills.api import Surface
+from skills.files.errors import InputError
+from skills.geometry import wrap
+from skills.place.free_spot import spots
+from skills.robot import Pose2D
+
+__all__ = [
+    "EndedMission",
+    "FleetMission",
+    "FleetRobot",
+    "MissionProgress",
+    "Offers",
+    "ProgressJournal",
+    "RobotNow",
+    "bid_for",
+    "charging_missions",
+    "charging_time_s",
+    "fleet_mission",
+    "is_lost",
+    "is_plain",
+    "is_way",
+    "missions_json",
+    "missions_message",
+    "progress_of",
+    "rest_of",
+    "surfaces_of",
+    "with_commands",
+]
+
+URGENT: Final = 0.5
+"""At this share of the charge that counts as low, a robot that has something in hand goes to its dock all the same."""
+_TOUCHED: Final = (Status.RUNNING, Status.SUCCESS)
+_HEADINGS: Final = 16
+
+
+@dataclass(frozen=True)
+class FleetMission:
+    """A mission of the queue: what each robot that may do it would do. The first `done` commands are done already.
+
+    It began at `since_s` (s on the robots' clock; None: not yet); `shares` are what robots did that had it before, and
+    `tried` why one did not do it, by its name.
+    """
+
+    stored: StoredMission
+    options: Mapping[str, Prepared]
+    done: int = 0
+    since_s: float | None = None
+    shares: tuple[Share, ...] = ()
+    tried: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RobotNow:
+    """A robot as the auction sees it: where it is free next (world frame), with which charge, its mission to `dock`
+    (None: it cannot), below which charge it is `low`, and what plans its routes."""
+
+    pose: Pose2D
+    charge: float
+    low: float
+    planner: RoutePlanner
+    dock: Prepared | None = None
+
+
+def fleet_mission(
+    store: MissionStore,
+    stored: StoredMission,
+    *,
+    world: World,
+    knowledge: Knowledge,
+    robots: Mapping[str, PlacedRobot],
+    done: int = 0,
+) -> FleetMission:
+    """A mission of the store for these robots. Raises InputError, which names the mission: it is for none of them."""
+    try:
+        options = _options(store, stored, world, knowledge, robots)
+        return FleetMission(stored, {name: rest_of(each, done) for name, each in options.items()}, done)
+    except InputError as error:
+        what = f"mission {stored.id} ({stored.request.name}): {error.message}"
+        raise InputError(what, hint=error.hint or "it stays in the queue", file=error.file, line=error.line) from error
+
+
+def _options(
+    store: MissionStore,
+    stored: StoredMission,
+    world: World,
+    knowledge: Knowledge,
+    robots: Mapping[str, PlacedRobot],
+) -> Mapping[str, Prepared]:
+    request = stored.request
+    if request.world_name != world.name:
+        hint = f"run those of {request.world_name} in a run of their own"
+        raise InputError(f"it is for the world {request.world_name}, and this run is in {world.name}", hint=hint)
+    if request.sentence is not None:
+        setting = Setting(request, world, _patient(knowledge), robots)
+        meant = setting.understood()
+        meanings = [part.meaning for part in meant.parts]
+        return {name: setting.part(name, meanings) for name in _named(meant.parts, robots)}
+    alone = prepare_alone(as_it_was(stored, store.path))
+    if alone.world.seed_rules != world.seed_rules:
+        raise InputError("its file brings objects into the world", hint="run it by `errand run`")
+    setting = Setting(alone.request, world, _patient(alone.knowledge), robots)
+    return {name: setting.for_robot(name).compiled(replace(alone.mission, robot_name=name)) for name in robots}
+
+
+def _named(parts: Sequence[Part], robots: Mapping[str, PlacedRobot]) -> tuple[str, ...]:
+    """The robots that may do a mission. Raises InputError: it is for several at once."""
+    named = {part.robot for part in parts} - {Whom.ANY}
+    if len(named) > 1 or (Whom.ALL in named and len(robots) > 1):
+        raise InputError("it is for several robots at once", hint="queue a mission for each of them")
+    return tuple(name for name in robots if not named or name in named or Whom.ALL in named)
+
+
+def rest_of(prepared: Prepared, done: int) -> Prepared:
+    """What is left of a mission of plain commands of which the first `done` are done."""
+    return with_commands(prepared, prepared.tree.commands[done:]) if done else prepared
+
+
+def surfaces_of(prepared: Prepared) -> frozenset[str]:
+    """The surfaces that a mission's commands name, at each of which one robot works at a time."""
+    goals = {command.goal for command in prepared.tree.commands if command.goal is not None}
+    return frozenset(filter(None, map(prepared.knowledge.place, goals))) & prepared.knowledge.surfaces.keys()
+
+
+def with_commands(prepared: Prepared, commands: Sequence[Command]) -> Prepared:
+    """A mission of plain commands with others in their place. Raises InputError: they cannot be carried out."""
+    (step,) = prepared.mission.steps
+    mission: Mission = replace(prepared.mission, steps=(replace(step, commands=tuple(commands)),))
+    return prepared.with_mission(mission)
+
+
+def _patient(knowledge: Knowledge) -> Knowledge:
+    """What a robot of a fleet knows: others go on with its mission when it is low, so that it interrupts it later."""
+    battery = knowledge.battery.model_copy(update={"low": URGENT * knowledge.battery.low})
+    return knowledge.model_copy(update={"battery": battery})
+
+
+def charging_missions(world: World, knowledge: Knowledge, robots: Mapping[str, PlacedRobot]) -> Mapping[str, Prepared]:
+    """What each robot does to charge; one without a dock is not among them."""
+    line = str(Command(task=Task.CHARGE))
+    setting = Setting(Request(commands=(line,), world_name=world.name), world, _patient(knowledge), robots)
+    return {
+        name: setting.for_robot(name).compiled(mission_from_lines((line,), world=world.name, robot_name=name))
+        for name, robot in robots.items()
+        if robot.dock is not None
+    }
+
+
+def bid_for(mission: FleetMission, robot: str, now: RobotNow) -> Bid:
+    """What a robot offers for a mission: it can do it, how long that takes from where it is, and the battery."""
+    prepared = mission.options.get(robot)
+    if prepared is None:
+        other = next(iter(mission.options))
+        return Bid(mission.stored.id, robot, 0.0, 0.0, problems=(f"it is for {other}",))
+    checked = _checked_from(now.pose, prepared, now.planner)
+    taken, left = checked.estimate, now.charge - checked.estimate.charge
+    problems = (*(error.message for error in checked.errors), *_out_of_reach(prepared, now))
+    bid = Bid(mission.stored.id, robot, 0.0, taken.duration_s, left, problems=problems)
+    if left >= now.low or problems:
+        return bid
+    charged = prepared.knowledge.battery.charged
+    if now.dock is None or now.dock.world.dock is None or charged - taken.charge < now.low:
+        return replace(bid, problems=(f"its battery has {now.charge:.0%}, and {taken.charge:.0%} would be used",))
+    to_dock = _checked_from(now.pose, now.dock, now.planner)
+    again = _checked_from(now.dock.world.dock, prepared, now.planner)
+    problems = tuple(error.message for error in (*to_dock.errors, *again.errors))
+    full_s = charging_time_s(now.charge, charged)
+    duration_s = to_dock.estimate.duration_s + full_s + again.estimate.duration_s
+    return replace(bid, duration_s=duration_s, charge=charged - again.estimate.charge, charges=True, problems=problems)
+
+
+def charging_time_s(charge: float, charged: float) -> float:
+    """How long a battery charges (s), from one state of charge to another (0 to 1)."""
+    return max(0.0, charged - charge) / load_estimates().battery.charging_per_s
+
+
+def _checked_from(pose: Pose2D, prepared: Prepared, planner: RoutePlanner) -> Checked:
+    return check_prepared(replace(prepared, world=replace(prepared.world, start=pose)), planner)
+
+
+def _out_of_reach(prepared: Prepared, now: RobotNow) -> Iterator[str]:
+    """What a robot is to take from where it cannot come. Alone it would look elsewhere; of a fleet another one can."""
+    knowledge = prepared.knowledge
+    for command in prepared.tree.commands:
+        if command.task is not Task.GRASP or command.object is None:
+            continue
+        place = None if command.goal is None else knowledge.place(command.goal)
+        usual = knowledge.usual_surfaces(command.object.name) if place is None else (place,)
+        surfaces = [name for spot in usual for name in knowledge.surfaces_in(spot)]
+        views = [view for name in surfaces for view in knowledge.surfaces[name].viewpoints]
+        if surfaces and not any(is_way(now.planner, now.pose, Pose2D(each.x, each.y, each.yaw)) for each in views):
+            yield f"there is no way to the {place or surfaces[0]}, where the {command.object} is to be taken"
+
+
+def is_way(planner: RoutePlanner, start: Pose2D, goal: Pose2D) -> bool:
+    """Whether there is a route."""
+    try:
+        planner.route(start, goal)
+    except ValueError:
+        return False
+    return True
+
+
+@dataclass(frozen=True)
+class MissionProgress:
+    """What of a tree is done: the first `done` commands for good, and whether what comes after has been `begun`: a
+    skill that changes the world has done its work, or does it; with `put`, one that gives away what was taken."""
+
+    done: int
+    begun: bool = False
+    put: bool = False
+
+
+def is_plain(tree: CompiledTree) -> bool:
+    """Whether a mission is nothing but commands, one after the other."""
+    plain = len(tree.parts) == len(tree.commands) and all(step.block is None for step in tree.steps)
+    return plain and len(tree.steps) == 1
+
+
+def progress_of(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> MissionProgress:
+    """What of a tree is done by what its nodes said, by path id.
+
+    Another robot can go on before a command that needs nothing in the gripper. A mission that has more than plain
+    commands is done as a whole.
+    """
+    done = 0
+    for number, part in enumerate(tree.parts if is_plain(tree) else ()):
+        if statuses(part.node or part.path_id) is not Status.SUCCESS:
+            break
+        after = number + 1
+        if after == len(tree.parts) or tree.commands[after].item is None:
+            done = after
+    over = {part.path_id for part in tree.parts[:done]}
+    begun = [leaf for leaf in _changing(tree.mission, over) if statuses(leaf.path_id) in _TOUCHED]
+    return MissionProgress(done, bool(begun), any(not leaf.options["skill"].gripper_after for leaf in begun))
+
+
+def is_lost(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> bool:
+    """Whether a mission ended because its robot did not find out where it is."""
+    watches = (node for node in tree.root.walk() if node.kind == "interrupt")
+    lost = (node.path_id for node in watches if isinstance(node.options["condition"], KnowsPlace))
+    return any(statuses(path_id) is Status.FAILURE for path_id in lost)
+
+
+def _changing(node: NodeSpec, over: set[str]) -> list[NodeSpec]:
+    """The skills below a node that change the world, without those of commands that are done."""
+    if any(node.path_id == path or node.path_id.startswith(f"{path}/") for path in over):
+        return []
+    own = [node] if node.kind == "skill" and node.options["skill"].changes_world else []
+    return own + [leaf for child in node.children for leaf in _changing(child, over)]
+
+
+class ProgressJournal:
+    """Tells how far a mission is whenever that changes."""
+
+    def __init__(self, tree: CompiledTree, tell: Callable[[MissionProgress], None]) -> None:
+        self._tree, self._tell = tree, tell
+        self._statuses: dict[str, Status] = {}
+        self.progress = MissionProgress(0)
+
+    def note(self, note: TickNote) -> None:
+        """Keep what a tick brought."""
+        if not note.changes:
+            return
+        for change in note.changes:
+            if change.after.status is not Status.INVALID:  # a node that is reset was done all the same
+                self._statuses[change.path_id] = change.after.status
+        progress = progress_of(self._tree, self._statuses.get)
+        if progress != self.progress:
+            self.progress = progress
+            self._tell(progress)
+
+
+@dataclass
+class FleetRobot:
+    """A robot of the fleet: where it is free next, and from when (s on the robots' clock).
+
+    Its mission to `dock` is None where it cannot charge.
+    """
+
+    placed: PlacedRobot
+    pose: Pose2D
+    charge: float = 1.0
+    free_at_s: float = 0.0
+    entry: RunEntry | None = None
+    journal: ProgressJournal | None = None
+    dock: Prepared | None = None
+    planner: RoutePlanner | None = None
+    faults: tuple[str, ...] = ()
+
+    def ready_s(self, now_s: float, *, busy: bool) -> float:
+        """In how long it is free (s). What is late is expected to be as late again."""
+        left_s = self.free_at_s - now_s
+        return abs(left_s) if busy else max(0.0, left_s)
+
+    @property
+    def progress(self) -> MissionProgress:
+        """How far the mission is that it has."""
+        return MissionProgress(0) if self.journal is None else self.journal.progress
+
+
+class Offers:
+    """What robots offer for missions; each route is planned once for each place that it is offered from."""
+
+    def __init__(
+        self,
+        robots: Mapping[str, FleetRobot],
+        battery: BatteryFacts,
+        now: Callable[[], float],
+        bid: Callable[[FleetMission, str, RobotNow], Bid] = bid_for,
+    ) -> None:
+        """`now` is the robots' clock (s); `bid` is what a robot offers, but for when it is free."""
+        self._robots, self._battery, self._now, self._bid = robots, battery, now, bid
+        self._known: dict[tuple[int, str, int, Pose2D, float, bool], Bid] = {}
+
+    def known(self, wanted: FleetMission, name: str, *, busy: bool, resting: bool) -> Bid:
+        """What a robot offers for a mission of the queue."""
+        robot = self._robots[name]
+        if (tried := wanted.tried.get(name)) is not None:
+            return Bid(wanted.stored.id, name, 0.0, 0.0, problems=(tried,))
+        key = (wanted.stored.id, name, wanted.done, robot.pose, robot.charge, resting)
+        if key not in self._known:
+            self._known[key] = self.new(wanted, name, busy=busy, resting=resting)
+        return replace(self._known[key], ready_s=robot.ready_s(self._now(), busy=busy))
+
+    def new(self, wanted: FleetMission, name: str, *, busy: bool, resting: bool) -> Bid:
+        """What a robot offers from where it is free next; one that is `resting` from its dock, and is `busy` as one is
+        that has a mission."""
+        robot = self._robots[name]
+        if robot.planner is None:
+            some = wanted.options.get(name, next(iter(wanted.options.values())))
+            robot.planner = route_planner_of(some.world, robot.placed, kept=False)
+        now = RobotNow(robot.pose, robot.charge, self._battery.low, robot.planner, robot.dock)
+        if resting and robot.dock is not None:
+            now = replace(now, pose=robot.dock.world.dock or robot.pose, charge=self._battery.charged)
+        return replace(self._bid(wanted, name, now), ready_s=robot.ready_s(self._now(), busy=busy))
+
+    def takes_from(self, name: str, table: SurfaceFacts) -> bool:
+        """Whether a robot that has offered something has a way to where it reaches what another one puts on a table.
+
+        That is nearest to the first viewpoint, from which it is put down.
+        """
+        robot, arm = self._robots[name], robot_kind(self._robots[name].placed.kind).capabilities().arm
+        view, planner = table.viewpoints[0], robot.planner
+        if arm is None or planner is None:
+            return False
+        there = spots(Surface("table", table.polygon, table.height))
+        x, y = min(there, key=lambda spot: float(np.hypot(*(spot - [view.x, view.y]))))
+        yaws = [wrap(2.0 * math.pi * n / _HEADINGS) for n in range(_HEADINGS)]
+        return any(
+            is_way(planner, robot.pose, Pose2D(x - d_m * math.cos(yaw), y - d_m * math.sin(yaw), yaw))
+            for d_m in arm.standing_m
+            for yaw in yaws
+        )
+
+
+@dataclass(frozen=True)
+class EndedMission:
+    """A mission's tree as a robot left it; it was under way between two times (s on the robots' clock)."""
+
+    number: int
+    ended: EndedTree
+    since_s: float
+    until_s: float
+
+
+def missions_json(store: MissionStore, numbers: Sequence[int]) -> list[dict[str, Any]]:
+    """Missions as JSON values, with their parts and what they are part of: whose each is or was, and how it ended."""
+    given = GivenMissions(store).all()
+    missions = {mission.id: mission for mission in store.missions()}
+    wanted = {*numbers, *(whole for number in numbers if (whole := given.get(number, GivenMission()).part_of))}
+    wanted |= {number for number, each in given.items() if each.part_of in wanted}
+    return [_mission_json(missions[number], given) for number in sorted(wanted)]
+
+
+def _mission_json(mission: StoredMission, given: Mapping[int, GivenMission]) -> dict[str, Any]:
+    known = given.get(mission.id, GivenMission())
+    parts = [each.robot for each in given.values() if each.part_of == mission.id and each.robot is not None]
+    return {
+        "id": mission.id,
+        "robot": parts[-1] if parts else known.robot,
+        "outcome": mission.state.value,
+        "referee": known.referee,
+        "reassigned": known.reassigned,
+        "message": mission.message,
+        "part_of": known.part_of,
+        "after": known.follows,
+    }
+
+
+def missions_message(store: MissionStore, rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Missions as the log has them: what was asked for, whose each is or was, and how it ended."""
+    requests = {each.id: each.request for each in store.missions()}
+    keys = ("id", "robot", "outcome", "reassigned", "message")
+    missions = [
+        {**{key: each[key] for key in keys}, "sentence": requests[each["id"]].sentence or requests[each["id"]].name}
+        for each in rows
+    ]
+    return {"missions": missions}

@@ -47,22 +47,22 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "missions": _Command("missions_command", "missions", "List the missions that come with Errand."),
     "init": _Command("missions_command", "init", "Copy the missions that come with Errand into a folder."),
     "parse": _Command("parse_command", "parse", "Show the commands that a sentence means."),
-    "tree": _Command("tree_command", "tree", "Show the tree of a sentence, a mission file or a log."),
+    "tree": _Command("inspect_command", "tree", "Show the tree of a sentence, a mission file or a log."),
     "listen": _Command(
         "listen_command", "listen", "Recognise what is said in wav files or at the microphone, and its commands."
     ),
-    "log": _Command("log_command", "log", "Print what each node of a run did and why, detections and the outcome."),
-    "replay": _Command("replay_command", "replay", "Show a run at any time of it: tree, map, pictures, events, 3D."),
+    "log": _Command("inspect_command", "log", "Print what each node of a run did and why, detections and the outcome."),
+    "replay": _Command("inspect_command", "replay", "Show a run at any time of it: tree, map, pictures, events, 3D."),
     "queue": _Command("queue_command", "queue", "Missions kept in a store, to be run one after another."),
     "fleet": _Command("fleet_command", "fleet", "What is queued, given out among several robots."),
-    "resume": _Command("resume_command", "resume", "Resume the mission that was interrupted; then run its queue."),
+    "resume": _Command("queue_command", "resume", "Resume the mission that was interrupted; then run its queue."),
     "evaluate": _Command(
         "evaluate_command",
         "evaluate",
         "Run a scenario file, or a mission at many seeds; count claims and what the referee saw.",
     ),
     "report": _Command("report_command", "report", "Report the results of an evaluation: rates, causes, failures."),
-    "teleop": _Command("teleop_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
+    "teleop": _Command("robot_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "stack": _Command("stack_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
     "map": _Command("map_command", "map_group", "Maps that the robot makes itself, by exploring or along a route."),
@@ -70,9 +70,9 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "object": _Command("object_command", "object_group", "Objects of your own: any mesh becomes a model for worlds."),
     "plugins": _Command("plugins", "plugins", "What other distributions add, and what of it is broken."),
     "warm-up": _Command(
-        "warm_up_command", "warm_up", "Compile the numeric code for this machine, so that runs begin at once."
+        "robot_command", "warm_up", "Compile the numeric code for this machine, so that runs begin at once."
     ),
-    "new-skill": _Command("new_skill_command", "new_skill", "Write an installable package with a skill and tests."),
+    "new-skill": _Command("missions_command", "new_skill", "Write an installable package with a skill and tests."),
 }
 """The commands of Errand by name, in the order of the help; those of plug-ins follow them."""
 

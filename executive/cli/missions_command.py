@@ -1,4 +1,4 @@
-"""`errand missions` and `errand init`: the missions that come with Errand, by name, from any folder."""
+"""`errand missions` and `errand init`: the missions that come with Errand; `errand new-skill`: a skill of one's own."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from executive.app.mission_files import FOLDER, shipped_missions
 from executive.cli.output import console_for, refusals, show_table
 from skills.files.errors import InputError
 
-__all__ = ["init", "missions"]
+__all__ = ["init", "missions", "new_skill"]
 
 _FOR_EDITORS: Final = "# yaml-language-server"
 
@@ -43,3 +43,18 @@ def _first_words(file: Path) -> str:
     """The first line of comment that is meant for people."""
     lines = file.read_text(encoding="utf-8").splitlines()
     return next((line[1:].strip() for line in lines if line[:1] == "#" and not line.startswith(_FOR_EDITORS)), "")
+
+
+def new_skill(
+    name: Annotated[str, typer.Argument(help="The skill's name: lower-case words joined by _.")],
+    folder: Annotated[Path, typer.Argument(help="The new folder for the package.")],
+) -> None:
+    """Write an installable package with one skill, its tests and its registration."""
+    from executive.cli.new_skill.render import render_skill
+    from executive.tree.registry import installed_skills
+
+    with refusals():
+        written = render_skill(name, folder, taken=frozenset(installed_skills().names))
+    for path in written:
+        typer.echo(str(path))
+    typer.echo(f"\nNext:\n  pip install --no-build-isolation --editable {folder}\n  pytest {folder}")

@@ -1,21 +1,21 @@
-"""`errand queue`: missions kept in a store, to be run one after another, or whenever a trigger fires."""
+"""`errand queue` and `errand resume`: missions kept in a store, run one after another or whenever a trigger fires."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import nullcontext
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 
 from executive.app.durable import STORE as STORE_NAME
 from executive.app.prepare import prepare
-from executive.cli.number_options import quantity_argument
+from executive.app.signals import ended_by_signals
+from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON, QUIET, STORE, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
-from executive.cli.serve_command import Out, serve
 from executive.cli.terminal import terminal_answerer
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.request import Request
@@ -24,11 +24,11 @@ from executive.store.missions import MissionState, MissionStore, StoredMission, 
 from executive.store.standing import StandingMission, StandingMissions
 from executive.store.trigger_source import refuse_missing_source
 from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, local, schedule_of
-from executive.store.wakeup import wake_server
-from skills.files.errors import InputError
-from skills.quantities import Count
+from executive.store.wakeup import WakeupPipe, wake_server
+from skills.files.errors import InputError, listing
+from skills.quantities import Count, Port, Wait
 
-__all__ = ["queue"]
+__all__ = ["Out", "queue", "resume", "serve"]
 
 queue = typer.Typer(
     name="queue",
@@ -37,6 +37,7 @@ queue = typer.Typer(
     rich_markup_mode=None,
 )
 
+Out = Annotated[Path, typer.Option(help="Folder for logs; each mission gets one of its own in it.")]
 Number = Annotated[
     int, quantity_argument(Count, metavar="NUMBER", help="The mission's number, as `errand queue list` shows it.")
 ]
@@ -55,6 +56,9 @@ WhenMissed = Annotated[
     Missed | None,
     typer.Option(help="What passes while nothing serves, or a mission runs: skip it (default), or queue once for all."),
 ]
+
+_LONGEST_S: Final = 3.2e9  # a hundred years
+_MAY_GO_ON: Final = (MissionState.RUNNING, MissionState.CANCELLED, MissionState.ERROR)
 
 
 @queue.command()
@@ -125,7 +129,7 @@ def run(
 ) -> None:
     """Run all that is queued, each mission in the world as the one before has left it."""
     from executive.app.runs import MissionRuns, queued, resumable_line, run_in_turn
-    from executive.cli.shown import ConsoleScreen
+    from executive.cli.screen import ConsoleScreen
 
     console = console_for(as_json)
     with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
@@ -142,9 +146,6 @@ def run(
         print_json({"missions": [each.to_json() for each in ended]})
     if not all(each.achieved for each in ended):
         raise typer.Exit(NOT_ACHIEVED)
-
-
-queue.command()(serve)
 
 
 def _state(mission: StoredMission) -> str:
@@ -201,3 +202,98 @@ def _trigger(at: str | None, every: str | None, on: str | None, missed: Missed |
     if isinstance(trigger, OnTopic):
         refuse_missing_source(trigger.kind)
     return trigger
+
+
+@queue.command()
+def serve(
+    out: Out = Path("out"),
+    store: STORE = None,
+    host: Annotated[str, typer.Option(help="Where HTTP calls are served.")] = "127.0.0.1",
+    port: Annotated[int, quantity_option(Port, help="The port for HTTP calls; 0 takes a free one.")] = 8950,
+    token: Annotated[
+        str | None,
+        typer.Option(envvar="ERRAND_TOKEN", help="What calls must bear; by default one kept beside the store."),
+    ] = None,
+    until_idle: Annotated[bool, typer.Option("--until-idle", help="End when nothing is queued.")] = False,
+    for_s: Annotated[
+        float | None,
+        quantity_option(Wait, "--for", help="End after so long; no mission begins then."),
+    ] = None,
+    quiet: QUIET = False,
+    as_json: AS_JSON = False,
+) -> None:
+    """Wait for triggers and run what is queued, until Ctrl-C: at times, on a full battery, calls and messages."""
+    from executive.app.listeners import CallAddress, Listeners
+    from executive.app.runs import MissionRuns, QueueServer, resumable_line
+    from executive.cli.screen import ConsoleScreen
+
+    console = console_for(as_json)
+    limit = None if for_s is None else timedelta(seconds=min(for_s, _LONGEST_S))
+
+    def tell(line: str) -> None:
+        console.print(line, markup=False)
+
+    with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
+        end = None if limit is None else missions.now() + limit
+        address = CallAddress(host, port, token)
+        with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
+            standing, runner = (
+                StandingMissions(missions),
+                MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer()),
+            )
+            server = QueueServer(missions, standing, wakeup, runner, follow=listeners.follow, tell=tell)
+            with ended_by_signals(server.stop):
+                tell(f"Standing missions: {len(standing.missions())} ({missions.path}). Ctrl-C ends.")
+                ended = server.serve(end=end, until_idle=until_idle)
+            resumable = resumable_line(missions)
+    tell(f"{sum(each.achieved for each in ended)} of {len(ended)} missions achieved")
+    if resumable is not None:
+        tell(resumable)
+    if as_json:
+        print_json({"missions": [{"mission": e.mission, "outcome": e.outcome, "achieved": e.achieved} for e in ended]})
+
+
+def resume(
+    store: Annotated[Path, typer.Option(help="Where the missions are kept.")] = Path("out") / STORE_NAME,
+    mission: Annotated[
+        int | None, quantity_option(Count, help="Its number; by default the one that was broken off or cancelled last.")
+    ] = None,
+    as_json: AS_JSON = False,
+    quiet: QUIET = False,
+) -> None:
+    """Go on with the mission that was broken off or cancelled, from its last finished step; then with its queue."""
+    console = console_for(as_json)
+    with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
+        from executive.app.runs import MissionRuns, queued, run_in_turn
+        from executive.cli.screen import ConsoleScreen
+
+        chosen = _broken_off(missions, mission)
+        runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
+        ended = [runs.run(chosen), *(run_in_turn(queued(missions), runs) if chosen.queued else ())]
+    if as_json:
+        print_json({**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]})
+    if not all(each.achieved for each in ended):
+        raise typer.Exit(NOT_ACHIEVED)
+
+
+def _broken_off(missions: MissionStore, number: int | None) -> StoredMission:
+    """The mission to go on with: the one named, the one that no process ended, or the newest where it was cancelled.
+
+    Raises InputError when there is none.
+    """
+    if number is None:
+        begun = [each for each in missions.missions() if each.starts]
+        broken = [each for each in begun if each.state is MissionState.RUNNING]
+        broken += [each for each in begun[-1:] if each.state in _MAY_GO_ON]
+        if broken:
+            return broken[0]
+        queued = missions.missions(MissionState.QUEUED)
+        hint = "`errand queue run` does what is queued" if queued else "`errand queue list` shows how missions ended"
+        raise InputError("no mission was broken off", hint=hint, file=missions.path)
+    chosen = missions.mission(number)
+    if chosen.state not in _MAY_GO_ON:
+        known = listing((state.value for state in _MAY_GO_ON), last="or")
+        raise InputError(
+            f"mission {number} is {chosen.state.value}", hint=f"name one that is {known}", file=missions.path
+        )
+    return chosen

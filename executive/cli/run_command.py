@@ -44,7 +44,7 @@ def run(
     from executive.app.prepare import prepare
     from executive.app.runs import MissionRuns
     from executive.cli.listen_command import hear_request
-    from executive.cli.shown import ConsoleScreen, voice_for
+    from executive.cli.screen import ConsoleScreen, voice_for
     from executive.record.profile import Profile, lines
     from executive.store.missions import MissionStore
 

@@ -31,7 +31,7 @@ RUN = """
     from dataclasses import replace
     sys.path.insert(0, {tests!r})
     from scripted_backend import ScriptedBackend
-    from executive.cli import (shown)
+    from executive.cli import screen
     from executive.app import prepare as preparing
     from executive.app.runs import noted
     from executive.app.mission_run import run_request
@@ -41,7 +41,7 @@ RUN = """
     from tests.visitors import OnTick
     from rich.console import Console
 
-    preparing.load_parser = shown.load_parser = lambda: None
+    preparing.load_parser = screen.load_parser = lambda: None
     out, robot = Path({out!r}), ScriptedBackend()
     request = Request(file=out / "m.yaml", out=out)
     prepared = prepare(request)
@@ -57,8 +57,8 @@ RUN = """
         mission = store.add(prepared.request, queued=False)
         with noted(store, mission) as ended:
             console = Console()
-            control = shown.control_for(console, quiet=False)
-            finished = shown.show_run(start, prepared, console, control=control, quiet=False)
+            control = screen.control_for(console, quiet=False)
+            finished = screen.show_run(start, prepared, console, control=control, quiet=False)
             ended(finished.report)
     (out / "stopped").write_text(next(call for call in reversed(robot.robot.calls) if call in ("stop", "drive")))
 """

@@ -61,7 +61,7 @@ GOOD: Final[Mapping[str, Mapping[str, str]]] = {
 """What each command is called with beside the hostile text; no key, no need."""
 WORK: Final = (
     "executive.app.simulated.simulate",
-    "executive.cli.teleop_command.simulate",
+    "executive.cli.robot_command.simulate",
     "executive.app.simulated.simulate",
     "executive.app.evaluate.cluster.Pool.opened",
     "errand_train.dataset.shards.render",

@@ -22,7 +22,7 @@ IMPORTS = [
     (["run", "--help"], set()),
     (["evaluate", "--help"], set()),
     (["queue", "--help"], {"pydrake"}),
-    (["log", "--help"], {"cv2"}),
+    (["log", "--help"], set()),
     (["new-skill", "--help"], set()),
 ]
 

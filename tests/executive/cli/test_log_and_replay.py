@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from executive.cli import entry, replay_command
+from executive.cli import entry
 from executive.record.event_log import EventLog
+from executive.view import server
 from skills.api import Cause, Failed
 
 
@@ -104,7 +105,7 @@ def test_replay_serves_the_page_and_ends(log_path, monkeypatch):
     def look(limit_s: float | None) -> None:
         seen.append(limit_s)
 
-    monkeypatch.setattr(replay_command, "wait", look)
+    monkeypatch.setattr(server, "wait", look)
     result = invoke("replay", log_path, "--view-for", "3")
     assert (result.exit_code, seen) == (0, [3.0])
     assert re.search(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+", result.stdout)
@@ -112,7 +113,7 @@ def test_replay_serves_the_page_and_ends(log_path, monkeypatch):
 
 def test_waiting_ends_by_itself():
     before = threading.active_count()
-    replay_command.wait(0.01)
+    server.wait(0.01)
     assert threading.active_count() == before
 
 
@@ -122,7 +123,7 @@ def test_a_served_replay_answers(log_path, monkeypatch):
     def look(limit_s: float | None) -> None:
         answers.append(limit_s)
 
-    serve = replay_command.serve
+    serve = server.serve
 
     def noted(content, port):
         server = serve(content, port)
@@ -130,8 +131,8 @@ def test_a_served_replay_answers(log_path, monkeypatch):
             answers.append(answer.status)
         return server
 
-    monkeypatch.setattr(replay_command, "wait", look)
-    monkeypatch.setattr(replay_command, "serve", noted)
+    monkeypatch.setattr(server, "wait", look)
+    monkeypatch.setattr(server, "serve", noted)
     assert invoke("replay", log_path).exit_code == 0
     assert answers == [200, None]
 

@@ -1,4 +1,4 @@
-"""`errand teleop`: body and arm driven by hand, from the terminal's keys and from the live page."""
+"""`errand teleop` drives a body and arm by hand, from terminal or live page; `errand warm-up` readies this machine."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from executive.app.backend import Scene
+from executive.app.kernels import compile_kernels, newly_compiled
 from executive.app.mission_files import save_pose
 from executive.app.page_view import scene_actions
 from executive.app.robots import only_robot
@@ -30,12 +31,14 @@ from executive.view.server import PageContent, serve
 from plant.worlds.world import World
 from skills.api import SkillContext
 from skills.estimate.grid_map import load_grid_map
-from skills.files.errors import InputError
+from skills.files.errors import InputError, count_text
 from skills.quantities import Delay, Port, Seed
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack
 from skills.teleop.driver import Teleop, TeleopOptions
 from skills.teleop.keys import KEYS, asked_by, read_asked
+
+__all__ = ["warm_up"]
 
 HOLDER: Final = "teleop"
 SAVE_KEY: Final = "p"
@@ -175,3 +178,11 @@ def _told(hands: Teleop) -> dict[str, Any]:
         "joints_rad": list(pose.joints_rad),
         "opening": pose.opening,
     }
+
+
+def warm_up() -> None:
+    """Compile the numeric code for this machine, so that the first run begins at once."""
+    begun_s = time.monotonic()
+    with refusals():
+        compile_kernels()
+    typer.echo(f"{count_text(newly_compiled(), 'function')} compiled in {time.monotonic() - begun_s:.0f} s")

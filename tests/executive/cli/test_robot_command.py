@@ -13,7 +13,7 @@ from executive.app.robots import only_robot
 from executive.app.simulated import simulate
 from executive.app.worlds import open_world
 from executive.cli.entry import app
-from executive.cli.teleop_command import TerminalKeys, context_for, page_actions, period
+from executive.cli.robot_command import TerminalKeys, context_for, page_actions, period
 from executive.mission.file.resolve import load_mission
 from executive.mission.request import Start
 from executive.view.actions import RefusedError

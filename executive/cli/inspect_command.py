@@ -1,0 +1,233 @@
+"""`errand log`, `errand replay` and `errand tree`: what a run did and when, and the tree of a mission."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from enum import StrEnum
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Final
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+from executive.cli.number_options import quantity_option
+from executive.cli.output import console_for, refusals, show_table
+from executive.cli.terminal import terminal_answerer
+from executive.mission.request import Request
+from executive.record.history import History, read_history
+from executive.record.schemas import ERRORS
+from executive.record.timeline import Entry, timeline
+from executive.tree.node_view import NodeView, node_view, to_json
+from executive.view.btcpp import to_btcpp
+from executive.view.collapse import DRAWN_NODES, MANY_NODES, fold_below, fold_to
+from executive.view.mermaid import to_mermaid
+from executive.view.styles import style_of
+from executive.view.svg import to_svg
+from executive.view.text import printable, to_text
+from skills.files.errors import InputError
+from skills.files.outside import is_file
+from skills.quantities import Count, Delay, Port, Tries, Wait
+
+RECORDING: Final = "recording.html"
+LOG_SUFFIX: Final = ".mcap"
+
+
+def log(
+    file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
+    as_json: Annotated[bool, typer.Option("--json", help="All transitions as one JSON list.")] = False,
+    ros2: Annotated[Path | None, typer.Option(help="Write it anew as a ROS 2 bag (MCAP), and end.")] = None,
+    map_file: Annotated[
+        Path | None, typer.Option("--map", help="Draw map, way, path and particles as PNG, and end.")
+    ] = None,
+    at: Annotated[float, quantity_option(Delay, help="When the map is drawn (s); else at the end.")] = math.inf,
+    robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
+    every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
+) -> None:
+    """Print what happened in a run: what each node did and why, detections, the outcome, tracebacks of defects."""
+    with refusals():
+        history = read_history(file)
+        history = history if robot is None else history.of_robot(robot)
+        if ros2 is not None:
+            from executive.record.ros2 import write_ros2
+
+            typer.echo(f"{write_ros2(history.events, ros2)} messages in {ros2}", err=True)
+            return
+        if map_file is not None:
+            _draw(history, map_file, at)
+            return
+        if as_json:
+            sys.stdout.write(json.dumps(list(history.transitions()), ensure_ascii=False) + "\n")
+            return
+        _show(history, console_for(as_json=False), every_node=every_node)
+
+
+def _draw(history: History, file: Path, at_s: float) -> None:
+    """Write the map's picture. Raises InputError: it cannot be written."""
+    import cv2
+
+    from executive.view.map_picture import map_picture
+
+    _, png = cv2.imencode(".png", map_picture(history.events, at_s))
+    try:
+        file.write_bytes(png.tobytes())
+    except OSError as error:
+        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=file) from error
+    typer.echo(f"the map is in {file}", err=True)
+
+
+def _show(history: History, console: Console, *, every_node: bool) -> None:
+    """The timeline as a table, and the traceback of each defect below it."""
+    entries = list(timeline(history.events, leaves_only=not every_node))
+    prefix = _common([entry.about for entry in entries if entry.state is not None])
+    several = len(history.robots) > 1
+    rows = ((entry.robot, *_row(entry, prefix)) if several else _row(entry, prefix) for entry in entries)
+    show_table(console, (*(("robot",) if several else ()), "t (s)", "", "node or topic", "what"), rows)
+    for event in history.events:
+        if event.topic == ERRORS:
+            head = f"{event.stamp_s:.2f} s, {event.data.get('node')}:"
+            lines = str(event.data.get("traceback", "")).splitlines()
+            console.print("", *map(printable, (head, *lines)), sep="\n", markup=False)
+
+
+def _common(path_ids: Sequence[str]) -> str:
+    """The parts, robot and mission, with which all path ids begin; empty where they differ."""
+    starts = {"/".join(path_id.split("/")[:2]) + "/" for path_id in path_ids}
+    return starts.pop() if len(starts) == 1 else ""
+
+
+def _row(entry: Entry, prefix: str) -> tuple[str | Text, ...]:
+    if entry.state is None:
+        return f"{entry.t:.2f}", "·", Text(entry.about, style="cyan"), Text(printable(entry.text))
+    style = style_of(entry.state)
+    symbol = Text(f"{style.symbol} {style.word}", style=style.rich)
+    about = entry.about.removeprefix(prefix)
+    return f"{entry.t:.2f}", symbol, Text(printable(about)), Text(printable(entry.text), style=style.rich)
+
+
+def replay(
+    file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
+    html: Annotated[Path | None, typer.Option(help="Write one HTML file that needs no server, and end.")] = None,
+    scene: Annotated[bool, typer.Option(help="With the 3D recording that lies beside the log.")] = True,
+    port: Annotated[int, quantity_option(Port, help="Serve here; 0 takes a free port.")] = 0,
+    view_for: Annotated[float | None, quantity_option(Wait, help="End after so many seconds.")] = None,
+) -> None:
+    """Show what happened in a run, at any time of it: tree, map, pictures, events, 3D recording."""
+    with refusals():
+        history = read_history(file)
+        history.trees()
+        beside = file.parent / RECORDING
+        recording = beside if scene and beside.is_file() else None
+        if html is not None:
+            from executive.view.html import log_page
+
+            _write(html, log_page(history.events, recording))
+            return
+        _serve(history, recording, port, view_for)
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=path) from error
+
+
+def _serve(history: History, recording: Path | None, port: int, view_for_s: float | None) -> None:
+    from executive.view.html import feed_of
+    from executive.view.server import PageContent, serve, wait
+
+    content = PageContent(feed_of(history.events), recording=recording)
+    with serve(content, port) as server:
+        console_for(False).print(f"{server.url}\n(Ctrl-C ends it)", markup=False)
+        wait(view_for_s)
+
+
+class TreeFormat(StrEnum):
+    """How `errand tree` shows a tree."""
+
+    TEXT = "text"
+    SVG = "svg"
+    MERMAID = "mermaid"
+    XML = "xml"
+    JSON = "json"
+
+
+_FORMS: Final[Mapping[TreeFormat, Callable[[NodeView, bool], str]]] = MappingProxyType(
+    {
+        TreeFormat.TEXT: lambda view, ascii_only: to_text(view, ascii_only=ascii_only) + "\n",
+        TreeFormat.SVG: lambda view, _: to_svg(view),
+        TreeFormat.MERMAID: lambda view, _: to_mermaid(view),
+        TreeFormat.XML: lambda view, _: to_btcpp(view),
+        TreeFormat.JSON: lambda view, _: json.dumps(to_json(view), ensure_ascii=False) + "\n",
+    }
+)
+_MOST: Final[Mapping[TreeFormat, int]] = (
+    MappingProxyType(  # programs, which read the other forms, do not mind a large tree
+        {TreeFormat.TEXT: MANY_NODES, TreeFormat.SVG: DRAWN_NODES, TreeFormat.MERMAID: DRAWN_NODES}
+    )
+)
+
+
+def tree(
+    file: Annotated[str | None, typer.Argument(metavar="FILE|SENTENCE|LOG", show_default=False)] = None,
+    say: Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')] = None,
+    world: Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")] = None,
+    form: Annotated[TreeFormat, typer.Option("--format", help="How to show it.")] = TreeFormat.TEXT,
+    depth: Annotated[int | None, quantity_option(Tries, help="Show only so many levels below the root.")] = None,
+    most: Annotated[
+        int | None, quantity_option(Count, help="Fold what is done or not begun beyond so many nodes.")
+    ] = None,
+    at: Annotated[float | None, quantity_option(Delay, help="Of a log: at this time (s), not at its end.")] = None,
+    robot: Annotated[str | None, typer.Option(metavar="NAME", help="Of a log: of this one of several robots.")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Write it to this file.")] = None,
+    ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,
+) -> None:
+    """Show the tree of a sentence or a mission file before it runs, or of a log as it last was."""
+    with refusals():
+        whole = _view(file, say, world, at, robot)
+        shown = whole if depth is None else fold_below(whole, depth)
+        few = most or _MOST.get(form)
+        text = _FORMS[form](shown if few is None else fold_to(shown, few), ascii_only)
+        if output is None:
+            sys.stdout.write(text)
+        else:
+            _write(output, text)
+
+
+def _view(text: str | None, say: str | None, world: str | None, at_s: float | None, robot: str | None) -> NodeView:
+    """What ends in .mcap is a log, what ends in .yaml, exists or is shipped a mission file, and all else a sentence."""
+    if text is not None and text.endswith(LOG_SUFFIX):
+        history = read_history(Path(text))
+        if robot is None and len(history.robots) > 1:
+            known = ", ".join(history.robots)
+            raise InputError("the log has several robots", hint=f"add --robot with one of: {known}", file=history.file)
+        return (history if robot is None else history.of_robot(robot)).trees(at_s)[-1]
+    if at_s is not None or robot is not None:
+        option = "--at" if robot is None else "--robot"
+        raise InputError(f"{option} is for logs", hint="name a log.mcap that a run has written")
+    from executive.app.prepare import prepare
+
+    prepared = prepare(_request(text, say, world), ask=terminal_answerer())
+    for each in prepared.all:
+        for note in each.mission.notes:
+            typer.echo(note, err=True)
+    trees = tuple(node_view(each.tree.root) for each in prepared.all)
+    return trees[0] if len(trees) == 1 else NodeView("robots", "together", prepared.mission.name, children=trees)
+
+
+def _request(text: str | None, say: str | None, world: str | None) -> Request:
+    if text is not None and say is not None:
+        raise InputError("a sentence and --say were given", hint="leave one of them out")
+    from executive.app.mission_files import shipped_missions
+
+    if text is not None and (text.endswith((".yaml", ".yml")) or text in shipped_missions() or is_file(Path(text))):
+        return Request(file=Path(text), world=world)
+    sentence = say if text is None else text
+    if sentence is None:
+        raise InputError("a mission file, a sentence or a log is needed", hint='try: errand tree "go to the kitchen"')
+    return Request(sentence, world=world)

@@ -1,4 +1,4 @@
-"""The bench: one skill in its real leaf, with a robot, estimators and a clock, ticked as the runner ticks."""
+"""Test bench for one skill: its real leaf, a robot, estimators and a clock, ticked as the runner ticks."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ _OUTCOMES = {Status.SUCCESS: "success", Status.FAILURE: "failure"}
 
 @dataclass(frozen=True)
 class SkillRun:
-    """How a skill ended on the bench.
+    """Result of a skill on the bench.
 
-    `outcome` is "success", "failure" or "cancelled"; `messages` says when (s) which message came up.
+    `outcome` is "success", "failure" or "cancelled"; `messages` are the skill's messages with their times (s).
     """
 
     outcome: str
@@ -48,7 +48,7 @@ class SkillRun:
 
 
 class SkillBench:
-    """A robot with its lease, its estimators and a log, for one skill after the other."""
+    """A robot with its lease, estimators and log. It runs one skill after the other."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class SkillBench:
         detector: Detector | None = None,
         seed: int = 0,
     ) -> None:
-        """Take the robot's lease; time passes by `clock`. Estimators that know all stand in for those left out."""
+        """Takes the robot's lease. `clock` advances the time; ideal estimators replace those that are not given."""
         self.robot, self.clock = robot, clock
         self._capabilities = robot.capabilities()
         self.sensing = False
@@ -80,21 +80,21 @@ class SkillBench:
         self._sense(robot)
 
     def context(self) -> SkillContext:
-        """What a skill is made with."""
+        """The context with which a skill is created."""
         return self._context.for_skill(f"{_PREFIX}/skill")
 
     def inject(self, *words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS) -> None:
-        """From now on these faults are at work. Raises ValueError for words that are no fault of this robot."""
+        """Injects faults, given in words. Raises ValueError for words that are no fault of this robot."""
         cameras = [camera.source for camera in self._capabilities.cameras]
         self.add_faults(*(parse_fault(each, kinds, cameras=cameras) for each in words))
 
     def add_faults(self, *faults: Fault) -> None:
-        """From now on these faults are at work."""
+        """Injects faults."""
         self.robot = with_faults(self.robot, self.clock, faults)
         self._context = replace(self._context, robot=self.robot)
 
     def leaf(self, skill: type[Skill[Any]], inputs: Any, *, limit_s: float | None = None) -> SkillLeaf:
-        """The skill's leaf, as a tree would have it, with these inputs."""
+        """The skill's leaf with these inputs, as in a tree; `limit_s` is its time limit."""
         fields = {name: Constant(value) for name, value in vars(inputs).items()}
         return SkillLeaf(
             path_id=f"{_PREFIX}/skill",
@@ -107,7 +107,7 @@ class SkillBench:
         )
 
     def tick(self, leaf: SkillLeaf) -> None:
-        """One period: time passes, estimators see, the leaf is ticked."""
+        """Advances the clock by one period, updates the estimators, and ticks the leaf."""
         self.clock.advance(TICK_S)
         self._sense(self.robot)
         leaf.tick_once()
@@ -115,7 +115,7 @@ class SkillBench:
     def run(
         self, skill: type[Skill[Any]], inputs: Any, *, limit_s: float | None = None, cancel_at_s: float = math.inf
     ) -> SkillRun:
-        """The skill from its beginning to its end, to the time limit (s), or until it is cancelled at a time (s)."""
+        """Runs a skill until it ends, reaches its time limit (s), or is cancelled at a time (s)."""
         leaf = self.leaf(skill, inputs, limit_s=limit_s)
         begun_s, ticks = self.clock.now(), 0
         messages: list[tuple[float, str]] = []
@@ -132,7 +132,7 @@ class SkillBench:
         return SkillRun(outcome, leaf.cause, leaf.message, time_s, ticks, outputs, tuple(messages))
 
     def close(self) -> None:
-        """Stop the robot and give the lease back, as the runner does at the end; defects of the robot are let pass."""
+        """Stops the robot and returns the lease, as the runner does at the end; ignores errors of the robot."""
         for call in (lambda: self.robot.stop(lease=self._context.lease), self._give_back):
             try:
                 call()
@@ -143,7 +143,7 @@ class SkillBench:
         self.robot.return_lease(self._context.lease)
 
     def _sense(self, robot: Robot) -> None:
-        """Bring the estimators up to date; those of a robot that cannot sense keep what they have."""
+        """Updates the estimators. They keep their estimates if the robot's sensors raise."""
         context, self.sensing = self._context, True
         try:
             context.localiser.update(robot)
@@ -161,7 +161,7 @@ def scripted_bench(
     *,
     localised: bool = True,
 ) -> tuple[SkillBench, ScriptedRobot]:
-    """A bench with a scripted robot, and that robot; it stands in the room with a table and a can unless said."""
+    """A bench with a scripted robot, and that robot; by default in the room with a table and a can."""
     clock = VirtualClock()
     robot = ScriptedRobot(clock, capabilities=capabilities, blocks=blocks, start=start)
     place = KnownPlace(start.pose)

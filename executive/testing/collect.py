@@ -1,4 +1,4 @@
-"""Lets pytest collect `*.skilltest.yaml` files."""
+"""Collects `*.skilltest.yaml` files for pytest."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from skills.robot import Capabilities
 
 
 class SkillTestSettings:
-    """What the tests of a session share; a conftest may add to `fault_kinds` or put other benches in `makers`."""
+    """Settings of all skill tests of a session; a conftest may add to `fault_kinds` or replace benches in `makers`."""
 
     def __init__(self, skills: Mapping[str, type[Skill[Any]]], makers: BenchMakers, capabilities: Capabilities) -> None:
         self.skills, self.makers, self.capabilities = dict(skills), dict(makers), capabilities
@@ -27,7 +27,7 @@ class SkillTestSettings:
 
 
 class SkillTestError(Exception):
-    """A skill test that did not go as expected."""
+    """A skill test did not meet its expectation."""
 
 
 class SkillTestModule(pytest.File):
@@ -36,7 +36,7 @@ class SkillTestModule(pytest.File):
     settings: SkillTestSettings
 
     def collect(self) -> Iterable[pytest.Item]:
-        """Its tests, and the suite's parts where it asks for them. A broken file is one error with its line."""
+        """The tests, and the parts of the suite if the file asks for them. A broken file is one error with its line."""
         try:
             tests = load_skill_tests(self.path, self.settings.skills, self.settings.fault_kinds)
         except InputError as error:
@@ -58,7 +58,7 @@ class SkillTestModule(pytest.File):
 
 
 class _Item(pytest.Item):
-    """What stands at one line of a file of skill tests."""
+    """A test at one line of a file of skill tests."""
 
     def __init__(self, *, tests: SkillTestFile, index: int, **options: Any) -> None:
         super().__init__(**options)
@@ -80,7 +80,7 @@ class _Item(pytest.Item):
         return self.path, self.tests.line(self.index) - 1, self.name
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """A plain report for a test that went otherwise; a traceback for a defect."""
+        """A plain report for a failed test, and a traceback for a defect."""
         if isinstance(excinfo.value, SkillTestError | InputError):
             return f"{self.path}:{self.tests.line(self.index)}: skill '{self.tests.skill}'\n{excinfo.value}"
         return super().repr_failure(excinfo, style)
@@ -90,7 +90,7 @@ class SkillTestItem(_Item):
     """One test."""
 
     def runtest(self) -> None:
-        """Carry it out. Raises SkillTestError."""
+        """Runs the test. Raises SkillTestError if it fails."""
         settings = self.settings
         trial = carry_out(self.tests, self.index, self.skill, settings.makers, settings.fault_kinds)
         if trial.differences:
@@ -105,7 +105,7 @@ class SuiteItem(_Item):
         self.findings = findings
 
     def runtest(self) -> None:
-        """Run that part. Raises SkillTestError."""
+        """Runs the part. Raises SkillTestError if it fails."""
         found = list(self.findings())
         if found:
             raise SkillTestError("\n".join(found))

@@ -1,4 +1,4 @@
-"""The small room as a world: what is known of it (`small_room.yaml`), and a folder from which a plant builds it."""
+"""The small room as a world: its knowledge (`small_room.yaml`), and the folder from which the plant builds it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _RESOLUTION_M = 0.025
 
 
 def write_small_room(folder: Path, *, can: bool = True) -> Path:
-    """Write the world into `folder`; that folder. Its only object is a can on the table, whose place the seed sets."""
+    """Writes the world into `folder` and returns that. Its only object is a can on the table, placed by the seed."""
     (folder / "map").mkdir(parents=True, exist_ok=True)
     (folder / "room.sdf").write_text(_sdf([_FLOOR, *ROOM]), encoding="utf-8")
     model = {"add_model": {"name": "room", "file": (folder / "room.sdf").resolve().as_uri()}}
@@ -82,6 +82,6 @@ def _shapes(number: int, block: Block) -> str:
     pose = f"<pose>{x:.6g} {y:.6g} {z:.6g} 0 0 0</pose>"
     box = f"<geometry><box><size>{size}</size></box></geometry>"
     colour = " ".join(f"{channel / 255:.3f}" for channel in block.colour)
-    looks = f"<material><diffuse>{colour} 1</diffuse></material>"
+    material = f"<material><diffuse>{colour} 1</diffuse></material>"
     name = quoteattr(f"block_{number}")
-    return f"<visual name={name}>{pose}{box}{looks}</visual><collision name={name}>{pose}{box}</collision>"
+    return f"<visual name={name}>{pose}{box}{material}</visual><collision name={name}>{pose}{box}</collision>"

@@ -1,4 +1,4 @@
-"""The suite that every skill must pass: cancelled at any tick, an exception in any verb, stale sensors.
+"""Test suite that every skill must pass: cancellation at any tick, exceptions in any verb, stale sensors.
 
 Write a class in a test file and pytest runs all of it:
 
@@ -32,7 +32,7 @@ _OWN_VERBS = ("acquire_lease", "take_lease", "return_lease", "lease_holder")
 
 @dataclass(frozen=True)
 class SuiteCase:
-    """A skill with inputs for which it succeeds, and what makes a new bench with its scripted robot."""
+    """A skill, inputs with which it succeeds, and a factory of benches with the scripted robot."""
 
     skill: type[Skill[Any]]
     inputs: Any
@@ -41,12 +41,12 @@ class SuiteCase:
 
     @property
     def limit_s(self) -> float:
-        """How long a run in which something goes wrong is followed: half as long again as one that goes well."""
+        """Time limit of a run with a fault (s): 1.5 times the nominal run, and 5 s."""
         return 1.5 * self.nominal[0].time_s + 5.0
 
     @cached_property
     def nominal(self) -> tuple[SkillRun, Counter[str]]:
-        """The run in which nothing goes wrong, and how often the skill calls each verb in it."""
+        """The run without faults, and how often the skill calls each verb in it."""
         bench, _ = self.bench()
         calls: Counter[str] = Counter()
 
@@ -58,7 +58,7 @@ class SuiteCase:
         return bench.run(self.skill, self.inputs), calls
 
     def sampled(self, ticks: int) -> list[int]:
-        """Tick numbers spread over a run: all of a short one; first and last always."""
+        """Tick numbers spread over a run, with the first and the last; all of a short run."""
         if ticks <= self.samples:
             return list(range(1, ticks))
         step = (ticks - 2) / (self.samples - 1)
@@ -66,10 +66,11 @@ class SuiteCase:
 
 
 def cancelled_at_every_tick(case: SuiteCase) -> Iterator[str]:
-    """Cancel it at sampled ticks: cause CANCELLED, the robot still within 0.2 s, `end` a second time does nothing."""
+    """Cancels the skill at sampled ticks: the cause is CANCELLED, the robot stops within 0.2 s, a second `end` does
+    nothing."""
     run, _ = case.nominal
     if run.outcome != "success":
-        yield f"the case does not succeed when nothing goes wrong: {run.cause} {run.message}"
+        yield f"the skill fails without any fault: {run.cause} {run.message}"
         return
     for tick in case.sampled(run.ticks):
         yield from (f"cancelled at tick {tick}: {what}" for what in _cancelled(case, tick))
@@ -99,7 +100,7 @@ def _cancelled(case: SuiteCase, tick: int) -> Iterator[str]:
 
 
 def exception_in_every_verb(case: SuiteCase) -> Iterator[str]:
-    """Let each verb that it uses raise, at its first call and halfway: FAILURE with cause ERROR, robot still."""
+    """Lets each verb raise at its first call and halfway: the skill fails with cause ERROR, and the robot stops."""
     _, called = case.nominal
     for verb in (verb for verb in VERBS if called[verb] and verb not in _OWN_VERBS):
         for calls in sorted({0, called[verb] // 2}):
@@ -131,7 +132,7 @@ def _raising(case: SuiteCase, verb: str, calls: int) -> Iterator[str]:
 
 
 def stale_sensors(case: SuiteCase) -> Iterator[str]:
-    """Freeze all sensors at sampled ticks: it must not succeed on data that is older than it declares."""
+    """Freezes all sensors at sampled ticks: the skill must not succeed on data older than it declares."""
     run, called = case.nominal
     sensed = [verb for verb in SENSE_VERBS if called[verb]]
     declared = case.skill.max_data_age_s
@@ -149,7 +150,7 @@ def stale_sensors(case: SuiteCase) -> Iterator[str]:
 
 
 def _recorded(skill: type[Skill[Any]], made: list[Skill[Any]]) -> type[Skill[Any]]:
-    """The skill's class, which notes its instances."""
+    """A subclass of the skill that appends its instances to `made`."""
     skill = skill.loaded()
 
     def init(self: Any, *arguments: Any, **options: Any) -> None:
@@ -179,22 +180,22 @@ class SkillSuite:
 
     def test_it_can_be_cancelled_at_every_tick(self, robot_capabilities: Capabilities) -> None:
         """Motion ends within 0.2 s and nothing raises."""
-        _demand(cancelled_at_every_tick(self._case(robot_capabilities)))
+        _raise_findings(cancelled_at_every_tick(self._case(robot_capabilities)))
 
     def test_an_exception_in_any_verb_is_a_failure_with_cause_error(self, robot_capabilities: Capabilities) -> None:
         """And the robot is still afterwards."""
-        _demand(exception_in_every_verb(self._case(robot_capabilities)))
+        _raise_findings(exception_in_every_verb(self._case(robot_capabilities)))
 
     def test_no_success_is_claimed_on_stale_data(self, robot_capabilities: Capabilities) -> None:
         """No success on data older than the skill declares."""
-        _demand(stale_sensors(self._case(robot_capabilities)))
+        _raise_findings(stale_sensors(self._case(robot_capabilities)))
 
     def _case(self, capabilities: Capabilities) -> SuiteCase:
         return SuiteCase(self.skill, self.inputs, lambda: self.bench(capabilities), self.samples)
 
 
-def _demand(found: Iterator[str]) -> None:
-    """Raises AssertionError with all that was found."""
+def _raise_findings(found: Iterator[str]) -> None:
+    """Raises AssertionError with all findings, if there are any."""
     sentences = list(found)
     if sentences:
         raise AssertionError("\n".join(sentences))

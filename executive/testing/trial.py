@@ -1,4 +1,4 @@
-"""One skill test carried out: what happened, and how that differs from what was expected."""
+"""Runs skill tests, and compares their results with what they expect."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ from skills.testing.robot import ScriptedRobot, Start
 
 BenchMaker = Callable[[RobotSetup, WorldSetup], SkillBench]
 BenchMakers = Mapping[str, BenchMaker]
-"""What makes a bench for each kind of robot."""
+"""Factories of benches by kind of robot."""
 
 _LAST_MESSAGES = 12
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A test that was carried out; `differences` is empty when it went as expected."""
+    """Result of one test; `differences` is empty when it met its expectation."""
 
     test: SkillTest
     run: SkillRun
     differences: tuple[str, ...]
 
     def report(self) -> str:
-        """What was expected, what happened, and the messages on the way."""
+        """Differences, end, faults, and the last messages, as text."""
         run = self.run
         lines = [*self.differences, ""]
         lines.append(f"it ended with {_end(run.outcome, run.cause)} after {run.time_s:g} s: {run.message}")
         lines += [f"fault: {words}" for words in self.test.faults]
-        lines += ["what it said on the way:"]
+        lines += ["messages:"]
         lines += [f"  {at_s:7.2f} s  {message}" for at_s, message in run.messages[-_LAST_MESSAGES:]]
         return "\n".join(lines)
 
 
 def scripted_maker(capabilities: Capabilities) -> BenchMaker:
-    """What makes benches with a scripted robot of these capabilities."""
+    """A factory of benches with a scripted robot of these capabilities."""
 
     return lambda setup, world: bench_of_setup(capabilities, setup, world)[0]
 
@@ -74,7 +74,7 @@ def carry_out(
     makers: BenchMakers,
     kinds: Sequence[FaultKind] = STANDARD_FAULTS,
 ) -> Trial:
-    """Run one test of a file. Raises InputError when its ports do not fit."""
+    """Runs one test of a file. Raises InputError if its ports do not fit."""
     test = file.tests[index]
     setup = test.robot or file.robot
     bench = makers[setup.kind](setup, test.world or file.world)
@@ -89,11 +89,11 @@ def _differences(test: SkillTest, run: SkillRun) -> list[str]:
     expect, found = test.expect, []
     if (expect.outcome, expect.cause or run.cause) != (run.outcome, run.cause):
         wanted = _end(expect.outcome, expect.cause)
-        found.append(f"expected {wanted}, and it was {_end(run.outcome, run.cause)}")
+        found.append(f"expected {wanted}, got {_end(run.outcome, run.cause)}")
     if expect.message is not None and re.search(expect.message, run.message) is None:
-        found.append(f"expected a message like /{expect.message}/, and it was: {run.message}")
+        found.append(f"expected a message like /{expect.message}/, got: {run.message}")
     if expect.within_s is not None and run.time_s > expect.within_s:
-        found.append(f"expected an end within {expect.within_s:g} s, and it took {run.time_s:g} s")
+        found.append(f"expected an end within {expect.within_s:g} s, got {run.time_s:g} s")
     return found
 
 

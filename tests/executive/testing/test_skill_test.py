@@ -78,11 +78,11 @@ def test_tests_that_go_as_expected_show_no_difference(written):
 @pytest.mark.parametrize(
     ("old", "new", "index", "difference"),
     [
-        ("outcome: success,", "outcome: failure,", 0, "expected failure, and it was success"),
-        ("within_s: 2", "within_s: 0.5", 0, "expected an end within 0.5 s, and it took 1.05 s"),
-        ("cause: EXECUTION", "cause: TIMEOUT", 1, "expected failure TIMEOUT, and it was failure EXECUTION"),
-        ("message: moved", "message: fell", 1, "expected a message like /fell/, and it was: the body moved"),
-        ("cancel_at_s: 0.5", "cancel_at_s: 5", 2, "expected cancelled CANCELLED, and it was success"),
+        ("outcome: success,", "outcome: failure,", 0, "expected failure, got success"),
+        ("within_s: 2", "within_s: 0.5", 0, "expected an end within 0.5 s, got 1.05 s"),
+        ("cause: EXECUTION", "cause: TIMEOUT", 1, "expected failure TIMEOUT, got failure EXECUTION"),
+        ("message: moved", "message: fell", 1, "expected a message like /fell/, got: the body moved"),
+        ("cancel_at_s: 0.5", "cancel_at_s: 5", 2, "expected cancelled CANCELLED, got success"),
     ],
 )
 def test_a_difference_is_told_in_a_sentence(written, old, new, index, difference):

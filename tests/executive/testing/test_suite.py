@@ -150,7 +150,7 @@ def test_data_as_old_as_declared_is_good_enough():
 
 
 def test_a_case_that_fails_by_itself_is_found():
-    assert "does not succeed when nothing goes wrong" in next(cancelled_at_every_tick(case_of(Lost)))
+    assert "the skill fails without any fault" in next(cancelled_at_every_tick(case_of(Lost)))
 
 
 @pytest.mark.parametrize(("ticks", "expected"), [(5, [1, 2, 3, 4]), (100, [1, 15, 29, 43, 57, 71, 85, 99])])

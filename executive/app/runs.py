@@ -204,16 +204,18 @@ class MissionRuns:
 
     def _run(self, mission: StoredMission, prepared: Prepared | None) -> Ended:
         name, begun = mission.request.name, mission.state is not MissionState.QUEUED
-        past: tuple[str, ...] | None = None
-        if begun and self._missions.has_steps(mission.id):
-            taken = take_up(self._missions, mission, ask=self._ask)
+        taken = (
+            take_up(self._missions, mission, ask=self._ask) if begun and self._missions.has_steps(mission.id) else None
+        )
+        if taken is not None:
             self._screen.tell(f"Mission {mission.id} ({name}) goes on.")
-            prepared, durable, past = _in_its_folder(mission, taken.prepared), taken.durable, taken.told
+            prepared, durable = _in_its_folder(mission, taken.prepared), taken.durable
         else:
             if begun:
                 self._screen.tell(f"Mission {mission.id} ({name}) had not begun; it begins now.")
             prepared, durable = self._begun(mission, prepared)
         report = self._shown(mission, prepared, durable)
+        past = None if taken is None else taken.told
         if past is not None:
             self._screen.tell("\n  ".join(["What became of its past:", *past]))
         self._screen.name_files(prepared.request.out)

@@ -47,7 +47,7 @@ class StoreJournal(RunVisitor):
         self._written: dict[str, Any] = {}
         self._steps: dict[str, StepRecord] = {}
         self._values: dict[str, str] = {}
-        self._checkpoints: dict[str, Mapping[str, Any]] = {}
+        self._checkpoints: dict[str, str] = {}
         self._pose: Pose2D | None = None
         self._charges: tuple[float, float] | None = None  # the lowest so far, and the last
         self._recollection: Recollection | None = None
@@ -114,9 +114,10 @@ class StoreJournal(RunVisitor):
                 self._checkpoints.pop(change.path_id, None)
                 self._steps[change.path_id] = StepRecord(after.status, after.cause, after.message, note.now_s)
         for path_id, checkpoint in note.checkpoints.items():
-            if self._checkpoints.get(path_id) != checkpoint:
-                self._checkpoints[path_id] = dict(checkpoint)
-                self._steps[path_id] = StepRecord(Status.RUNNING, None, "", note.now_s, dict(checkpoint))
+            step = StepRecord(Status.RUNNING, None, "", note.now_s, dict(checkpoint))
+            text = json.dumps(step.checkpoint)
+            if self._checkpoints.get(path_id) != text:
+                self._checkpoints[path_id], self._steps[path_id] = text, step
 
     def _take_values(self, board: Mapping[str, Any]) -> None:
         if board is self._board:

@@ -89,7 +89,7 @@ class Resting:
 
     def rest(self, who: RunRobot) -> None:
         """A robot whose lease nobody holds, since its mission is over or it has none; it is sensed for as well."""
-        self._guarded(who, lambda: self._begin(who, who.rest(), own_lease=True))
+        self._guarded(who, lambda: self._begin(who, who.claim(), own_lease=True))
 
     def leave(self, name: str) -> None:
         """The robot has work again, or the run is over. Idempotent; raises nothing."""

@@ -3,42 +3,100 @@
 from __future__ import annotations
 
 import math
+import time
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from typing import Final
+from dataclasses import dataclass, field, replace
+from typing import Final, cast
 
 import numpy as np
 
 from executive.record.schemas import NAVIGATION, POSE, STATE, stamp
+from executive.record.work import CountedDetector, Work
+from executive.run.control import Control
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.outcome import RobotStatus
 from executive.run.traffic import TrafficTable
-from executive.run.watchdog import VerbHung
+from executive.run.visitor import RunEntry, RunSettings, Visitors
+from executive.run.watchdog import VerbHung, Watchdog
+from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
-from skills.api import LayeredView, LocalisationEstimate, ParticleView, SkillContext
-from skills.robot import Pose2D
+from executive.words.slug import slug
+from skills.api import LayeredView, LocalisationEstimate, ParticleView, Worker
+from skills.navigate.footprint import Footprint
+from skills.robot import Clock, Lease, Pose2D, Robot
 
-__all__ = ["HOLDER", "RunRobot"]
+__all__ = ["RunRobot", "RunShared"]
 
 HOLDER: Final = "errand"
+_NO_LEASE: Final = Lease("", "", 0)
 POSE_PERIOD_S: Final = 0.5
 MOST_PARTICLES: Final = 30
 _EPSILON_S: Final = 1e-9
 _NOTHING: Final = np.empty((0, 2))
 
 
+@dataclass
+class RunShared:
+    """What all robots of a run share. `day_began_s` is the time of day (s after midnight) at the clock's zero."""
+
+    clock: Clock
+    worker: Worker
+    visitors: Visitors
+    settings: RunSettings
+    control: Control
+    work: Work = field(default_factory=Work)
+    traffic: TrafficTable = field(init=False)
+    watchdog: Watchdog = field(init=False)
+    day_began_s: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        limits, told_s = self.settings, self.settings.time_of_day_s
+        self.traffic = TrafficTable({}, self.clock.now)
+        self.watchdog = Watchdog(min(limits.verb_limit_s, limits.image_limit_s, limits.tick_limit_s))
+        self.day_began_s = (_time_of_day_s() if told_s is None else told_s) - self.clock.now()
+
+
 class RunRobot:
     """One robot, with or without a mission. `context` is what may be done with it, under the lease that it has."""
 
-    def __init__(self, context: RunContext, guarded: GuardedRobot, traffic: TrafficTable) -> None:
-        self.name: Final = context.robot.name
-        self.context = context
-        self._guarded, self._traffic = guarded, traffic
-        self._pose_due_s = context.clock.now()
+    def __init__(self, entry: RunEntry, shared: RunShared) -> None:
+        """Raises what the robot's verbs raise."""
+        self.name: Final = entry.robot.name
+        limits, self._traffic = shared.settings, shared.traffic
+        self._guarded = GuardedRobot(
+            entry.robot, shared.watchdog, limit_s=limits.verb_limit_s, image_limit_s=limits.image_limit_s
+        )
+        self._traffic.join(self.name, Footprint.of(self._guarded.capabilities()).discs)
+        self.context = self._context(entry, shared)
+        self._pose_due_s = shared.clock.now()
         self._matched_s = -math.inf
         self._navigation: Mapping[str, object] = {}
+
+    def _context(self, entry: RunEntry, shared: RunShared) -> RunContext:
+        """What the tree of a robot may use, without a lease."""
+        name, control, publish = self.name, shared.control, shared.visitors.publish
+        return RunContext(
+            robot=cast(Robot, self._guarded),
+            lease=_NO_LEASE,
+            clock=shared.clock,
+            worker=shared.worker,
+            localiser=entry.localiser,
+            costmap=entry.costmap,
+            publish=lambda topic, message: publish(topic, {"robot": name, **message}),
+            seed=shared.settings.seed,
+            board=Board(slug(entry.tree.robot_name)),
+            ask=lambda question: control.ask(question, shared.clock, name),
+            stop_pressed=lambda: control.stop_pressed(name),
+            presses=lambda: control.presses,
+            day_began_s=shared.day_began_s,
+            detector=CountedDetector(entry.detector, shared.work),
+            work=shared.work,
+            stack=entry.stack,
+            doors=entry.tree.doors,
+            traffic=shared.traffic.view_of(name),
+        )
 
     def status(self) -> RobotStatus:
         """Where the robot is, whether it holds something, and its battery's charge. Raises what its verbs raise."""
@@ -57,8 +115,8 @@ class RunRobot:
         context.costmap.update(context.robot, estimate)
         self._traffic.heard(self.name, context.known_pose())
 
-    def rest(self) -> SkillContext:
-        """Claim the lease, which nobody holds: what may be used to step aside for others. Raises LeaseError."""
+    def claim(self) -> RunContext:
+        """Claim the lease, which nobody holds; what may be used under it. Raises LeaseError."""
         self.context = replace(self.context, lease=self._guarded.claim(HOLDER))
         return self.context
 
@@ -133,3 +191,9 @@ class RunRobot:
         if new != self._navigation:
             self._navigation = new
             self.context.publish(NAVIGATION, {"robot": self.name, **new})
+
+
+def _time_of_day_s() -> float:
+    """The time of day on this machine (s after midnight)."""
+    now = time.localtime()
+    return 3600.0 * now.tm_hour + 60.0 * now.tm_min + now.tm_sec

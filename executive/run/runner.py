@@ -6,17 +6,14 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Final, TypeVar, cast
+from typing import Final, TypeVar
 
 from executive.record.schemas import CONTROL, OUTCOME, RESERVED_PATH
-from executive.record.work import CountedDetector, Work
 from executive.run.control import Control, ControlRequests, Event
-from executive.run.guarded_robot import GuardedRobot
 from executive.run.outcome import Ending, Outcome, RobotResult, RobotStatus, RunResult, ending_of
 from executive.run.resting import Resting
-from executive.run.robot import HOLDER, RunRobot
+from executive.run.robot import RunRobot, RunShared
 from executive.run.session import Session
-from executive.run.traffic import TrafficTable
 from executive.run.visitor import (
     Assigner,
     MissionEnd,
@@ -27,16 +24,12 @@ from executive.run.visitor import (
     TickNote,
     Visitors,
 )
-from executive.run.watchdog import VerbHung, Watchdog
-from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.context import RunContext
+from executive.run.watchdog import VerbHung
 from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
-from executive.words.slug import slug
 from skills.api import Cause, Worker
 from skills.files.errors import disk_is_full
-from skills.navigate.footprint import Footprint
-from skills.robot import Clock, Lease, Robot
+from skills.robot import Clock, Lease
 
 __all__ = ["run"]
 
@@ -80,8 +73,9 @@ def run(
     settings, control = settings or RunSettings(), control or Control(pace=None)
     control.begin({entry.tree.robot_name: entry.tree for entry in entries})
     all_visitors = Visitors((assigner, *visitors))
-    all_visitors.begin(settings, worker)
-    return _Run(assigner, clock, worker, all_visitors, settings, control).run(spare)
+    for each in all_visitors:
+        each.begin(settings, worker)
+    return _Run(assigner, RunShared(clock, worker, all_visitors, settings, control)).run(spare)
 
 
 class _AllAtOnce(Assigner):
@@ -99,22 +93,12 @@ class _AllAtOnce(Assigner):
 class _Run:
     """The state of one run. `_sessions` has each robot's last mission, `_over` all that have ended."""
 
-    def __init__(
-        self,
-        assigner: Assigner,
-        clock: Clock,
-        worker: Worker,
-        visitors: Visitors,
-        settings: RunSettings,
-        control: Control,
-    ) -> None:
-        self._assigner, self._clock, self._worker, self._visitors = assigner, clock, worker, visitors
-        self._settings, self._control, self._work = settings, control, Work()
-        self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
-        told_s = settings.time_of_day_s
-        self._day_began_s = (_time_of_day_s() if told_s is None else told_s) - clock.now()
-        self._traffic = TrafficTable({}, clock.now)
-        self._resting = Resting(self._traffic, self._watchdog, settings.tick_limit_s)
+    def __init__(self, assigner: Assigner, shared: RunShared) -> None:
+        self._assigner, self._shared = assigner, shared
+        self._clock, self._visitors = shared.clock, shared.visitors
+        self._settings, self._control = shared.settings, shared.control
+        self._traffic, self._watchdog = shared.traffic, shared.watchdog
+        self._resting = Resting(shared.traffic, shared.watchdog, shared.settings.tick_limit_s)
         self._assigned: list[RunEntry] = []
         self._sessions: dict[str, Session] = {}
         self._results: dict[str, RobotResult] = {}
@@ -123,10 +107,10 @@ class _Run:
         self._idle: list[Session] = []  # whose missions ended in the last tick
         self._seen: dict[str, RobotStatus] = {}
         self._stopping = False
-        self._paths_due_s = clock.now()
+        self._paths_due_s = shared.clock.now()
         self._ticks = self._overruns = 0
-        self._begun_s, self._begun_wall_s = clock.now(), time.perf_counter()
-        self._time = StoppableTime(clock)
+        self._begun_s, self._begun_wall_s = shared.clock.now(), time.perf_counter()
+        self._time = StoppableTime(shared.clock)
 
     def run(self, spare: Sequence[RunEntry]) -> RunResult:
         """The whole run."""
@@ -135,7 +119,7 @@ class _Run:
             ending: Ending | None = None
             try:
                 for entry in spare:
-                    self._resting.rest(self._robot(entry))
+                    self._resting.rest(RunRobot(entry, self._shared))
                 while self._has_work():
                     self._cycle()
             except (Exception, VerbHung, KeyboardInterrupt) as stop:
@@ -147,7 +131,8 @@ class _Run:
         if full is not None:
             raise full
         result = self._result()
-        self._visitors.end(result)
+        for each in self._visitors:
+            each.end(result)
         return result
 
     @property
@@ -169,7 +154,7 @@ class _Run:
         name = entry.robot.name
         self._resting.leave(name)
         try:
-            session = self._session(entry)
+            session = Session(entry, self._shared)
         except (Exception, VerbHung) as stop:
             if disk_is_full(stop):
                 raise
@@ -178,53 +163,6 @@ class _Run:
             return
         self._sessions = dict(sorted({**self._sessions, name: session}.items()))
         self._control.mission_begun(name, entry.tree)
-
-    def _robot(self, entry: RunEntry, lease: Lease = _NO_LEASE) -> RunRobot:
-        """A robot without a mission."""
-        guarded = self._guarded(entry)
-        return RunRobot(self._context(entry, guarded, lease), guarded, self._traffic)
-
-    def _session(self, entry: RunEntry) -> Session:
-        """The robot's mission, opened with its lease. Raises LeaseError, and what its verbs raise."""
-        guarded = self._guarded(entry)
-        context = self._context(entry, guarded, guarded.claim(HOLDER))
-        try:
-            return Session(entry, context, guarded, self._traffic, self._control, self._visitors)
-        except BaseException:
-            guarded.give_lease_back()
-            raise
-
-    def _guarded(self, entry: RunEntry) -> GuardedRobot:
-        """The robot under the watchdog, known to the others."""
-        limits = self._settings
-        guarded = GuardedRobot(
-            entry.robot, self._watchdog, limit_s=limits.verb_limit_s, image_limit_s=limits.image_limit_s
-        )
-        self._traffic.join(guarded.name, Footprint.of(guarded.capabilities()).discs)
-        return guarded
-
-    def _context(self, entry: RunEntry, robot: GuardedRobot, lease: Lease) -> RunContext:
-        name, publish = entry.robot.name, self._visitors.publish
-        return RunContext(
-            robot=cast(Robot, robot),
-            lease=lease,
-            clock=self._clock,
-            worker=self._worker,
-            localiser=entry.localiser,
-            costmap=entry.costmap,
-            publish=lambda topic, message: publish(topic, {"robot": name, **message}),
-            seed=self._settings.seed,
-            board=Board(slug(entry.tree.robot_name)),
-            ask=lambda question: self._control.ask(question, self._clock, name),
-            stop_pressed=lambda: self._control.stop_pressed(name),
-            presses=lambda: self._control.presses,
-            day_began_s=self._day_began_s,
-            detector=CountedDetector(entry.detector, self._work),
-            work=self._work,
-            stack=entry.stack,
-            doors=entry.tree.doors,
-            traffic=self._traffic.view_of(name),
-        )
 
     def _cycle(self) -> None:
         """One period: requests are polled, time passes, estimators see, trees tick, visitors are told."""
@@ -251,7 +189,9 @@ class _Run:
         tick_wall_s = time.perf_counter() - began_wall_s
         self._overruns += tick_wall_s > self._settings.tick_period_s
         self._note_ends(live)
-        self._visitors.tick(self._progress(notes, tick_wall_s))
+        progress = self._progress(notes, tick_wall_s)
+        for each in self._visitors:
+            each.tick(progress)
         self._tell_ends()
         self._recall()
         self._keep_pace(begun_wall_s)
@@ -294,9 +234,9 @@ class _Run:
         for request in requests.instead:
             if request.tree.robot_name == session.name:
                 session.replace(request.tree, request.instead_of)
-        for tree in _for_robot(session, requests.preempts):
+        for tree in (each for each in requests.preempts if each.robot_name == session.name):
             session.preempt(tree)
-        for tree in _for_robot(session, requests.later):
+        for tree in (each for each in requests.later if each.robot_name == session.name):
             session.later(tree)
         for _, reason in (each for each in requests.cancels if each[0] == session.name):
             if session.cancelled:
@@ -390,7 +330,8 @@ class _Run:
         for end in ends:
             self._control.mission_ended(end.result.robot_name)
             self._visitors.publish(OUTCOME, {**end.result.message_of_end(), "ticks": self._ticks})
-            self._visitors.mission_ended(end)
+            for each in self._visitors:
+                each.mission_ended(end)
 
     def _recall(self) -> None:
         """End the missions that are recalled now."""
@@ -445,20 +386,10 @@ class _Run:
             sim_time_s=self._clock.now() - self._begun_s,
             wall_time_s=time.perf_counter() - self._begun_wall_s,
             trees={result.robot_name: tree for result, tree in over},
-            work=self._work.totals(),
+            work=self._shared.work.totals(),
         )
-
-
-def _for_robot(session: Session, trees: Sequence[CompiledTree]) -> Sequence[CompiledTree]:
-    return [tree for tree in trees if tree.robot_name == session.name]
 
 
 def _never_began(entry: RunEntry, ending: Ending) -> RobotResult:
     """The result of a robot whose mission did not begin."""
     return RobotResult(entry.robot.name, ending.outcome, ending.cause, ending.message, {}, {})
-
-
-def _time_of_day_s() -> float:
-    """The time of day on this machine (s after midnight)."""
-    now = time.localtime()
-    return 3600.0 * now.tm_hour + 60.0 * now.tm_min + now.tm_sec

@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from executive.record.schemas import OUTCOME
-from executive.run.control import Control
-from executive.run.guarded_robot import GuardedRobot
 from executive.run.outcome import Ending, Outcome, RobotResult
-from executive.run.robot import RunRobot
-from executive.run.traffic import TrafficTable
+from executive.run.robot import RunRobot, RunShared
 from executive.run.tree_run import TreeRun
-from executive.run.visitor import RunEntry, TickNote, Visitors
+from executive.run.visitor import RunEntry, TickNote
 from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.context import RunContext
 from executive.tree.compiler import CompiledTree
 from executive.tree.compiling.builder import start_key
 from executive.tree.snapshot import NodeState, Snapshot
@@ -32,21 +28,19 @@ class Session(RunRobot):
     failed. `note` is what the last tick brought of the mission that the robot began with.
     """
 
-    def __init__(
-        self,
-        entry: RunEntry,
-        context: RunContext,
-        guarded: GuardedRobot,
-        traffic: TrafficTable,
-        control: Control,
-        visitors: Visitors,
-    ) -> None:
-        super().__init__(context, guarded, traffic)
-        if entry.speaker_W is not None:
-            context.board.put(start_key(entry.tree.robot_name, entry.tree.mission_name), entry.speaker_W)
+    def __init__(self, entry: RunEntry, shared: RunShared) -> None:
+        """Open it under the robot's lease. Raises LeaseError, and what the robot's verbs raise."""
+        super().__init__(entry, shared)
+        context = self.claim()
+        try:
+            if entry.speaker_W is not None:
+                context.board.put(start_key(entry.tree.robot_name, entry.tree.mission_name), entry.speaker_W)
+            self._stack: tuple[TreeRun, ...] = (TreeRun(entry.tree, context, shared.visitors),)
+        except BaseException:
+            self._guarded.give_lease_back()
+            raise
         self.after = entry.after
-        self._control, self._visitors = control, visitors
-        self._stack: tuple[TreeRun, ...] = (TreeRun(entry.tree, context, visitors),)
+        self._control, self._visitors = shared.control, shared.visitors
         self._given_up: tuple[TreeRun, ...] = ()
         self._held = False
         self._lost_since_s: float | None = None

@@ -61,7 +61,8 @@ class TreeRun:
         self._pose_due_s = -math.inf
         self._gates: dict[str, Gate] = {}
         self._breakpoints: frozenset[str] = frozenset()
-        visitors.mission_begun(self._observed.nodes, context)
+        for each in visitors:
+            each.mission_begun(self._observed.nodes, context)
         self.show()
 
     @property

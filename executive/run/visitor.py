@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -153,13 +153,16 @@ class Assigner(RunVisitor):
         return {}
 
 
-class Visitors(RunVisitor):
-    """All visitors of a run as one. While the run is `ending`, a broken log keeps no robot from being stopped."""
+class Visitors:
+    """All visitors of a run, in order. While the run is `ending`, a broken log keeps no robot from being stopped."""
 
     def __init__(self, visitors: Sequence[RunVisitor]) -> None:
         self._all = tuple(visitors)
         self._readers = tuple(each.message for each in self._all if type(each).message is not RunVisitor.message)
         self.ending = False
+
+    def __iter__(self) -> Iterator[RunVisitor]:
+        return iter(self._all)
 
     def publish(self, topic: str, message: Mapping[str, Any]) -> None:
         """Tell all of a message. Raises what a visitor raises, but not while the run is ending."""
@@ -169,28 +172,3 @@ class Visitors(RunVisitor):
         except Exception:
             if not self.ending:
                 raise
-
-    def begin(self, settings: RunSettings, worker: Worker) -> None:
-        """Tell all."""
-        for each in self._all:
-            each.begin(settings, worker)
-
-    def mission_begun(self, nodes: Sequence[Behaviour], context: RunContext) -> None:
-        """Tell all."""
-        for each in self._all:
-            each.mission_begun(nodes, context)
-
-    def tick(self, progress: Progress) -> None:
-        """Tell all."""
-        for each in self._all:
-            each.tick(progress)
-
-    def mission_ended(self, end: MissionEnd) -> None:
-        """Tell all."""
-        for each in self._all:
-            each.mission_ended(end)
-
-    def end(self, result: RunResult) -> None:
-        """Tell all."""
-        for each in self._all:
-            each.end(result)

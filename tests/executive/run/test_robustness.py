@@ -261,7 +261,7 @@ def test_garbage_is_named(clock):
 
 
 def test_numpy_truth_and_numbers_are_no_garbage():
-    from executive.run.verb_answers import garbage_check
+    from executive.run.guarded_robot import garbage_check
     from skills.robot import Gripper
 
     assert garbage_check("gripper")(Gripper(1.0, np.float64(0.2), np.float32(3.0), np.bool_(True))) is None

@@ -1,4 +1,4 @@
-"""What remarks about the run do: they act at once, through its control."""
+"""Answers to remarks about a run: they act at once through its control, or say where the robot is and what it does."""
 
 from __future__ import annotations
 
@@ -6,16 +6,26 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
+from py_trees.common import Status
+
 from executive.conversation.parts import OVER, Reply, Speech, answer, done, refused
-from executive.conversation.status_words import doing_in_words, place_in_words
 from executive.language.followups import Remark
 from executive.language.grounding import known_line
-from executive.run.control import Control, Mode, RobotMode
+from executive.run.control import Control, ControlState, Mode, RobotMode
 from executive.run.visitor import Progress
+from executive.tree.snapshot import NodeState, Snapshot
+from executive.words.geometry import distance_m
+from executive.words.knowledge import Knowledge
+from skills.robot import Pose2D
 
-__all__ = ["RemarkAnswers"]
+__all__ = ["RemarkAnswers", "doing_in_words", "place_in_words"]
 
+NEAR_M: Final = 1.3
+"""How near to the edge of a surface the robot stands to be next to it."""
+IN_THE_ROOM_M: Final = 0.3
+"""How far outside a room's outline it still counts as in it: walls have a thickness."""
 _TOLD_TO_STOP: Final = "told to stop"
+_HELD: Final = frozenset({Mode.PAUSED, Mode.STOPPED, Mode.LEASE_LOST})
 
 
 class RemarkAnswers:
@@ -81,3 +91,66 @@ class RemarkAnswers:
         if status is None:
             return answer("I do not know yet; the run has not begun")
         return answer(place_in_words(status.pose, self._speech.knowledge))
+
+
+def place_in_words(pose: Pose2D | None, knowledge: Knowledge) -> str:
+    """Where a pose (world frame) is: the room, and the surface next to it; None is a robot that is lost."""
+    if pose is None:
+        return "I do not know where I am; I am looking for my place"
+    here = (pose.x_m, pose.y_m)
+    distances = {name: distance_m(place.polygon, here) for name, place in knowledge.places.items()}
+    room = min(distances, key=lambda name: distances[name], default=None)
+    if room is None:
+        return f"I am at x {pose.x_m:.1f} m, y {pose.y_m:.1f} m"
+    beside = {name: distance_m(knowledge.surfaces[name].polygon, here) for name in knowledge.surfaces_in(room)}
+    nearest = min(beside, key=lambda name: beside[name], default=None)
+    inside = f"in the {room}" if distances[room] <= IN_THE_ROOM_M else f"{distances[room]:.1f} m from the {room}"
+    at = f", next to the {nearest}" if nearest is not None and beside[nearest] <= NEAR_M else ""
+    return f"I am {inside}{at}"
+
+
+def doing_in_words(progress: Progress | None, state: ControlState, robot_name: str) -> str:
+    """What the robot does just now: the mission, its step, and why it stands still when it does."""
+    if state.mode is Mode.ENDED:
+        return "I have nothing to do; the mission is over"
+    tree = None if progress is None else progress.trees.get(robot_name)
+    if progress is None or tree is None:
+        return "I have not begun yet"
+    states = progress.states[robot_name]
+    own = {path_id: states[path_id] for path_id in tree.path_ids if path_id in states}
+    said = f"I am busy with '{tree.mission_name}'{_step(own)}"
+    own_mode = state.robots.get(robot_name, state)
+    if own_mode.mode in _HELD:
+        said = f"I stand still ({own_mode.reason}); then I go on with '{tree.mission_name}'{_step(own)}"
+    asked = "".join(f"; I have asked: {each.question.text}" for each in state.questions)
+    trouble = _last_failure(own)
+    return f"{said}{f'; before, {trouble}' if trouble else ''}{asked}"
+
+
+def _step(states: Snapshot) -> str:
+    """The deepest node that runs, with its sentence."""
+    running = [(path_id, node) for path_id, node in states.items() if node.status is Status.RUNNING]
+    if not running:
+        return ""
+    path_id, node = running[-1]
+    how_far = f" ({100 * node.progress:.0f} %)" if node.progress else ""
+    return f": {_name(path_id)}{f', {node.message}' if node.message else ''}{how_far}"
+
+
+def _last_failure(states: Snapshot) -> str:
+    """The last skill that failed, and why."""
+    failed = [(path_id, node) for path_id, node in states.items() if _has_failed(node)]
+    if not failed:
+        return ""
+    path_id, node = failed[-1]
+    assert node.cause is not None
+    return f"{_name(path_id)} failed ({node.cause.value}: {node.message})"
+
+
+def _has_failed(node: NodeState) -> bool:
+    return node.status is Status.FAILURE and node.cause is not None and bool(node.message)
+
+
+def _name(path_id: str) -> str:
+    """The last part of a path id, as words."""
+    return path_id.rpartition("/")[2].replace("-", " ").replace("_", " ")

@@ -9,8 +9,7 @@ import pytest
 from mcap.reader import make_reader
 
 from executive.record.announce import map_message
-from executive.record.drawable import boxes, drawable, with_picture
-from executive.record.event_log import EventLog
+from executive.record.event_log import EventLog, boxes, drawable, with_picture
 from executive.record.reader import read_events
 from skills.estimate.grid_map import GridMap
 

@@ -14,7 +14,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
     from executive.app.checker import Checked
+    from executive.app.evaluate.summary import Case
     from executive.app.report import RunReport
     from executive.language.understand import Understanding
     from executive.mission.request import Request
@@ -22,7 +26,7 @@ if TYPE_CHECKING:
     from executive.words.knowledge import Knowledge
     from plant.worlds.world import World
 
-__all__ = ["Request", "check", "load_world", "parse", "run_mission"]
+__all__ = ["Request", "check", "evaluate", "load_world", "parse", "run_mission"]
 
 
 def __getattr__(name: str) -> Any:
@@ -76,3 +80,19 @@ def run_mission(request: Request, *, control: Control | None = None) -> RunRepor
     prepared = prepare(request)
     refuse_impossible(prepared)
     return run_simulated(prepared, control=control).report
+
+
+def evaluate(scenario: Path, *, out: Path, jobs: int = 2) -> Sequence[Case]:
+    """The runs of a scenario file with what came of each, done by `jobs` processes.
+
+    Results land in `results.sqlite` of the folder `out`; the same call goes on where it stopped.
+
+    Raises:
+        InputError: the file, or a mission in it, cannot be used, or the folder holds other results.
+    """
+    from executive.app.evaluate.cluster import Pool
+    from executive.app.evaluate.evaluation import evaluate_runs, refuse_impossible_runs
+    from executive.app.evaluate.scenario import load_evaluation
+
+    results, before = out / "results.sqlite", refuse_impossible_runs
+    return evaluate_runs(load_evaluation(scenario), Pool(jobs), results, out=out, before=before).cases

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -13,7 +14,7 @@ import typer
 
 from executive.cli.number_options import quantity_option
 from executive.cli.options import ANYWAY, AS_JSON, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
+from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, refusals, show_table
 from executive.cli.terminal import terminal_answerer
 from executive.mission.request import Request
 from skills.files.errors import InputError
@@ -78,30 +79,50 @@ def evaluate(
     has_own = each_fault or request != Request()
     with refusals():
         pool, kept_in = Pool(jobs, workers, scheduler), results or out / RESULTS
+        run = partial(evaluate_runs, pool=pool, out=out, tell=plain_lines(console), progress=partial(_bar, console))
         if random_missions is not None:
             if has_own or file is not None:
                 what = "--random-missions draws itself what is run"
                 raise InputError(what, hint="give only --worlds, --seeds, who works, and where results land")
             evaluation = drawn_missions(random_missions, worlds or DEFAULT_WORLD, seeds or "1-")
             console.print(f"errand evaluate {evaluation.name}", markup=False)
-            found = evaluate_runs(evaluation, pool, kept_in, out=out, console=console, checked=not anyway)
+            found = run(evaluation, results=kept_in, checked=not anyway)
         elif file is not None and is_evaluation(file):
             if has_own or seeds is not None or worlds is not None:
                 what = "a scenario file says itself what is run"
                 raise InputError(what, hint="write missions, worlds, seeds, faults and stacks into it", file=file)
             evaluation, before = load_evaluation(file), None if anyway else refuse_impossible_runs
-            found = evaluate_runs(evaluation, pool, kept_in, out=out, console=console, before=before)
+            found = run(evaluation, results=kept_in, before=before)
         else:
             if worlds is not None:
                 raise InputError("--worlds is for --random-missions", hint="name one world by --world")
             asked = replace(request, file=file)
             evaluation = _at_seeds(asked, seeds or "1-20", each_fault=each_fault, anyway=anyway)
             with _file_of(results) as kept_in:
-                found = evaluate_runs(evaluation, pool, kept_in, out=out, console=console)
+                found = run(evaluation, results=kept_in)
             _show_seeds(found.cases, console, as_json=as_json)
             _end(found.cases)
         _show(evaluation, found, kept_in, console, as_json=as_json)
         _end(found.cases)
+
+
+@contextmanager
+def _bar(console: Console, total: int) -> Iterator[Callable[[], None]]:
+    """A bar of progress over so many runs."""
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    text = TextColumn("{task.description}")
+    columns = (text, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("runs", total=total)
+        yield lambda: bar.advance(task)
 
 
 def _end(cases: Sequence[Case]) -> None:

@@ -67,6 +67,22 @@ def test_a_sentence_is_run_and_judged(tmp_path):
     assert (tmp_path / "out" / "log.mcap").is_file()
 
 
+def test_a_scenario_that_names_an_unknown_world_is_refused_before_any_run(tmp_path):
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text("missions: [go to the kitchen]\nworlds: [nowhere]\nseeds: '1'\n", encoding="utf-8")
+    with pytest.raises(InputError, match="unknown world 'nowhere'"):
+        executive.evaluate(scenario, out=tmp_path / "out")
+
+
+@pytest.mark.mission
+def test_the_runs_of_a_scenario_are_judged_and_kept(tmp_path):
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text("missions: [go to the kitchen]\nseeds: '1'\n", encoding="utf-8")
+    (case,) = executive.evaluate(scenario, out=tmp_path / "out", jobs=1)
+    assert (case.report.achieved, case.run.request.seed) == (True, 1)
+    assert executive.evaluate(scenario, out=tmp_path / "out", jobs=1)[0].outcome == case.outcome
+
+
 def test_there_is_nothing_else():
     with pytest.raises(AttributeError, match="has no attribute 'fly'"):
         executive.fly  # noqa: B018

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
-
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from executive.app.evaluate.cluster import Pool
 from executive.app.evaluate.evaluation_run import lost_outcome, run_one
@@ -24,8 +22,10 @@ from executive.app.prepare import prepare
 from executive.words.variation import NO_VARIATION
 from skills.files.errors import Problems
 
-__all__ = ["Evaluated", "evaluate_runs", "give_out_runs", "refuse_impossible_runs"]
+__all__ = ["Evaluated", "Progress", "evaluate_runs", "give_out_runs", "refuse_impossible_runs"]
 
+Progress = Callable[[int], AbstractContextManager[Callable[[], None]]]
+"""Shows how many of so many runs are done; what it gives is called after each."""
 LOGS: Final = "logs"
 _CANCELLED: Final = "cancelled"
 
@@ -45,7 +45,8 @@ def evaluate_runs(
     results: Path,
     *,
     out: Path,
-    console: Console,
+    tell: Callable[[str], None] = lambda line: None,
+    progress: Progress = lambda total: nullcontext(lambda: None),
     before: Callable[[Sequence[RunSpec]], None] | None = None,
     checked: bool = False,
 ) -> Evaluated:
@@ -56,7 +57,8 @@ def evaluate_runs(
         pool: who works on them.
         results: the results file, made where there is none.
         out: the folder for the files of runs.
-        console: shows the progress.
+        tell: shows a line.
+        progress: shows how far it is.
         before: is called with the missing runs before the first begins, to refuse them all by InputError.
         checked: whether a run that `errand check` would refuse counts as refused.
 
@@ -70,32 +72,24 @@ def evaluate_runs(
         if missing and before is not None:
             before(missing)
         if done:
-            console.print(f"{len(done)} of {len(evaluation.runs)} runs have a result in {kept.path}.", markup=False)
+            tell(f"{len(done)} of {len(evaluation.runs)} runs have a result in {kept.path}.")
         kept.note(logs=str((out / LOGS).resolve()))
         if missing:
-            _work_through(missing, kept, pool, out, console, checked=checked)
+            _work_through(missing, kept, pool, out, progress, checked=checked)
         cases = [Case(evaluation.runs[number], outcome) for number, outcome in kept.outcomes()]
         about = kept.about()
     return Evaluated(cases, about, int(about.get("workers", 0)))
 
 
 def _work_through(
-    missing: Sequence[RunSpec], kept: ResultsFile, pool: Pool, out: Path, console: Console, *, checked: bool
+    missing: Sequence[RunSpec], kept: ResultsFile, pool: Pool, out: Path, progress: Progress, *, checked: bool
 ) -> None:
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with pool.opened() as workers, Progress(*columns, console=console) as bar:
+    with pool.opened() as workers, progress(len(missing)) as advance:
         count, began = workers.count, time.monotonic()
-        task = bar.add_task("runs", total=len(missing))
         folders = {run.id: out / (run.folder or f"{LOGS}/{run.id}") for run in missing}
         for outcome in give_out_runs(missing, workers, checked=checked):
             kept.add(_with_files(outcome, folders[outcome.run_id]))
-            bar.advance(task)
+            advance()
         hours = (time.monotonic() - began) / 3600.0
     kept.note(workers=str(count), missions_per_hour=f"{len(missing) / hours:.1f}")
 

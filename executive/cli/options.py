@@ -97,7 +97,7 @@ class _Typed:
         return (self.option.name or f"--{self.name.replace('_', '-')}",)
 
     def parameter(self, default: Any) -> inspect.Parameter:
-        """What Typer makes the option of."""
+        """The parameter from which Typer makes the option."""
         option, kind = self.option, self.kind
         plain = next(each for each in get_args(kind) if each is not NoneType) if NoneType in get_args(kind) else kind
         if quantity_of(plain) is not None:

@@ -54,7 +54,9 @@ On = Annotated[
 ]
 WhenMissed = Annotated[
     Missed | None,
-    typer.Option(help="What passes while nothing serves, or a mission runs: skip it (default), or queue once for all."),
+    typer.Option(
+        help="How to treat times that pass while nothing serves, or a mission runs: skip them (default), or queue once."
+    ),
 ]
 
 _LONGEST_S: Final = 3.2e9  # a hundred years

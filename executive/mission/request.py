@@ -1,4 +1,4 @@
-"""What a user asks for, and how it is run: the one form of it, from the command line to the store and back."""
+"""A user's request and how it is run: one form, from the command line to the store and back."""
 
 from __future__ import annotations
 

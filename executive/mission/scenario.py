@@ -1,4 +1,4 @@
-"""Scenarios: what goes wrong with the robot, and what happens in its world, while a mission runs."""
+"""Scenarios: faults of the robot, and events in its world, while a mission runs."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def _alias(name: str) -> str:
 
 
 class ScenarioFile(_Strict):
-    """What goes wrong and happens while a mission runs."""
+    """Faults and events while a mission runs."""
 
     faults: tuple[Text, ...] = Field(default=(), description="Faults by their words.")
     random: RandomFaults = Field(0, description="How many more faults the run's seed draws.")

@@ -1,4 +1,4 @@
-"""Which robot of a fleet has which mission of a store, how often one was given to another, and what a referee saw."""
+"""Assignments of a store's missions to the robots of a fleet: who has each, how far it is, what a referee saw."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _FAILED: Final = (MissionState.FAILURE, MissionState.ERROR, MissionState.CANCELL
 
 @dataclass(frozen=True)
 class GivenMission:
-    """What is known of a mission that was given out.
+    """The assignment of a mission to a robot of a fleet.
 
-    `robot` has it, or had it last; it was given to another `reassigned` times. The first `done` of its commands are
-    done and not done again; `blocked` is why it cannot begin again where it is interrupted now. `referee` is what a
-    referee said in the end, as JSON values.
+    `robot` has it, or had it last; it went to another one `reassigned` times. The first `done` of its commands are done
+    and not done again; `blocked` is why it cannot begin again where it is interrupted now. `referee` is the verdict at
+    the end, as JSON values.
 
     A mission that no robot could do alone is done in parts, which are missions `part_of` it; a part that `follows`
     another begins when that is done.
@@ -36,38 +36,40 @@ class GivenMission:
 
 
 class GivenMissions:
-    """What a store knows of the missions that were given out."""
+    """The assignments in a store."""
 
     def __init__(self, store: MissionStore) -> None:
         self._store = store
 
     def all(self) -> Mapping[int, GivenMission]:
-        """All of them, by their numbers."""
+        """All assignments, by the numbers of their missions."""
         rows = self._store.rows("SELECT id, given FROM mission WHERE given IS NOT NULL ORDER BY id")
         return {row["id"]: form(GivenMission).validate_json(row["given"]) for row in rows}
 
     def give(self, mission: int, robot: str) -> None:
-        """A robot has the mission from now on."""
+        """Assigns the mission to a robot."""
         known = self._of(mission)
         again = known.robot is not None and known.robot != robot
         self._put(mission, replace(known, robot=robot, reassigned=known.reassigned + again, blocked=None))
 
     def progress(self, mission: int, done: int, blocked: str | None) -> None:
-        """How many commands are done, and why what is under way cannot begin again (None: it can)."""
+        """Notes how many commands are done, and why the one under way cannot begin again (None: it can)."""
         self._put(mission, replace(self._of(mission), done=done, blocked=blocked))
 
     def hand_back(self, mission: int) -> None:
-        """The mission waits for another robot."""
+        """Lets the mission wait for another robot."""
         self._put(mission, replace(self._of(mission), blocked=None))
 
     def split(self, mission: int, parts: Sequence[int]) -> None:
-        """The mission is done in parts, one after the other."""
+        """Notes that the mission is done in parts, one after the other."""
         for part, before in zip(parts, (None, *parts), strict=False):
             self._put(part, replace(self._of(part), part_of=mission, follows=before))
 
     def settle(self) -> None:
-        """What does not go on, since a part before it was not done, ends as a failure; what has no part left to do ends
-        as the last one did."""
+        """Ends missions that wait for nothing any more.
+
+        A part ends as a failure where the part before it was not done; a mission in parts ends as its last part did.
+        """
         given, states = self.all(), {mission.id: mission for mission in self._store.missions()}
         for number, one in given.items():
             if one.part_of is None or states[one.part_of].state is not MissionState.RUNNING:
@@ -82,7 +84,7 @@ class GivenMissions:
                 self._store.finish(one.part_of, before.state, f"mission {before.id}: {before.message}")
 
     def judge(self, mission: int, referee: Mapping[str, Any] | None) -> None:
-        """What a referee saw."""
+        """Notes the referee's verdict."""
         self._put(mission, replace(self._of(mission), referee=referee))
 
     def _of(self, mission: int) -> GivenMission:

@@ -57,7 +57,7 @@ class StoreJournal(RunVisitor):
         self.troubles: list[str] = []
 
     def replaceable(self, tree: CompiledTree, request_of: Callable[[CompiledTree], Request]) -> StoreJournal:
-        """The journal of a mission whose place another may take; `request_of` gives that one's request."""
+        """Allows a correction to replace the mission; `request_of` gives the new mission's request."""
         self._tree, self._request_of = tree, request_of
         return self
 
@@ -88,7 +88,7 @@ class StoreJournal(RunVisitor):
         return self
 
     def tick(self, progress: Progress) -> None:
-        """Keep what a tick brought."""
+        """Keeps the news of a tick."""
         for name, note in progress.notes.items():
             if self._robot in (None, name):
                 self.note(note)
@@ -163,12 +163,12 @@ class StoreJournal(RunVisitor):
 
 
 def of_robot(column: str) -> str:
-    """The SQL condition that a path id or a blackboard key is that of a robot; its values are `prefix_of` the robot."""
+    """The SQL condition that a column belongs to a robot; its values are `prefix_of` the robot."""
     return f"substr({column}, 1, length(?)) = ?"
 
 
 def prefix_of(robot: str | None) -> tuple[str, str]:
-    """How a robot's path ids and blackboard keys begin, twice; those of any robot for None."""
+    """The beginning of a robot's path ids and blackboard keys, twice; an empty one for the only robot (None)."""
     prefix = "" if robot is None else f"{slug(robot)}/"
     return prefix, prefix
 

@@ -1,4 +1,4 @@
-"""What a resumed run remembers of the run before it, and for how long that counts."""
+"""The memory of an interrupted run, and how a resumed run uses it up."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PATIENCE_S = 10.0
 
 @dataclass(frozen=True)
 class StepRecord:
-    """What a node last said: its status, when that began, and for a skill under way its checkpoint."""
+    """The last state of a node: its status, when that began (s), and the checkpoint of a skill under way."""
 
     status: Status
     cause: Cause | None
@@ -35,7 +35,7 @@ class StepRecord:
 
 @dataclass(frozen=True)
 class Memory:
-    """All that is known of a robot's interrupted mission: its nodes by path id, its blackboard, the last pose."""
+    """The state of a robot's interrupted mission: its nodes by path id, its blackboard, its last pose."""
 
     steps: Mapping[str, StepRecord]
     board: Mapping[str, Any]

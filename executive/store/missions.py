@@ -26,7 +26,7 @@ def utc_now() -> datetime:
 
 
 class MissionState(enum.Enum):
-    """How far a mission is. RUNNING while no process works on it means: interrupted, `errand resume` goes on.
+    """The state of a mission. RUNNING while no process works on it means that it was interrupted.
 
     A STANDING one is never run itself: each time its trigger fires, a queued copy of it is added.
     """
@@ -73,7 +73,7 @@ class MissionStore(Database):
         self.now = now
 
     def add(self, request: Request, *, queued: bool) -> StoredMission:
-        """Keep a mission that is still to be run, its request understood."""
+        """Adds a mission that is still to be run, its request understood."""
         with self.writing() as connection:
             number = insert(connection, request, state=MissionState.QUEUED, queued=queued)
         return self.mission(number)
@@ -93,24 +93,24 @@ class MissionStore(Database):
         return tuple(mission for mission in found if not states or mission.state in states)
 
     def remove(self, number: int) -> None:
-        """Forget a mission. Raises InputError when there is none."""
+        """Removes a mission. Raises InputError when there is none."""
         self.mission(number)
         with self.writing() as connection:
             connection.execute("DELETE FROM mission WHERE id = ?", (number,))
 
     def begin(self, number: int) -> None:
-        """The mission is started, or started again."""
+        """Notes that the mission is started, or started again."""
         with self.writing() as connection:
             connection.execute("UPDATE mission SET state = 'running', starts = starts + 1 WHERE id = ?", (number,))
 
     def never_began(self, before: StoredMission) -> None:
-        """A mission that was started is as it was `before`: it could not begin."""
+        """Puts a mission that could not begin back into the state that it had `before`."""
         with self.writing() as connection:
             values = (before.state.value, before.message, before.starts, before.id)
             connection.execute("UPDATE mission SET state = ?, message = ?, starts = ? WHERE id = ?", values)
 
     def finish(self, number: int, state: MissionState, message: str) -> None:
-        """The mission has come to an end."""
+        """Notes how the mission ended."""
         with self.writing() as connection:
             values = (state.value, message, self.now().isoformat(), number)
             connection.execute("UPDATE mission SET state = ?, message = ?, ended = ? WHERE id = ?", values)
@@ -120,7 +120,7 @@ class MissionStore(Database):
         return bool(self.rows("SELECT 1 FROM step WHERE mission = ? LIMIT 1", number))
 
     def memory(self, number: int, robot: str | None = None) -> Memory:
-        """All that is known of how far a mission has come, once the skills are loaded that it was done with.
+        """The state in which a mission was interrupted; the skills that it was done with must be loaded.
 
         `robot` is the one of several whose part is meant. Raises InputError: it cannot be read.
         """
@@ -136,14 +136,14 @@ class MissionStore(Database):
             raise InputError(f"mission {number} cannot be taken up: {error}", hint=hint, file=self.path) from error
 
     def journal(self, number: int, robot: str | None = None) -> StoreJournal:
-        """Keeps notes of a mission's run; `robot` is the one of several whose part it keeps.
+        """The journal of a mission's run; `robot` is the one of several whose part it keeps.
 
         Of several batteries, that of the robot that stands for all is noted.
         """
         return StoreJournal(self._connection, number, robot, main=self.mission(number).request.robot)
 
     def place(self, number: int, poses: Mapping[str, Pose2D]) -> None:
-        """Note where robots are when a mission begins; of a robot that was noted already, that stays."""
+        """Notes where robots are when a mission begins (world frame); an earlier note of a robot stays."""
         known = {**poses, **self.mission(number).poses}
         with self.writing() as connection:
             text = form(dict[str, Pose2D]).dump_json(known).decode()

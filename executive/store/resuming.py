@@ -3,7 +3,7 @@
 The tree finds its way by itself: its composites see the same results as before and come to the same node. Nothing is
 done to reach that but ticking; a skill that had finished gives its result in its first tick. Guards look at the robot
 as it is now. The skill that was under way is told to `resume`, not to `begin`, so that it looks before it repeats
-what changed the world. Counts of attempts begin anew.
+what changed the world. Counts of attempts begin again.
 """
 
 from __future__ import annotations

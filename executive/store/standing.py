@@ -16,7 +16,7 @@ from skills.files.errors import InputError
 __all__ = ["LATE", "MOST_WAITING", "StandingMission", "StandingMissions", "TooManyError"]
 
 LATE: Final = timedelta(seconds=90)
-"""What is noticed later than this after its time is missed: the clock was set, or the machine slept."""
+"""An occurrence that is noticed later than this is missed: the clock was set, or the machine slept."""
 SET_BACK: Final = timedelta(hours=1)
 """A clock that is set back by less has no occurrence come twice; by more, occurrences come as it shows their times."""
 MOST_WAITING: Final = 100
@@ -136,7 +136,7 @@ class StandingMissions:
 
 
 class TooManyError(InputError):
-    """So many copies of a standing mission wait that no more are added."""
+    """Too many copies of a standing mission wait already."""
 
 
 def _queue(connection: sqlite3.Connection, standing: int, request: Request, why: str) -> int:

@@ -1,4 +1,4 @@
-"""Triggers: when a standing mission is queued anew. Data with a text form that parses back to itself.
+"""Triggers: when a standing mission is queued again. Data with a text form that parses back to itself.
 
     every weekday 09:00                    every monday and friday 08:15 and 17:00
     2026-12-01 09:00                       every 30m
@@ -48,7 +48,7 @@ _EVENTS: Final = "'battery full', 'battery 80%', 'call NAME' or 'topic KIND:TOPI
 
 
 class Missed(enum.Enum):
-    """What becomes of occurrences that pass while nothing serves, or while a mission runs."""
+    """How to treat occurrences that pass while nothing serves, or while a mission runs."""
 
     SKIP = "skip"
     ONCE = "once"
@@ -221,7 +221,7 @@ def schedule_of(text: str) -> Schedule | Once:
 
 
 def event_of(text: str) -> OnBatteryFull | OnCall | OnTopic:
-    """What `--on` says: a battery's charge, a call or a topic. Raises InputError, with a hint."""
+    """The trigger that `--on` names: a battery's charge, a call or a topic. Raises InputError, with a hint."""
     words = text.strip()
     first = words.split(" ", 1)[0]
     if (topic := _TOPIC.fullmatch(words)) is not None and topic["topic"].isprintable():

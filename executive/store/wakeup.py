@@ -1,4 +1,4 @@
-"""How a process that waits for work hears of it at once: a named pipe beside the store, to which anybody may write.
+"""Wakes a process that waits for work: through a named pipe beside the store, to which any process may write.
 
 It says only that the store, or something in the waiting process, has changed. Threads, signal handlers and other
 processes write to it in the same way; what is written while nobody waits ends the next wait, and many count as one.

@@ -1,4 +1,4 @@
-"""Who works on an evaluation: processes of this machine, or a Dask cluster, which needs the extra `cluster`."""
+"""Workers of an evaluation: processes of this machine, or a Dask cluster, which needs the extra `cluster`."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from skills.files.errors import InputError
 __all__ = ["ClusterWorkers", "Pool", "local_cluster", "scheduler_at"]
 
 ANSWER_S: Final = 10.0
-"""How long a scheduler, and the first worker of it, is waited for."""
+"""Longest wait for a scheduler, and for its first worker."""
 GONE_S: Final = 120.0
-"""How long work that is given out waits while no worker is connected: a nanny, or a person, may start another."""
+"""Longest wait for a result while no worker is connected: a nanny, or a person, may start another."""
 _LOOK_S: Final = 5.0
 _GO_ON: Final = "what was done is kept; the same command goes on where it stopped"
 _START_ONE: Final = f"start workers again; {_GO_ON}"
@@ -39,7 +39,7 @@ class ClusterWorkers:
 
     @property
     def count(self) -> int:
-        """How many are connected now."""
+        """The number of workers that are connected now."""
         return len(self._client.scheduler_info(n_workers=-1)["workers"])
 
     def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:
@@ -151,7 +151,7 @@ def _distributed() -> Any:
 
 @contextmanager
 def local_cluster(count: int) -> Iterator[ClusterWorkers]:
-    """So many worker processes on this machine, each with a nanny that replaces it when it dies.
+    """Starts `count` worker processes on this machine, each with a nanny that replaces it when it dies.
 
     Raises InputError: the extra is not installed.
     """
@@ -188,7 +188,7 @@ def scheduler_at(address: str) -> Iterator[ClusterWorkers]:
 
 @dataclass(frozen=True)
 class Pool:
-    """Who does the work: so many local processes (`jobs`), a local cluster of `workers`, or those of a `scheduler`.
+    """The workers to use: `jobs` local processes, a local cluster of `workers`, or the workers of a `scheduler`.
 
     Raises:
         InputError: both of a cluster and a scheduler are given.

@@ -133,7 +133,7 @@ def _report(spec: RunSpec, outcome: str, cause: str, message: str) -> RunReport:
 
 
 def steps_of(events: Sequence[Event]) -> dict[str, float]:
-    """How long each skill ran, by its name (s, on the robot's clock); what runs at once counts for each."""
+    """Run time of each skill by its name (s, on the robot's clock); skills that run at once count each."""
     skills, since, spent = dict[str, str](), dict[str, float](), defaultdict[str, float](float)
     for event in events:
         if event.topic == TREE:

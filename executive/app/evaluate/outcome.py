@@ -1,4 +1,4 @@
-"""What came of one run of an evaluation."""
+"""The outcome of one run of an evaluation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _COUNTERS_OF_THE_MACHINE: Final = ("bytes_logged",)
 
 
 class Standing(enum.Enum):
-    """What a run claims against what the referee saw, in words."""
+    """The claim of a run against the referee's verdict, in words."""
 
     FULFILLED = "claimed and fulfilled"
     FALSE_CLAIM = "claimed, not fulfilled: FALSE CLAIM"
@@ -35,7 +35,7 @@ _NO_CLAIM: Final = {"refused": Standing.REFUSED, "error": Standing.BROKEN}
 
 @dataclass(frozen=True)
 class Evidence:
-    """What shows why a run failed: its timeline as (s, about, text), pictures as caption and JPEG file, other files."""
+    """Evidence of a failure: the timeline as (s, about, text), pictures as caption and JPEG file, other files."""
 
     timeline: tuple[tuple[float, str, str], ...] = ()
     pictures: tuple[tuple[str, bytes], ...] = ()

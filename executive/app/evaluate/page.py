@@ -28,7 +28,7 @@ MOST_PICTURE_BYTES: Final = 40_000_000
 
 @dataclass(frozen=True)
 class EvaluationPage:
-    """What the page is of: all cases, how the evidence of a run and the commands that repeat and show it are found.
+    """The content of the page: all cases, and functions that find the evidence and the commands of a run.
 
     `facts` are pairs of a name and a value; `against` are the cases of another results file, `other` its name.
     """

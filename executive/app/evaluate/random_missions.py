@@ -65,7 +65,7 @@ def random_missions(count: int, worlds: str, seeds: str) -> Evaluation:
 
 
 def _known_world(name: str) -> KnownWorld:
-    """What is known of a world, and what the robot of most missions can carry there. Raises InputError."""
+    """The knowledge of a world, and the classes that the usual robot can carry there. Raises InputError."""
     world = open_world(name)
     knowledge, abilities = knowledge_of(world), abilities_in(world)
     carried = frozenset(

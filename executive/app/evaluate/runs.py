@@ -49,7 +49,7 @@ class RunSpec:
 
     @property
     def variation_words(self) -> str:
-        """What is varied, on one line."""
+        """The variation on one line."""
         return ", ".join(f"{name} {value}" for name, value in self.varied.items())
 
 

@@ -46,7 +46,7 @@ __all__ = [
 
 MOST_RUNS: Final = 200_000
 CONDITION: Final = "condition"
-"""What runs with one fault or scenario alone vary by."""
+"""The dimension by which runs with one fault or scenario alone vary."""
 _NOTHING: Final = ("none", "default")
 FileFinder = Callable[[Path], Path]
 """The file that a path means: itself, or one of that name that comes with Errand. Raises InputError."""
@@ -146,7 +146,7 @@ class _Reader:
             raise self.source.error(("seeds",), error.message, error.hint) from error
 
     def _mission(self, entry: str | MissionEntry, path: KeyPath) -> tuple[str, Request]:
-        """What people call an entry, and its request; a text with spaces that names no file is a sentence."""
+        """The name of an entry and its request; a text with spaces that names no file is a sentence."""
         if isinstance(entry, str):
             is_file = entry.endswith((".yaml", ".yml")) or " " not in entry.strip()
             entry = MissionEntry.model_validate({"file" if is_file else "say": entry})

@@ -1,4 +1,4 @@
-"""What results say: success by mission, world, robot and variation, causes, where time goes; two results compared."""
+"""Summarises results: success by mission, world, robot and variation, causes, times; compares two results."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Case:
 
     @property
     def report(self) -> RunReport:
-        """How the run ended."""
+        """The report of the run."""
         return self.outcome.report
 
     @property
@@ -88,7 +88,7 @@ class Case:
 
     @property
     def asked(self) -> str:
-        """What was asked for: the sentence, else what people call the mission."""
+        """The sentence, else the name of the mission."""
         return self.run.request.sentence or self.run.mission
 
 
@@ -106,7 +106,7 @@ class Group:
 
     @property
     def rate(self) -> Rate:
-        """How many succeeded."""
+        """The rate of success."""
         return Rate(self.achieved, self.runs)
 
     @property
@@ -326,7 +326,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Rate:
-    """So many successes of so many."""
+    """A number of successes out of a total."""
 
     successes: int
     total: int

@@ -1,4 +1,4 @@
-"""Who does the work of an evaluation: one function for many items, given out to processes that may die."""
+"""Gives out the work of an evaluation: one function for many items, to processes that may die."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ class Finished(Generic[Item, Result]):
 
 
 class Workers(Protocol):
-    """Those who do the work."""
+    """Workers that apply a function to items."""
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """The number of workers."""
 
     def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:
         """Have each item worked on once, and give each as it ends. What the function raises is raised here."""
@@ -60,7 +60,7 @@ class LocalWorkers:
 
     @property
     def count(self) -> int:
-        """How many processes."""
+        """The number of processes."""
         return self._count
 
     def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:

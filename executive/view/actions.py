@@ -1,4 +1,4 @@
-"""What the page's buttons do: each action by its name, on the control of the run."""
+"""Actions of the page's buttons, by name, on the control of the run."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Action = Callable[[Mapping[str, Any]], str]
 
 
 class RefusedError(Exception):
-    """An action that cannot be done; the text says why and what to do."""
+    """An action cannot be done; the text says why and what to do."""
 
 
 def control_actions(control: Control) -> Mapping[str, Action]:
-    """The actions of a run by name; each takes the page's values and gives one sentence, or raises RefusedError."""
+    """The actions of a run by name. Each takes the page's values and returns a sentence, or raises RefusedError."""
 
     def bound(call: Callable[[Control, Mapping[str, Any]], None], said: str) -> Action:
-        """An action that makes a call on the control and says what was done."""
+        """An action that calls the control and returns the sentence `said`."""
 
         def action(values: Mapping[str, Any]) -> str:
             try:
@@ -38,7 +38,7 @@ def control_actions(control: Control) -> Mapping[str, Action]:
 
 
 def text_of(values: Mapping[str, Any], key: str) -> str:
-    """A text among an action's values. Raises RefusedError when it is missing, empty, too long or no plain text."""
+    """A text among an action's values. Raises RefusedError if it is missing, empty, too long or no plain text."""
     text = values.get(key)
     if not isinstance(text, str) or not text.strip():
         raise RefusedError(f"the action needs a text under '{key}'")
@@ -49,13 +49,13 @@ def text_of(values: Mapping[str, Any], key: str) -> str:
 
 
 def robot_of(values: Mapping[str, Any]) -> str | None:
-    """The robot that an action is for; None: all of them."""
+    """Name of the robot that an action is for; None for all robots."""
     robot = values.get("robot")
     return robot if isinstance(robot, str) and robot else None
 
 
 def control_json(state: ControlState) -> dict[str, Any]:
-    """What the page shows of a run's control."""
+    """State of a run's control as JSON values for the page."""
     return {
         "mode": state.mode.value,
         "reason": state.reason,
@@ -79,7 +79,7 @@ def control_json(state: ControlState) -> dict[str, Any]:
 
 
 def asked_json(waiting: Waiting | None, robot: str = "") -> dict[str, Any]:
-    """What the page shows of the question that a robot asks back; nothing of it where none waits."""
+    """The question that a robot asks back as JSON values for the page; null if none waits."""
     if waiting is None:
         return {"question": None}
     question = waiting.question

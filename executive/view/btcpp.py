@@ -1,8 +1,8 @@
 """The tree in the XML format of BehaviorTree.CPP 4, which Groot2 opens.
 
-Sequences and selectors become `Sequence` and `Fallback`, whose meaning is the same; every other node stands under its
-own name in explicit form, and the `TreeNodesModel` tells its ports. Each step of the mission is a tree of its own, so
-that the editor can fold it. State, cause, path id and source line stand in the node's description.
+Sequences and selectors become `Sequence` and `Fallback`, which mean the same. Every other node has its own name in
+explicit form, and the `TreeNodesModel` lists its ports. Each step of the mission is a tree of its own, so that the
+editor can fold it. The node's description has state, cause, path id and source line.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ def to_btcpp(root: NodeView) -> str:
 
 
 def _parts(root: NodeView) -> list[tuple[NodeView, str]]:
-    """The steps of the mission and what watches over it, each with a name that no other tree has.
+    """The steps of the mission and its guards, each with a name that no other tree has.
 
-    The path id of a mission has two parts; it is the root, or stands below the nodes that watch over it.
+    The path id of a mission has two parts. The mission is the root, or below its guards.
     """
     missions = [node for _, node in root.walk() if node.path_id.count("/") == 1]
     parents = {id(node): node for node in (root, *missions)}
@@ -89,7 +89,7 @@ def _element(node: NodeView, steps: Mapping[int, str]) -> Element:
 
 
 def _category(node: NodeView) -> str:
-    """The element's name: a built-in control node, else what the number of children says."""
+    """Name of the element: a built-in control node, or the category that fits the number of children."""
     if node.kind in _BUILT_IN and node.children:
         return _BUILT_IN[node.kind]
     if not node.children:
@@ -102,14 +102,14 @@ def _model_id(node: NodeView) -> str:
 
 
 def _identifier(text: str, prefix: str = "Errand") -> str:
-    """A name as the format allows one: letters and digits, a letter first, and none that is built in."""
+    """A name that the format allows: letters and digits, a letter first, and no built-in name."""
     words = re.findall(r"[A-Za-z0-9]+", text)
     name = "".join(word[0].upper() + word[1:] for word in words) or "Unnamed"
     return name if name[0].isalpha() and name not in _TAKEN else f"{prefix}{name}"
 
 
 def _named(ports: Iterable[Port]) -> Iterator[tuple[str, Port]]:
-    """The ports with their names in the file; an output that is called as an input is called differently there."""
+    """The ports with their names in the file; an output with the name of an input gets another name."""
     inputs = {port.name for port in ports if not port.output}
     for port in ports:
         yield f"{_port_name(port)}_out" if port.output and port.name in inputs else _port_name(port), port
@@ -121,7 +121,7 @@ def _port_name(port: Port) -> str:
 
 
 def _value(port: Port) -> str:
-    """A blackboard key in braces; other text that looks like one is quoted, so that it stays text."""
+    """A blackboard key in braces, or a text, quoted if it looks like a key."""
     text = printable(port.value)
     if port.on_board:
         return f"{{{text}}}"
@@ -136,7 +136,7 @@ def _description(node: NodeView) -> str:
 
 
 def _models(root: NodeView, trees: Sequence[str]) -> Element:
-    """One model for each kind of node that is not built in, with all ports that such nodes have."""
+    """One model for each kind of node that is not built in, with all ports of its nodes."""
     models: dict[tuple[str, str], dict[str, Port]] = {}
     for _, node in root.walk():
         if node.kind not in _BUILT_IN or not node.children:

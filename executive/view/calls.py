@@ -1,6 +1,6 @@
-"""Serves calls: `POST /missions/NAME` with `Authorization: Bearer TOKEN` has something done, and says what.
+"""HTTP server for calls: `POST /missions/NAME` with `Authorization: Bearer TOKEN` starts a mission.
 
-The token is looked at before anything else. Nothing of a request is kept but the values in its JSON body.
+The server checks the token before anything else, and stores nothing of a request but the values in its JSON body.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ __all__ = ["CallError", "CallServer", "Called"]
 
 
 class CallError(Exception):
-    """A call that is refused, with its reason and its HTTP status."""
+    """A call is refused, with a reason and an HTTP status."""
 
     def __init__(self, status: HTTPStatus, reason: str) -> None:
         super().__init__(reason)
@@ -31,17 +31,17 @@ class CallError(Exception):
 
 
 class Called(Protocol):
-    """Does what a call asks for."""
+    """Carries out a call."""
 
     def __call__(self, name: str, body: bytes) -> Mapping[str, Any]:
-        """The answer's JSON object; called in a thread of its own. Raises CallError."""
+        """Returns the answer's JSON object, in a thread of its own. Raises CallError."""
 
 
 class CallServer:
-    """Calls that are being served. Use it as a context manager, or call `close`."""
+    """A running server for calls. Use it as a context manager, or call `close`."""
 
     def __init__(self, called: Called, *, token: str, host: str, port: int) -> None:
-        """Begin to serve; `port` 0 takes a free one. Raises OSError: the address is taken, or not of this machine."""
+        """Starts serving; `port` 0 takes a free one. Raises OSError if the address is taken, or not of this machine."""
         self._called, self._token = called, token
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         opened = socket.create_server((host, port), family=family)
@@ -57,12 +57,12 @@ class CallServer:
 
     @property
     def url(self) -> str:
-        """Where it is called, up to the name."""
+        """The address of calls, up to the name."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"http://{host}:{self.port}/missions/"
 
     def close(self) -> None:
-        """Answer the calls under way and serve no more; idempotent."""
+        """Answers the open calls and stops serving; idempotent."""
         self._serving.end()
         self._serving.join()
 

@@ -13,7 +13,7 @@ _SAFE: Final = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ01
 
 
 def to_mermaid(root: NodeView) -> str:
-    """The tree from left to right: one box for each node, its state by symbol, colour and line, causes in the box."""
+    """The tree from left to right: a box for each node, with its state as symbol, colour and line, and its cause."""
     return "\n".join(["flowchart LR", *_nodes(root), *_classes(), ""])
 
 
@@ -34,7 +34,7 @@ def _label(node: NodeView) -> str:
 
 
 def escaped(text: str) -> str:
-    """The text with every character that Mermaid might read as syntax written as its number."""
+    """The text, with a character reference for every character that Mermaid might read as syntax."""
     return "".join(char if char in _SAFE else f"#{ord(char)};" for char in printable(text))
 
 

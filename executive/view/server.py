@@ -1,7 +1,7 @@
-"""Serves the page on 127.0.0.1 from a thread of its own.
+"""HTTP server of the page on 127.0.0.1, in a thread of its own.
 
-Every request for data, every action and the websocket need the token that is made anew for each server; requests that
-come from another origin, or that name another host, are refused, so that no other web page can reach the robot.
+Every request for data, every action and the websocket need the token, which each server draws again. The server refuses
+requests from another origin or for another host, so that no other web page can reach the robot.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _NOT_ALLOWED: Final = 4403
 
 @dataclass(frozen=True)
 class PageContent:
-    """What a server shows: the feed, what the buttons do, where the 3D scene is (a web address) or its recording."""
+    """Content of the page: feed, actions of the buttons, and the 3D scene's address or recording."""
 
     feed: Feed
     actions: Mapping[str, Action] = field(default_factory=dict)
@@ -49,10 +49,10 @@ class PageContent:
 
 
 class PageServer:
-    """A page that is being served. Use it as a context manager, or call `close`."""
+    """A running server of the page. Use it as a context manager, or call `close`."""
 
     def __init__(self, content: PageContent, *, port: int = 0) -> None:
-        """Begin to serve; `port` 0 takes a free one. Raises OSError when the port is taken."""
+        """Starts serving; `port` 0 takes a free one. Raises OSError if the port is taken."""
         self._content = content
         self._token = secrets.token_urlsafe(24)
         self._socket = socket.create_server((HOST, port))
@@ -63,7 +63,7 @@ class PageServer:
         content.feed.listen(self._wake)
 
     def offer_recording(self, recording: Path) -> None:
-        """Show the recording of the scene from now on; it follows the page's slider."""
+        """Shows the recording of the scene from now on; it follows the page's slider."""
         self._content = replace(self._content, recording=recording)
         self._content.feed.tell("recording", {"address": RECORDING_ADDRESS})
 
@@ -73,7 +73,7 @@ class PageServer:
         return f"http://{HOST}:{self.port}/?token={self._token}"
 
     def close(self) -> None:
-        """Stop serving; idempotent."""
+        """Stops serving; idempotent."""
         self._closing = True
         self._serving.end()
         self._wake()
@@ -86,7 +86,7 @@ class PageServer:
         self.close()
 
     def _wake(self) -> None:
-        """Tell all websockets that there is news; from any thread."""
+        """Wakes all websockets; from any thread."""
         self._serving.call_soon(self._wake_all)
 
     def _wake_all(self) -> None:
@@ -101,13 +101,13 @@ class PageServer:
                 Route("/picture/{number:int}", guarded(self._picture)),
                 Route(f"/{RECORDING_ADDRESS}", guarded(self._recording)),
                 Route("/action/{name}", guarded(self._act), methods=["POST"]),
-                WebSocketRoute("/feed", self._tell),
+                WebSocketRoute("/feed", self._send),
                 Mount("/page", StaticFiles(directory=PAGE_FOLDER)),
             ]
         )
 
     def _allowed(self, connection: HTTPConnection) -> bool:
-        """The host is ours, the origin ours or not told (which browsers always do for actions), the token right."""
+        """Whether host, origin and token are right. Browsers always send the origin of actions."""
         here = {f"{HOST}:{self.port}", f"localhost:{self.port}"}
         headers = connection.headers
         origin = headers.get("origin")
@@ -161,8 +161,8 @@ class PageServer:
             return JSONResponse({"error": str(refusal)}, HTTPStatus.CONFLICT)
         return JSONResponse({"said": said})
 
-    async def _tell(self, websocket: WebSocket) -> None:
-        """Send all there is, and then whatever is new."""
+    async def _send(self, websocket: WebSocket) -> None:
+        """Sends all messages, and then each new one."""
         if not self._allowed(websocket):
             await websocket.close(_NOT_ALLOWED)
             return
@@ -202,7 +202,7 @@ class PageServer:
 
 
 def _values(body: bytes | None) -> Mapping[str, Any]:
-    """An action's values. Raises RefusedError for what is no JSON object."""
+    """The values of an action. Raises RefusedError for anything but a JSON object."""
     if body is None:
         raise RefusedError(f"the action's values are larger than {MAX_BODY} bytes")
     try:
@@ -212,7 +212,7 @@ def _values(body: bytes | None) -> Mapping[str, Any]:
 
 
 def serve(content: PageContent, port: int) -> PageServer:
-    """A server for the content. Raises InputError when the port is taken."""
+    """Starts a server for the content. Raises InputError if the port is taken."""
     try:
         return PageServer(content, port=port)
     except OSError as error:
@@ -220,7 +220,7 @@ def serve(content: PageContent, port: int) -> PageServer:
 
 
 def wait(limit_s: float | None) -> None:
-    """Block until Ctrl-C or the limit (s, on the wall's clock)."""
+    """Waits until Ctrl-C or the limit (s, wall time)."""
     try:
         threading.Event().wait(limit_s)
     except KeyboardInterrupt:

@@ -17,10 +17,10 @@ MAX_BODY: Final = 20_000
 
 
 class ServingThread:
-    """An application that is being served, until `close`."""
+    """A thread that serves an application until `end`."""
 
     def __init__(self, app: Starlette, opened: socket.socket, **settings: Any) -> None:
-        """Begin to serve on an open socket; `settings` are uvicorn's."""
+        """Starts serving on an open socket; `settings` are uvicorn's."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ready = threading.Event()
         config = uvicorn.Config(app, log_level="error", access_log=False, lifespan="off", **settings)
@@ -30,16 +30,16 @@ class ServingThread:
         self._ready.wait(START_LIMIT_S)
 
     def call_soon(self, callback: Callable[[], None]) -> None:
-        """Have the serving thread call something; from any thread. Does nothing once it has ended."""
+        """Calls `callback` in the serving thread; from any thread. Does nothing after the end."""
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(callback)
 
     def end(self) -> None:
-        """Let it end once the requests under way are answered."""
+        """Ends the thread once it has answered the open requests."""
         self._server.should_exit = True
 
     def join(self) -> None:
-        """Wait until it has ended."""
+        """Waits until the thread has ended."""
         self._thread.join(START_LIMIT_S)
 
     def _serve(self) -> None:
@@ -52,7 +52,7 @@ class ServingThread:
 
 
 async def body_of(request: Request) -> bytes | None:
-    """A request's body; None when it is larger than MAX_BODY (the rest is not read), or its client went away."""
+    """Body of a request; None if it is larger than MAX_BODY (the rest is not read), or the client disconnects."""
     body = b""
     try:
         async for part in request.stream():

@@ -84,7 +84,7 @@ def test_the_state_at_a_time_tells_what_was_being_done_then(telling_run):
     assert messages == ["turning", "going, 2 m to go"]
 
 
-def test_the_timeline_tells_what_running_skills_do(telling_run):
+def test_the_timeline_lists_messages_of_running_skills(telling_run):
     told = next(event.data for event in telling_run.events if event.topic == "activity")
     entries = [entry for entry in timeline(telling_run.events, leaves_only=True) if entry.about == told["node"]]
     assert [entry.text for entry in entries][:2] == ["turning", "going, 2 m to go"]

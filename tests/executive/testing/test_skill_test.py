@@ -85,12 +85,12 @@ def test_tests_that_go_as_expected_show_no_difference(written):
         ("cancel_at_s: 0.5", "cancel_at_s: 5", 2, "expected cancelled CANCELLED, got success"),
     ],
 )
-def test_a_difference_is_told_in_a_sentence(written, old, new, index, difference):
+def test_a_difference_is_reported_in_a_sentence(written, old, new, index, difference):
     assert old in GOOD
     assert differences(written(GOOD.replace(old, new)), index) == (difference,)
 
 
-def test_the_report_tells_faults_and_what_was_said_on_the_way(written):
+def test_the_report_lists_faults_and_messages(written):
     file = load_skill_tests(written(GOOD.replace("message: moved", "message: fell")), SKILLS)
     report = carry_out(file, 1, Wait, MAKERS).report()
     assert "it ended with failure EXECUTION after 1" in report

@@ -118,7 +118,7 @@ def test_the_websocket_is_refused_without_the_token_or_from_elsewhere(server, qu
         socket.recv(timeout=2)
 
 
-def test_the_websocket_tells_all_there_is_and_then_what_is_new(server, feed):
+def test_the_websocket_sends_all_messages_and_then_each_new_one(server, feed):
     feed("pose", 0.5, {"x": 1})
     address = f"ws://127.0.0.1:{server.port}/feed?token={token_of(server)}"
     with connect(address, origin=f"http://127.0.0.1:{server.port}", proxy=None) as socket:
@@ -130,7 +130,7 @@ def test_the_websocket_tells_all_there_is_and_then_what_is_new(server, feed):
         assert json.loads(socket.recv(timeout=5))[0]["data"] == {"x": 2}
 
 
-def test_two_pages_are_told_the_same(server, feed):
+def test_two_pages_get_the_same_messages(server, feed):
     address = f"ws://127.0.0.1:{server.port}/feed?token={token_of(server)}"
     with connect(address, proxy=None) as one, connect(address, proxy=None) as two:
         for socket in (one, two):
@@ -167,7 +167,7 @@ def test_a_panels_buttons_are_for_its_robot_alone(feed, clock, compiled, make):
     assert {each.mode for each in control.state.robots.values()} == {Mode.RUNNING}
 
 
-def test_the_page_is_told_what_each_robot_does_and_asks(clock, compiled, make):
+def test_the_page_gets_the_mode_and_the_questions_of_each_robot(clock, compiled, make):
     control = Control(attended=True)
     control.begin({name: compiled(*make.FETCH) for name in ("Alice", "Bob")})
     control.pause("let me look", robot="Bob")
@@ -180,7 +180,7 @@ def test_the_page_is_told_what_each_robot_does_and_asks(clock, compiled, make):
     assert [each["robot"] for each in told["questions"]] == ["Alice"]
 
 
-def test_the_page_is_told_what_each_robot_is_at():
+def test_the_page_gets_the_progress_of_each_robot():
     running = {"a/go": NodeState(Status.RUNNING, None, "half way", progress=0.5), "a": NodeState(Status.SUCCESS)}
     word = progress_word(Progress(2.0, 40, 0, {"Alice": running, "Bob": {"b": NodeState()}}))
     assert word["robots"] == {
@@ -200,7 +200,7 @@ def test_the_page_is_told_what_each_robot_is_at():
         ("dance", {}, 404, "no action 'dance'"),
     ],
 )
-def test_what_cannot_be_done_is_refused_with_a_reason(server, name, values, status, words):
+def test_an_impossible_action_is_refused_with_a_reason(server, name, values, status, words):
     given, answer = act(server, name, values)
     assert (given, words in answer["error"]) == (status, True)
 
@@ -235,7 +235,7 @@ def test_an_answer_that_cannot_be_said_again_is_refused_and_the_question_stays(c
     assert [each.id for each in control.state.questions] == ["alice/q"]
 
 
-def test_every_state_of_the_control_is_told(feed, control):
+def test_the_page_gets_every_state_of_the_control(feed, control):
     watch = ControlWatch(control, feed)
     told = threading.Event()
     feed.listen(told.set)

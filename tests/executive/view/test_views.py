@@ -77,7 +77,7 @@ def test_a_tree_that_has_not_run_is_idle(compiled, make):
     assert {node.state for _, node in view.walk()} == {NodeState()}
 
 
-def test_looks_are_told_apart_by_symbol_and_colour():
+def test_states_differ_in_symbol_and_colour():
     styles = [style.value for style in Styles]
     for attribute in ("word", "symbol", "ascii", "line", "fill"):
         assert len({getattr(style, attribute) for style in styles}) == len(styles)

@@ -44,7 +44,7 @@ class Saying:
     """What is said to one addressee: `who` is None where nobody was named; `joint` stood before it.
 
     `then` says that it comes after the one before it; `behind` names the robots whose parts before it have to be done
-    first. `otherwise` says that it hangs on the condition of the one before it. `deed` says that it tells what the
+    first. `otherwise` says that it hangs on the condition of the one before it. `past` says that it tells what the
     robot has done by then, which is what it is to do.
     """
 
@@ -54,7 +54,7 @@ class Saying:
     then: bool = False
     behind: Who | None = None
     otherwise: bool = False
-    deed: bool = False
+    past: bool = False
 
 
 @cache
@@ -124,7 +124,7 @@ class Addressees:
         for part in parting.parts():
             last = found[-1] if found else None
             waits = part.behind is not None and part.behind != part.who
-            if last is not None and last.who == part.who and not waits and not (last.deed or part.deed):
+            if last is not None and last.who == part.who and not waits and not (last.past or part.past):
                 joint = part.joint if re.search(r"\w", part.joint) else " and "
                 found[-1] = replace(last, text=f"{last.text}{joint}{part.text}")
             else:
@@ -190,7 +190,7 @@ class _Parting:
                 self.listener = self.listener or called
                 self._take(found, text[at:start])
                 at = found.end
-            elif self.found[-1].deed and text[:start].rstrip().endswith(","):
+            elif self.found[-1].past and text[:start].rstrip().endswith(","):
                 self._add(text[at:start])
                 self.found.append(Saying(self.address, "", then=True))
                 at = start
@@ -229,17 +229,17 @@ class _Parting:
             self.found.append(Saying(who, "", joint, behind=self._behind(found)))
             return
         who = self._who(found)
-        said, opener = (said, "") if found.kind == "deed" else self._split_opener(said)
+        said, opener = (said, "") if found.kind == "past" else self._split_opener(said)
         self._add(said)
         last = self.found[-1]
         begun = Saying(
             who,
             f"{opener}, {found.lead}" if opener else found.lead,
             joint,
-            then=last.deed or self.calls.forms.then.search(joint) is not None or (last.then and not last.text),
+            then=last.past or self.calls.forms.then.search(joint) is not None or (last.then and not last.text),
             behind=None if last.text else last.behind,
             otherwise=self.calls.forms.otherwise.search(joint) is not None,
-            deed=found.kind == "deed",
+            past=found.kind == "past",
         )
         self.found.append(begun)
         self.address = who if found.kind == "call" else self.address
@@ -280,7 +280,7 @@ class _Parting:
             split = self.address is not None and self.address != one.who
             first, *rest = re.split(r"(?<=[.!?])\s+", one.text) if split else [one.text]
             if _says(replace(one, text=first)):
-                yield replace(one, text=tidy(first) if one.deed else imperative(tidy(first)))
+                yield replace(one, text=tidy(first) if one.past else imperative(tidy(first)))
             if rest:
                 yield Saying(self.address, imperative(tidy(" ".join(rest))))
 

@@ -340,4 +340,3 @@ def _around(location: Location) -> str | None:
 
 _INSIDE: Final = frozenset({"in", "at", "inside"})
 _KINDS: Final = ("room", "surface", "person")
-_PLURALS: Final = {Slot.THING: "things", Slot.PLACE: "places", Slot.PERSON: "people", Slot.GOAL: "places"}

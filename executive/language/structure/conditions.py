@@ -14,34 +14,34 @@ from executive.language.lexicon import Patterns
 from executive.language.questions import RefusalError, RefusalKind, Slot, which
 from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
-from executive.language.structure.leaves import Leaves, State, Supposed, negated, placed, verb
+from executive.language.structure.plain import PlainReader, State, Supposed, behind_preposition, contrary, verb
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Not, ValueIs
 from executive.words.expression import Expression
 from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
 
-__all__ = ["door_condition", "meeting", "pressed", "reading", "suppose"]
+__all__ = ["button_condition", "door_condition", "meeting", "suppose", "usual_condition"]
 
 
-def suppose(text: str, state: State, leaves: Leaves) -> Supposed:
+def suppose(text: str, state: State, reader: PlainReader) -> Supposed:
     """The condition that `text` tells. Raises RefusalError: it tells none that can be looked at or read."""
     words = _P.tail.sub("", " ".join(text.replace(" o' clock", " o'clock").split()).strip(" ,."))
-    if (found := reading(words, state, leaves)) is not None:
+    if (found := usual_condition(words, state, reader)) is not None:
         return found
     if (unreal := CLAUSES.unreal.search(words)) is not None:
         raise RefusalError(f"I can only decide by how things are now, not by '{words}'", [unreal[0]])
-    joined, left_open = _joined(words, state, leaves)
+    joined, left_open = _joined(words, state, reader)
     if joined is not None:
         return joined
     try:
-        return _look(words, state, leaves)
+        return _look(words, state, reader)
     except RefusalError as refusal:
         raise refusal if refusal.question is not None or left_open is None else left_open from None
 
 
-def reading(words: str, state: State, leaves: Leaves) -> Supposed | None:
-    """The condition of a usual form: of battery, hand, place, clock, button, door, or somebody who comes or leaves."""
-    return next((found for read in _READERS if (found := read(words, state, leaves)) is not None), None)
+def usual_condition(words: str, state: State, reader: PlainReader) -> Supposed | None:
+    """The condition of a usual form: of battery, hand, place, clock, button, door, or somebody who comes or reader."""
+    return next((found for read in _READERS if (found := read(words, state, reader)) is not None), None)
 
 
 def _plain(condition: Condition, said: str, state: State, *notes: str) -> Supposed:
@@ -68,7 +68,7 @@ _P: Final = Patterns("structures.yaml", "conditions", {**AMOUNTS, "compared": _C
 _FULL: Final = 0.99
 
 
-def _battery(words: str, state: State, leaves: Leaves) -> Supposed | None:
+def _battery(words: str, state: State, reader: PlainReader) -> Supposed | None:
     match = _P.battery.fullmatch(words)
     if match is not None:
         share = share_of(match["share"])
@@ -78,13 +78,13 @@ def _battery(words: str, state: State, leaves: Leaves) -> Supposed | None:
     match = _P.charged.fullmatch(re.sub(r"^you are", "you is", words))
     if match is None:
         return None
-    facts, how = leaves.knowledge.battery, (match["how"] or match["low"] or "").lower()
+    facts, how = reader.knowledge.battery, (match["how"] or match["low"] or "").lower()
     level = {"charged": f">= {facts.charged:g}", "full": f">= {_FULL}", "fully charged": f">= {_FULL}"}
     found = _value(f"battery {level.get(how, f'< {facts.low:g}')}")
-    return _plain(negated(found) if match["not"] else found, words, state)
+    return _plain(contrary(found) if match["not"] else found, words, state)
 
 
-def _holding(words: str, state: State, leaves: Leaves) -> Supposed | None:
+def _holding(words: str, state: State, reader: PlainReader) -> Supposed | None:
     words = re.sub(r"n't\b", " not", words)
     match = _P.holds.fullmatch(words) or _P.in_hand.fullmatch(words)
     if match is None:
@@ -93,13 +93,13 @@ def _holding(words: str, state: State, leaves: Leaves) -> Supposed | None:
     return _plain(_value("not holding" if empty != bool(match["not"]) else "holding"), words, state)
 
 
-def _place(words: str, state: State, leaves: Leaves) -> Supposed | None:
+def _place(words: str, state: State, reader: PlainReader) -> Supposed | None:
     if _P.knows.fullmatch(words):
         return _plain(_value("localised"), words, state)
     return _plain(_value("not localised"), words, state) if _P.lost.fullmatch(words) else None
 
 
-def _clock(words: str, state: State, leaves: Leaves) -> Supposed | None:
+def _clock(words: str, state: State, reader: PlainReader) -> Supposed | None:
     match = _P.passed.fullmatch(words)
     if match is not None:
         seconds = seconds_of(match["span"] or match["since"])
@@ -116,21 +116,21 @@ def _clock(words: str, state: State, leaves: Leaves) -> Supposed | None:
 _BUTTON: Final = "button"
 
 
-def _button(words: str, state: State, leaves: Leaves) -> Supposed | None:
+def _button(words: str, state: State, reader: PlainReader) -> Supposed | None:
     match = _P.pressed.fullmatch(words)
     if match is None:
         return None
-    return pressed(match["one"] or match["other"], words, state)
+    return button_condition(match["one"] or match["other"], words, state)
 
 
-def pressed(button: str, words: str, state: State) -> Supposed:
+def button_condition(button: str, words: str, state: State) -> Supposed:
     """Whether a button is pressed, which is spoken of with its article; `words` say it."""
     name = re.sub(r"^(?:the|a|any)\b\s*|\s*\bbutton$", "", button.strip(), flags=re.IGNORECASE).strip()
     return _plain(ButtonPressed(name.lower() or _BUTTON), words, state)
 
 
-def _door(words: str, state: State, leaves: Leaves) -> Supposed | None:
-    found = door_condition(words, state.door, leaves.knowledge)
+def _door(words: str, state: State, reader: PlainReader) -> Supposed | None:
+    found = door_condition(words, state.door, reader.knowledge)
     if found is None:
         return None
     door = found.part if isinstance(found, Not) else found
@@ -139,7 +139,7 @@ def _door(words: str, state: State, leaves: Leaves) -> Supposed | None:
     return Supposed(found, words, known, known)
 
 
-def _meeting(words: str, state: State, leaves: Leaves) -> Supposed | None:
+def _meeting(words: str, state: State, reader: PlainReader) -> Supposed | None:
     """Somebody comes to where the robot is, or leaves it."""
     gone = _P.goes.fullmatch(words)
     match = gone or _P.comes.fullmatch(words)
@@ -148,29 +148,31 @@ def _meeting(words: str, state: State, leaves: Leaves) -> Supposed | None:
     who = re.sub(r"\b(?:if|until)\b", "", match["who"]).strip()
     where = match.groupdict().get("place") or match["room"]
     where = "there" if where is None and re.search(r"\bthere(?: any more)?$", words, re.IGNORECASE) else where
-    if not (_P.nobody.fullmatch(who) or leaves.somebody(who, state)) or re.search(r"\b(?:or|and)\b", where or ""):
+    if not (_P.nobody.fullmatch(who) or reader.is_somebody(who, state)) or re.search(r"\b(?:or|and)\b", where or ""):
         return None
-    return meeting(who, where, words, state, leaves, gone=gone is not None)
+    return meeting(who, where, words, state, reader, gone=gone is not None)
 
 
-def meeting(who: str, where: str | None, words: str, state: State, leaves: Leaves, *, gone: bool = False) -> Supposed:
+def meeting(
+    who: str, where: str | None, words: str, state: State, reader: PlainReader, *, gone: bool = False
+) -> Supposed:
     """Whether somebody, or nobody, is where the robot is, or in a room; `words` say it. Raises RefusalError."""
     nobody = _P.nobody.fullmatch(who) is not None
-    room = _where(where, state, leaves)
+    room = _where(where, state, reader)
     if room is None:
         raise RefusalError(f"in which room is '{words}' to be seen? Name it", [words])
-    look = leaves.look("anybody" if nobody or who.lower() in _ANY else who, room, words, state)
+    look = reader.look("anybody" if nobody or who.lower() in _ANY else who, room, words, state)
     return replace(look, condition=Not(look.condition) if gone != nobody else look.condition)
 
 
-def _where(where: str | None, state: State, leaves: Leaves) -> str | None:
+def _where(where: str | None, state: State, reader: PlainReader) -> str | None:
     """The room that is meant: where the robot is, unless another one is said; "there" may be one that was spoken of."""
     if where is None or where.lower() == "here":
         return state.at
     if where.lower() != "there":
-        return leaves.room(where, state)
+        return reader.room(where, state)
     spoken_of = state.memory.place
-    return state.at if spoken_of == HERE else leaves.room("there", state)
+    return state.at if spoken_of == HERE else reader.room("there", state)
 
 
 _ANY: Final = frozenset(
@@ -178,41 +180,41 @@ _ANY: Final = frozenset(
 )
 
 
-def _look(words: str, state: State, leaves: Leaves) -> Supposed:
+def _look(words: str, state: State, reader: PlainReader) -> Supposed:
     """Something to be seen, or not to be seen. Raises RefusalError."""
     match = _P.sees.fullmatch(words)
     if match is not None:
-        return _seen(match, words, state, leaves)
+        return _seen(match, words, state, reader)
     match = _P.fullness.fullmatch(re.sub(r"n't\b", " not", words))
     if match is not None:
-        found = leaves.anything_on(match["on"] or match["what"], words, state)
+        found = reader.anything_on(match["on"] or match["what"], words, state)
         empty = (match["how"] or "").lower() in ("empty", "free", "bare", "clear")
         return found.denied(words) if empty != bool(match["not"]) else found
-    return leaves.check(words, state)
+    return reader.check(words, state)
 
 
-def _seen(match: re.Match[str], words: str, state: State, leaves: Leaves) -> Supposed:
+def _seen(match: re.Match[str], words: str, state: State, reader: PlainReader) -> Supposed:
     """That the robot sees, or does not see, something or somebody."""
     what = re.sub(r"^(?:him|them)(?= )", "it", match["what"], flags=re.IGNORECASE)
     looks = re.match(r"you (?:can |do |could |\w+n't |not )*(?:see|spot|notice)\b", words, re.IGNORECASE)
     if re.fullmatch(r"it|one|him|her|them", what, re.IGNORECASE):
-        found = leaves.looked((verb("find"), *leaves.read(what)), words, state)
-    elif looks and state.at is not None and leaves.somebody(match["what"], state):
-        found = leaves.look(match["what"], state.at, words, state)
+        found = reader.look_by_items((verb("find"), *reader.items_of(what)), words, state)
+    elif looks and state.at is not None and reader.is_somebody(match["what"], state):
+        found = reader.look(match["what"], state.at, words, state)
     elif re.fullmatch(r"it there", what, re.IGNORECASE):
-        found = leaves.it_is_there(words, state)
+        found = reader.it_is_there(words, state)
     else:
-        found = leaves.exists(what, words, state)
+        found = reader.exists(what, words, state)
     return found.denied(words) if match["not"] else found
 
 
-def _joined(words: str, state: State, leaves: Leaves) -> tuple[Supposed | None, RefusalError | None]:
+def _joined(words: str, state: State, reader: PlainReader) -> tuple[Supposed | None, RefusalError | None]:
     """Several conditions with "and" or "or" between them, or else a question about one of them."""
     left_open: RefusalError | None = None
     for word, kind in ((" and ", AllOf), (" or ", AnyOf)):
         for before, after in _halves(words, word):
             try:
-                parts = _both(before, after, state, leaves)
+                parts = _both(before, after, state, reader)
             except RefusalError as refusal:
                 left_open = left_open or (refusal if refusal.question is not None else None)
                 continue
@@ -244,22 +246,22 @@ def _halves(words: str, word: str) -> Iterator[tuple[str, str]]:
         start = words.lower().find(word, start + 1)
 
 
-def _both(before: str, after: str, state: State, leaves: Leaves) -> tuple[Supposed, Supposed]:
+def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[Supposed, Supposed]:
     """Two conditions, where the second may leave out what the first has said, or the first the place of both."""
-    first = suppose(before, state, leaves)
+    first = suppose(before, state, reader)
     if _P.there.match(before) and _P.bare.match(after):
-        place = next((item for item in leaves.read(after) if _is_place(item)), None)
+        place = next((item for item in reader.items_of(after) if _is_place(item)), None)
         if place is not None and not _P.placed.search(before):
-            first = _looked_again(first, (*first.items, place), before, state, leaves)
-        return first, leaves.exists(after, after, first.holds)
+            first = _looked_again(first, (*first.items, place), before, state, reader)
+        return first, reader.exists(after, after, first.holds)
     if _P.at.fullmatch(before) and re.match(r"(?:in|on|at|the) ", after, re.IGNORECASE) and " is " not in after:
-        return first, _looked_again(first, _moved(first.items, leaves.read(after)), after, first.holds, leaves)
-    return first, suppose(after, first.holds, leaves)
+        return first, _looked_again(first, _moved(first.items, reader.items_of(after)), after, first.holds, reader)
+    return first, suppose(after, first.holds, reader)
 
 
-def _looked_again(first: Supposed, items: Sequence[Item], words: str, state: State, leaves: Leaves) -> Supposed:
+def _looked_again(first: Supposed, items: Sequence[Item], words: str, state: State, reader: PlainReader) -> Supposed:
     """The same condition with other items."""
-    found = leaves.looked(items, words, state)
+    found = reader.look_by_items(items, words, state)
     return found.denied(words) if isinstance(first.condition, Not) else found
 
 
@@ -267,14 +269,14 @@ def _moved(items: Sequence[Item], to: Sequence[Item]) -> tuple[Item, ...]:
     """The items with another place."""
     old = next((item for item in items if isinstance(item, Chunk) and item.role is not None), None)
     rest = tuple(item for item in items if item is not old)
-    return (*rest, *placed(to, old.preposition if isinstance(old, Chunk) else "in"))
+    return (*rest, *behind_preposition(to, old.preposition if isinstance(old, Chunk) else "in"))
 
 
 def _is_place(item: Item) -> bool:
     return isinstance(item, Chunk) and item.role is not None
 
 
-_Reader = Callable[[str, State, Leaves], Supposed | None]
+_Reader = Callable[[str, State, PlainReader], Supposed | None]
 _READERS: Final[tuple[_Reader, ...]] = (_battery, _holding, _place, _clock, _button, _door, _meeting)
 
 

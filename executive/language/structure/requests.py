@@ -14,8 +14,16 @@ from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.roles import Location
-from executive.language.structure.conditions import meeting, pressed, reading, suppose
-from executive.language.structure.leaves import Leaf, Leaves, State, Supposed, named, negated, verb
+from executive.language.structure.conditions import button_condition, meeting, suppose, usual_condition
+from executive.language.structure.plain import (
+    PlainReader,
+    PlainReading,
+    State,
+    Supposed,
+    contrary,
+    phrase_of_name,
+    verb,
+)
 from executive.words.blocks import Dock, Wait
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
@@ -27,18 +35,18 @@ __all__ = [
     "Done",
     "Listener",
     "Said",
-    "asked_of",
-    "bare",
-    "charged",
-    "everywhere",
+    "charging_in",
     "for_everyone",
-    "look_for",
-    "said_by",
-    "said_to",
+    "question_in",
+    "search_everywhere",
+    "search_for",
     "serves_all",
+    "speech_in",
+    "speech_to",
     "template",
     "wait",
-    "waited",
+    "wait_in",
+    "without_article",
 ]
 
 _WAITING: Final = Patterns("structures.yaml", "waiting", AMOUNTS)
@@ -47,32 +55,32 @@ Done = tuple[tuple[MissionStep, ...], State, tuple[str, ...]]
 """Steps, what is known behind them, and notes."""
 
 
-def waited(text: str, state: State, leaves: Leaves) -> Done | None:
+def wait_in(text: str, state: State, reader: PlainReader) -> Done | None:
     """A wait for something to be so; None where it is none, or only for some time. Raises RefusalError."""
     match = _WAITING.wait.fullmatch(text)
     if match is None or ACTS.only_span.fullmatch(match["what"]):
         return None
-    return wait(match["where"].strip(), match["how"].lower(), match["what"], state, leaves)
+    return wait(match["where"].strip(), match["how"].lower(), match["what"], state, reader)
 
 
-def wait(where: str, how: str, what: str, state: State, leaves: Leaves) -> Done:
+def wait(where: str, how: str, what: str, state: State, reader: PlainReader) -> Done:
     """A wait in a place: until something is so, for somebody ("for"), or as long as something is so.
 
     Raises RefusalError.
     """
-    steps, there = _gone(where, state, leaves)
+    steps, there = _gone(where, state, reader)
     if how in ("until", "till"):
         if (passed := _WAITING.passed.fullmatch(what)) is not None and (span := seconds_of(passed["span"])) is not None:
             return (*steps, MissionStep(block=Wait(seconds=span))), there, ()
         if (time := time_of(_WAITING.time.sub(r"\g<time>", what))) is not None:
             notes = (f"I take '{what}' as {time.text}",) if time.taken else ()
             return ((*steps, MissionStep(block=Wait(until_clock_s=time.seconds))), there, notes)
-        return _until(suppose(what, there, leaves), steps, there)
+        return _until(suppose(what, there, reader), steps, there)
     if how == "for":
-        more, there, found = _awaited(what, there, leaves)
+        more, there, found = _awaited(what, there, reader)
         return _until(found, (*steps, *more), there)
-    found = suppose(what, there, leaves)
-    return _until(replace(found, condition=negated(found.condition), holds=found.fails), steps, there)
+    found = suppose(what, there, reader)
+    return _until(replace(found, condition=contrary(found.condition), holds=found.fails), steps, there)
 
 
 def _until(found: Supposed, steps: tuple[MissionStep, ...], there: State) -> Done:
@@ -80,7 +88,7 @@ def _until(found: Supposed, steps: tuple[MissionStep, ...], there: State) -> Don
     return (*steps, MissionStep(block=Wait(found.condition))), after, found.notes
 
 
-def _gone(where: str, state: State, leaves: Leaves) -> tuple[tuple[MissionStep, ...], State]:
+def _gone(where: str, state: State, reader: PlainReader) -> tuple[tuple[MissionStep, ...], State]:
     """Where it is to be waited, and going there."""
     if _WAITING.here.fullmatch(where):
         return (), state
@@ -89,29 +97,29 @@ def _gone(where: str, state: State, leaves: Leaves) -> tuple[tuple[MissionStep, 
         raise RefusalError(f"I do not understand where to wait: '{where}'", [where])
     if match["there"] and state.goal is not None and state.at is not None:
         return (), state
-    leaf = leaves.going(match["place"] or match["there"], state)
-    return (MissionStep(leaf.commands),), leaf.state
+    reading = reader.go_to(match["place"] or match["there"], state)
+    return (MissionStep(reading.commands),), reading.state
 
 
-def _awaited(what: str, state: State, leaves: Leaves) -> tuple[tuple[MissionStep, ...], State, Supposed]:
+def _awaited(what: str, state: State, reader: PlainReader) -> tuple[tuple[MissionStep, ...], State, Supposed]:
     """What "wait for ..." waits for, and going there where a place is said."""
     if (match := _WAITING.button.fullmatch(what)) is not None:
-        return (), state, pressed(match["button"] or match["of"], what, state)
-    if " to " in what and (found := reading(what, state, leaves)) is not None:
+        return (), state, button_condition(match["button"] or match["of"], what, state)
+    if " to " in what and (found := usual_condition(what, state, reader)) is not None:
         return (), state, found
-    if (match := _WAITING.person_at.fullmatch(what)) is not None and leaves.somebody(match["who"], state):
-        leaf = leaves.going(match["where"], state)
-        found = meeting(match["who"], None, what, leaf.state, leaves)
-        return (MissionStep(leaf.commands),), leaf.state, found
-    if leaves.somebody(what, state):
-        return (), state, meeting(what, None, what, state, leaves)
+    if (match := _WAITING.person_at.fullmatch(what)) is not None and reader.is_somebody(match["who"], state):
+        reading = reader.go_to(match["where"], state)
+        found = meeting(match["who"], None, what, reading.state, reader)
+        return (MissionStep(reading.commands),), reading.state, found
+    if reader.is_somebody(what, state):
+        return (), state, meeting(what, None, what, state, reader)
     raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
 
 
 _FULL: Final = 0.99
 
 
-def charged(text: str, state: State) -> Done | None:
+def charging_in(text: str, state: State) -> Done | None:
     """Charging up to a level; None where no level is said."""
     match = _WAITING.charge.fullmatch(text)
     if match is None:
@@ -153,7 +161,7 @@ class Asked:
     yes_or_no: bool = False
 
 
-def said_by(text: str, knowledge: Knowledge, parser: DependencyParser) -> Said | None:
+def speech_in(text: str, knowledge: Knowledge, parser: DependencyParser) -> Said | None:
     """What a clause asks to say; None where it asks for nothing of that kind.
 
     Raises RefusalError: what it asks to say cannot be said for somebody else, or to nobody who is known.
@@ -174,7 +182,7 @@ def said_by(text: str, knowledge: Knowledge, parser: DependencyParser) -> Said |
     return _relayed(text, forms, parser)
 
 
-def said_to(who: str, text: str, knowledge: Knowledge) -> Said:
+def speech_to(who: str, text: str, knowledge: Knowledge) -> Said:
     """Telling somebody something. Raises RefusalError: nobody of that name is known, or it cannot be said for them."""
     match = _of_world(knowledge).who.fullmatch(who)
     if match is None:
@@ -270,7 +278,7 @@ def _listener(match: re.Match[str]) -> Listener:
     return Listener(who, where, name=who)
 
 
-def asked_of(text: str, knowledge: Knowledge) -> Asked | None:
+def question_in(text: str, knowledge: Knowledge) -> Asked | None:
     """The question that a clause asks to put to somebody; None where it is none.
 
     Raises RefusalError: it is none that the robot can put.
@@ -307,7 +315,7 @@ def _what(match: re.Match[str], text: str, knowledge: Knowledge) -> Asked:
     return Asked(spoken, _listener(match), tuple(f"a {name}" for name in names))
 
 
-def bare(choice: str) -> str:
+def without_article(choice: str) -> str:
     """The choice without its article."""
     return re.sub(r"^(?:a|an|some|the|any|another) ", "", choice, flags=re.IGNORECASE)
 
@@ -317,32 +325,32 @@ def serves_all(text: str) -> bool:
     return ACTS.gives.match(text) is not None and ACTS.everyone.search(text) is not None
 
 
-def for_everyone(text: str, state: State, leaves: Leaves) -> tuple[tuple[MissionStep, ...], State] | None:
+def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[tuple[MissionStep, ...], State] | None:
     """A step for each person to whom something is brought; None where it is brought to nobody of that kind.
 
     Raises RefusalError: it does not say in which room, nobody is known to be there, or there is only one of the thing.
     """
-    trace = leaves.actions(text, state)
+    trace = reader.actions_of(text, state)
     to = next((one.goal for one in trace.actions if one.goal is not None and _all_people(one.goal)), None)
     if to is None or to.phrase is None:
         return None
     who = to.phrase.spoken
     if to.within is None:
         raise RefusalError(f"I bring things to one person at a time, not to {who}; name one, or a room", [who])
-    room, knowledge = leaves.room_of(to.within, state), leaves.knowledge
+    room, knowledge = reader.room_of(to.within, state), reader.knowledge
     people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
     if not people:
         raise RefusalError(f"I know nobody in the {room} to bring anything to: {who}", [who])
     steps: list[MissionStep] = []
     begun = state
     for name in people:
-        person = Location(named(name, NounKind.PERSON), "to", to.within)
+        person = Location(phrase_of_name(name, NounKind.PERSON), "to", to.within)
         actions = [replace(one, goal=person) if one.goal == to else one for one in trace.actions]
-        leaf = leaves.acted(trace, actions, begun)
-        if any(action.target is not None and not action.target.indefinite for action in leaf.trace.resolved):
+        reading = reader.commands_of_actions(trace, actions, begun)
+        if any(action.target is not None and not action.target.indefinite for action in reading.trace.resolved):
             raise RefusalError(f"there is one of it, and I cannot bring it to {who}", [who])
-        steps.append(MissionStep(leaf.commands))
-        begun = replace(leaf.state, memory=state.memory)
+        steps.append(MissionStep(reading.commands))
+        begun = replace(reading.state, memory=state.memory)
     return tuple(steps), begun
 
 
@@ -350,17 +358,17 @@ def _all_people(goal: Location) -> bool:
     return goal.phrase is not None and ACTS.everyone.fullmatch(goal.phrase.spoken) is not None
 
 
-def everywhere(text: str, state: State, leaves: Leaves) -> Leaf | None:
+def search_everywhere(text: str, state: State, reader: PlainReader) -> PlainReading | None:
     """A look over all rooms; None where the text asks for none. Raises RefusalError: for what is unclear."""
     match = next((found for form in ACTS.each("looks") if (found := form.fullmatch(text)) is not None), None)
-    return None if match is None else look_for(match["what"], state, leaves)
+    return None if match is None else search_for(match["what"], state, reader)
 
 
-def look_for(what: str, state: State, leaves: Leaves) -> Leaf:
+def search_for(what: str, state: State, reader: PlainReader) -> PlainReading:
     """Looking for something or somebody wherever they may be. Raises RefusalError."""
-    leaf = leaves.leaf(what, state, (verb("find"),))
-    finds = [command for command in leaf.commands if command.task is Task.FIND]
-    if len(finds) != len(leaf.commands) or re.search(r"\b(?:in|on|at|near)\b", what):
+    reading = reader.commands_of(what, state, (verb("find"),))
+    finds = [command for command in reading.commands if command.task is Task.FIND]
+    if len(finds) != len(reading.commands) or re.search(r"\b(?:in|on|at|near)\b", what):
         raise RefusalError(f"I cannot look for {listing([what])} in every room", [what])
     commands = tuple(replace(command, goal=None, goal_at=None) for command in finds)
-    return replace(leaf, commands=commands, state=replace(leaf.state, goal=None, at=None))
+    return replace(reading, commands=commands, state=replace(reading.state, goal=None, at=None))

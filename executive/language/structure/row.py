@@ -10,7 +10,7 @@ from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, spoke
 from executive.language.lexicon import VerbKind
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE
-from executive.language.structure.leaves import Leaf, Leaves, State, Supposed, negated
+from executive.language.structure.plain import PlainReader, PlainReading, State, Supposed, contrary
 from executive.language.structure.requests import Done, template
 from executive.words.blocks import Block, Repeat, Speak
 from executive.words.command import Command, Task
@@ -87,10 +87,10 @@ def _after_all(clause: Clause, first: bool) -> bool:
 
 def same(one: Condition, other: Condition) -> bool:
     """Whether they look at the same, whatever the verb was."""
-    return written_condition(one) in (written_condition(other), written_condition(negated(other)))
+    return written_condition(one) in (written_condition(other), written_condition(contrary(other)))
 
 
-def turned(supposed: Supposed) -> Supposed:
+def contrary_of(supposed: Supposed) -> Supposed:
     """The contrary, with what is known then."""
     return replace(supposed.denied(f"not {supposed.said}"), told=False)
 
@@ -102,7 +102,7 @@ def sentence_of(supposed: Supposed) -> str | None:
     return said if said and plain else None
 
 
-def merged(one: State, other: State) -> State:
+def state_behind_both(one: State, other: State) -> State:
     """What is known behind two branches."""
     held = one.held if one.held == other.held else None
     goal = one.goal if one.goal == other.goal else None
@@ -110,27 +110,29 @@ def merged(one: State, other: State) -> State:
     return replace(one, held=held, goal=goal, at=at)
 
 
-def one_errand(leaf: Leaf) -> bool:
+def one_errand(reading: PlainReading) -> bool:
     """Whether the commands are all about one thing, or only go somewhere and back."""
-    things = {str(thing) for command in leaf.commands for thing in (command.item, command.object) if thing is not None}
-    going = [action for action in leaf.trace.resolved if action.kind is VerbKind.GO]
-    bare_goes = [command for command in leaf.commands if command.item is None and command.task is None]
+    things = {
+        str(thing) for command in reading.commands for thing in (command.item, command.object) if thing is not None
+    }
+    going = [action for action in reading.trace.resolved if action.kind is VerbKind.GO]
+    bare_goes = [command for command in reading.commands if command.item is None and command.task is None]
     if not bare_goes:
         return len(things) == 1
     back = going[-1].goal == HERE if going else False
     return not things and len(bare_goes) <= 2 and back
 
 
-def asked_by(leaf: Leaf, before: State, leaves: Leaves) -> LookedAt | None:
+def looked_at_by(reading: PlainReading, before: State, reader: PlainReader) -> LookedAt | None:
     """What the last command looked at, or takes."""
-    last = leaf.commands[-1] if leaf.commands else None
-    taken = next((c for c in reversed(leaf.commands) if c.task is Task.GRASP), None)
-    memory = leaf.state.memory
+    last = reading.commands[-1] if reading.commands else None
+    taken = next((c for c in reversed(reading.commands) if c.task is Task.GRASP), None)
+    memory = reading.state.memory
     if last is not None and last.task is Task.FIND:
-        looks = [c for c in leaf.commands if c.task is Task.FIND]
-        others = leaf.commands[: -len(looks)]
+        looks = [c for c in reading.commands if c.task is Task.FIND]
+        others = reading.commands[: -len(looks)]
         conditions = tuple(map(Look, looks))
-        known = leaves.seen(leaf, leaf.state)
+        known = reader.state_if_seen(reading, reading.state)
         fails = replace(known, memory=replace(known.memory, where=None, told=before.memory.told))
         condition: Condition = conditions[0] if len(conditions) == 1 else AllOf(conditions)
         steps = (MissionStep(others),) if others else ()
@@ -141,9 +143,9 @@ def asked_by(leaf: Leaf, before: State, leaves: Leaves) -> LookedAt | None:
         Command(goal=taken.goal, task=Task.FIND, object=taken.object, object_count=taken.object_count, verb="find")
     )
     fails = replace(
-        leaf.state, memory=replace(memory, where=None, told=before.memory.told), held=None, goal=None, at=None
+        reading.state, memory=replace(memory, where=None, told=before.memory.told), held=None, goal=None, at=None
     )
-    return LookedAt(Supposed(look, "", leaf.state, fails), looked=False)
+    return LookedAt(Supposed(look, "", reading.state, fails), looked=False)
 
 
 def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
@@ -158,7 +160,7 @@ def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
     return replace(supposed, condition=Not(there) if isinstance(condition, Not) else there)
 
 
-def checked(text: str) -> str | None:
+def checked_statement(text: str) -> str | None:
     """What is checked, as a statement: "is the door open" becomes "the door is open"."""
     match = ACTS.checked.fullmatch(text)
     if match is None:
@@ -206,8 +208,8 @@ class Base:
     told: str | None = None
     verb: str | None = None
 
-    def __init__(self, leaves: Leaves) -> None:
-        self.leaves = leaves
+    def __init__(self, reader: PlainReader) -> None:
+        self.reader = reader
         self.notes: list[str] = []
         self.special = False
 
@@ -220,23 +222,23 @@ class Base:
         if not row.plain:
             return
         last = row.plain[-1].text
-        leaf, row.plain = self.plain_leaf(row.plain, row.state), []
-        self.add(row, leaf)
+        reading, row.plain = self.read_together(row.plain, row.state), []
+        self.add(row, reading)
         if row.asked is not None and row.asked.looked:
             there = re.sub(r"^(?:is|are) there ", "there is ", last, flags=re.IGNORECASE)
-            said = checked(last) or (there if there != last else "")
+            said = checked_statement(last) or (there if there != last else "")
             row.asked = replace(row.asked, supposed=replace(row.asked.supposed, said=said))
 
-    def plain_leaf(self, clauses: Sequence[Clause], state: State) -> Leaf:
+    def read_together(self, clauses: Sequence[Clause], state: State) -> PlainReading:
         """What clauses that are plain commands ask for together."""
-        return self.leaves.leaf(spoken([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead)
+        return self.reader.commands_of(spoken([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead)
 
-    def add(self, row: Row, leaf: Leaf) -> None:
+    def add(self, row: Row, reading: PlainReading) -> None:
         """Put what a plain part asks for."""
-        self.notes += leaf.trace.notes
-        row.steps += [MissionStep(leaf.commands)] if leaf.commands else []
-        before, row.state = row.state, leaf.state
-        row.asked = asked_by(leaf, before, self.leaves)
+        self.notes += reading.trace.notes
+        row.steps += [MissionStep(reading.commands)] if reading.commands else []
+        before, row.state = row.state, reading.state
+        row.asked = looked_at_by(reading, before, self.reader)
 
     def put(self, row: Row, block: Block, state: State) -> None:
         """Put a block; `state` is what is known behind it."""

@@ -17,23 +17,23 @@ from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.structure.branches import Branches
 from executive.language.structure.conditions import suppose
-from executive.language.structure.leaves import Leaves, State, at_start, named, placed, verb
+from executive.language.structure.plain import PlainReader, State, at_start, behind_preposition, phrase_of_name, verb
 from executive.language.structure.requests import (
     Asked,
     Listener,
-    asked_of,
-    bare,
-    charged,
-    everywhere,
+    charging_in,
     for_everyone,
-    look_for,
-    said_by,
-    said_to,
+    question_in,
+    search_everywhere,
+    search_for,
     serves_all,
+    speech_in,
+    speech_to,
     template,
-    waited,
+    wait_in,
+    without_article,
 )
-from executive.language.structure.row import LookedAt, Row, Steps, checked, end_of, sentence_of
+from executive.language.structure.row import LookedAt, Row, Steps, checked_statement, end_of, sentence_of
 from executive.words.blocks import Ask, Check, Choose, Repeat, Speak, Together, Try, Wait, steps_of
 from executive.words.command import Task
 from executive.words.condition import Look
@@ -81,7 +81,7 @@ class Builder(Branches):
         if clause.begins and not _tells_only(row.plain):
             self.settle(row)
         if self.verb is not None and at == 0 and ACTS.no_verb.match(clause.text):
-            clause = replace(clause, lead=self.leaves.read(self.verb))
+            clause = replace(clause, lead=self.reader.items_of(self.verb))
             clauses = [clause, *clauses[1:]]
         text = clause.text
         self.verb = match[0] if (match := ACTS.giving.match(text)) is not None else self.verb
@@ -120,7 +120,7 @@ class Builder(Branches):
         if row.plain and not re.search(r"\b(?:until|till|for|while|as long as|to)\b", text, re.IGNORECASE):
             return None
         state = self.known(row)
-        done = charged(text, state) or waited(text, state, self.leaves)
+        done = charging_in(text, state) or wait_in(text, state, self.reader)
         if done is None:
             return None
         self.flush(row)
@@ -131,13 +131,13 @@ class Builder(Branches):
         """What is known behind the clauses that are still to be understood."""
         if not row.plain:
             return row.state
-        return self.plain_leaf(row.plain, row.state).state
+        return self.read_together(row.plain, row.state).state
 
     def _says(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
         clause = clauses[at]
         if (match := ACTS.tells_when.fullmatch(clause.text)) is not None:
             return self._tells_when(row, match, at)
-        if not ACTS.speaks.match(clause.text) or _asks_back(clause.text, self.leaves):
+        if not ACTS.speaks.match(clause.text) or _asks_back(clause.text, self.reader):
             return None
         if (everywhere_said := ACTS.says_everywhere.fullmatch(clause.text)) is not None:
             self._in_each(row, replace(clause, joint="", text=everywhere_said[1]))
@@ -146,7 +146,7 @@ class Builder(Branches):
         if found is not None and not _spoken_of(found, clause.text):
             self.modified(row, clause, found)
             return at + 1
-        said = said_by(clause.text, self.leaves.knowledge, self.leaves.parser)
+        said = speech_in(clause.text, self.reader.knowledge, self.reader.parser)
         if said is None:
             return None
         text = said.text if said.text is not None else self.told
@@ -160,12 +160,12 @@ class Builder(Branches):
     def _tells_when(self, row: Row, match: re.Match[str], at: int) -> int:
         """ "Tell me when Robin comes" waits for that, and then tells it."""
         self.flush(row)
-        supposed = suppose(match["what"], row.state, self.leaves)
+        supposed = suppose(match["what"], row.state, self.reader)
         told = sentence_of(supposed)
         if told is None:
             raise RefusalError(f"what am I to say in '{match[0]}'?", [match[0]])
         self.put(row, Wait(supposed.condition), supposed.holds)
-        said = said_to(match["who"], told, self.leaves.knowledge)
+        said = speech_to(match["who"], told, self.reader.knowledge)
         self._to(row, said.to)
         self.put(row, Speak(Template(template(said.text or told))), row.state)
         return at + 1
@@ -175,16 +175,18 @@ class Builder(Branches):
         if listener is None or not (listener.who or listener.where):
             return
         if listener.speaker:
-            leaf = self.leaves.done((verb("come"), Adverb(here=True)), row.state)
+            reading = self.reader.commands_of_items((verb("come"), Adverb(here=True)), row.state)
         else:
-            who = placed(self.leaves.read(listener.who), "to") if listener.who else ()
-            where = self.leaves.read(listener.where) if listener.where else ()
-            leaf = self.leaves.done((verb("go"), *who, *placed(where, "in" if who else "to")), row.state)
-        if leaf.commands[-1].goal != row.state.goal or leaf.commands[-1].goal_at is not None:
-            self.add(row, leaf)
+            who = behind_preposition(self.reader.items_of(listener.who), "to") if listener.who else ()
+            where = self.reader.items_of(listener.where) if listener.where else ()
+            reading = self.reader.commands_of_items(
+                (verb("go"), *who, *behind_preposition(where, "in" if who else "to")), row.state
+            )
+        if reading.commands[-1].goal != row.state.goal or reading.commands[-1].goal_at is not None:
+            self.add(row, reading)
 
     def _asks(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
-        asked = asked_of(_of_whom(clauses[at].text, row.state), self.leaves.knowledge)
+        asked = question_in(_of_whom(clauses[at].text, row.state), self.reader.knowledge)
         if asked is None:
             return None
         self.flush(row)
@@ -222,7 +224,7 @@ class Builder(Branches):
 
     def _chosen(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
         """What is done for each of the choices: it is brought, where that was said."""
-        names = [bare(choice) for choice in asked.choices]
+        names = [without_article(choice) for choice in asked.choices]
         if at >= len(clauses) or clauses[at].kind is not None or not _brings(clauses[at]):
             return dict.fromkeys(names, ()), at
         brings = replace(clauses[at], joint="")
@@ -231,20 +233,20 @@ class Builder(Branches):
 
     def _choosing(self, asked: Asked, number: int, state: State) -> State:
         """What is known behind the answer: "it" is what was chosen, and is given to who was asked."""
-        things = tuple(item.phrase for item in self.leaves.read(asked.choices[number]) if isinstance(item, Chunk))
-        person = Location(named(asked.of.name or "", NounKind.PERSON), "to")
+        things = tuple(item.phrase for item in self.reader.items_of(asked.choices[number]) if isinstance(item, Chunk))
+        person = Location(phrase_of_name(asked.of.name or "", NounKind.PERSON), "to")
         memory = replace(state.memory, things=things, gathered=things, where=None, person=person)
         return replace(state, memory=memory, recipient=person)
 
     def _checks(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
         """ "Look whether the door is open", "is the battery low": what only blocks can check."""
-        text = checked(clauses[at].text)
+        text = checked_statement(clauses[at].text)
         if text is None:
             return None
         state = self.known(row)
         found = behind(text)
         try:
-            self.leaves.leaf(clauses[at].text, state)
+            self.reader.commands_of(clauses[at].text, state)
         except RefusalError as refusal:
             plain = refusal
         else:
@@ -252,7 +254,7 @@ class Builder(Branches):
         if found is not None:
             return None
         try:
-            supposed = suppose(text, state, self.leaves)
+            supposed = suppose(text, state, self.reader)
         except RefusalError as refusal:
             said = refusal.question is not None or refusal.kind is RefusalKind.NO_SUCH_DOOR
             raise (refusal if said else plain) from None
@@ -266,7 +268,7 @@ class Builder(Branches):
     def _everyone(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
         if not serves_all(clauses[at].text):
             return None
-        done = for_everyone(clauses[at].text, self.known(row), self.leaves)
+        done = for_everyone(clauses[at].text, self.known(row), self.reader)
         if done is None:
             return None
         self.flush(row)
@@ -278,30 +280,30 @@ class Builder(Branches):
         text = clauses[at].text
         if not ACTS.every_room.search(text):
             return None
-        leaf, end = everywhere(text, self.known(row), self.leaves), at + 1
+        reading, end = search_everywhere(text, self.known(row), self.reader), at + 1
         follow = clauses[at + 1].text if at + 1 < len(clauses) and clauses[at + 1].kind is None else ""
-        if leaf is None and ACTS.goes_everywhere.fullmatch(text) is not None:
+        if reading is None and ACTS.goes_everywhere.fullmatch(text) is not None:
             if (match := ACTS.what_there.fullmatch(follow)) is not None:
                 what = next(filter(None, match.groups()))
-                leaf, end = look_for(what, self.known(row), self.leaves), at + 2
+                reading, end = search_for(what, self.known(row), self.reader), at + 2
             elif ACTS.speaks.match(follow) and behind(follow) is None:
                 self._in_each(row, replace(clauses[at + 1], joint=""))
                 return at + 2
-        if leaf is None:
+        if reading is None:
             return None
         self.flush(row)
-        self.add(row, leaf)
+        self.add(row, reading)
         self.special = True
         return end
 
     def _in_each(self, row: Row, says: Clause) -> None:
         """Say something in every room."""
         self.flush(row)
-        for room in self.leaves.knowledge.places:
-            there = Chunk(named(room, NounKind.PLACE), "to", PrepositionRole.GOAL)
-            leaf = self.leaves.done((verb("go"), there), replace(row.state, goal=None))
-            said, row.state = self.sequence([says], leaf.state)
-            row.steps += [MissionStep(leaf.commands), *said]
+        for room in self.reader.knowledge.places:
+            there = Chunk(phrase_of_name(room, NounKind.PLACE), "to", PrepositionRole.GOAL)
+            reading = self.reader.commands_of_items((verb("go"), there), replace(row.state, goal=None))
+            said, row.state = self.sequence([says], reading.state)
+            row.steps += [MissionStep(reading.commands), *said]
         row.asked = None
 
 
@@ -318,7 +320,7 @@ def _is_reported(text: str) -> bool:
     return re.fullmatch(CLAUSES.reported.pattern + more, text, re.IGNORECASE) is not None
 
 
-def _asks_back(text: str, leaves: Leaves) -> bool:
+def _asks_back(text: str, reader: PlainReader) -> bool:
     """Whether it asks the robot for something: "tell me where the hammer is", "let me know whether ..."."""
     return (
         re.match(
@@ -379,7 +381,7 @@ def structured(
         return None
     if len(clauses) > MOST_CLAUSES:
         raise RefusalError(f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most")
-    builder = Builder(Leaves(parser, knowledge))
+    builder = Builder(PlainReader(parser, knowledge))
     steps, state = builder.sequence(clauses, at_start(knowledge, memory or Memory()))
     if all(step.block is None for step in steps) and not builder.special:
         return None

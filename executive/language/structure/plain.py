@@ -23,7 +23,18 @@ from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
 from executive.words.geometry import inside
 from executive.words.knowledge import Knowledge
 
-__all__ = ["IT", "Leaf", "Leaves", "State", "Supposed", "at_start", "named", "negated", "placed", "verb"]
+__all__ = [
+    "IT",
+    "PlainReader",
+    "PlainReading",
+    "State",
+    "Supposed",
+    "at_start",
+    "behind_preposition",
+    "contrary",
+    "phrase_of_name",
+    "verb",
+]
 
 _LEFT_OUT: Final = frozenset({"not", "n't", "but", "except", "instead", "rather", "neither", "nor"})
 SEES: Final = "I can see whether something or somebody is somewhere"
@@ -64,11 +75,11 @@ class Supposed:
 
     def denied(self, said: str) -> Supposed:
         """The contrary, as it is said."""
-        return Supposed(negated(self.condition), said, self.fails, self.holds, self.notes, items=self.items)
+        return Supposed(contrary(self.condition), said, self.fails, self.holds, self.notes, items=self.items)
 
 
 @dataclass(frozen=True)
-class Leaf:
+class PlainReading:
     """A plain part: its commands, what is known behind it, and how it was understood."""
 
     commands: tuple[Command, ...]
@@ -76,7 +87,7 @@ class Leaf:
     trace: Trace
 
 
-def negated(condition: Condition) -> Condition:
+def contrary(condition: Condition) -> Condition:
     """The contrary."""
     return condition.part if isinstance(condition, Not) else Not(condition)
 
@@ -93,14 +104,14 @@ def verb(text: str) -> Verb:
     return Verb(text, lexicon().verbs[tuple(text.split())])
 
 
-def named(name: str, kind: NounKind) -> Phrase:
+def phrase_of_name(name: str, kind: NounKind) -> Phrase:
     """The noun phrase of a name that the world knows."""
     entity = "PERSON" if kind is NounKind.PERSON else ""
     pos, tag = ("PROPN", "NNP") if entity else ("NOUN", "NN")
     return Phrase((Token(0, 0, name, name.lower(), pos, tag, 0, "obl", entity, kind, known=True),))
 
 
-def placed(items: Sequence[Item], preposition: str) -> tuple[Item, ...]:
+def behind_preposition(items: Sequence[Item], preposition: str) -> tuple[Item, ...]:
     """Items whose first noun phrase stands behind a preposition; "there" needs none."""
     at = next((n for n, item in enumerate(items) if isinstance(item, Chunk | Adverb)), None)
     first = None if at is None else items[at]
@@ -116,7 +127,7 @@ _THERE_IS: Final = Being("there is", existential=True, asked=False)
 
 
 @dataclass(frozen=True)
-class Leaves:
+class PlainReader:
     """Understands plain parts in one world."""
 
     parser: DependencyParser
@@ -126,37 +137,37 @@ class Leaves:
     def _steps(self) -> Steps:
         return Steps(self.parser, self.knowledge)
 
-    def leaf(self, text: str, state: State, lead: Sequence[Item] = ()) -> Leaf:
+    def commands_of(self, text: str, state: State, lead: Sequence[Item] = ()) -> PlainReading:
         """What a plain part asks for, behind the items `lead`. Raises RefusalError: it leaves something open."""
         part = Part(tuple(lead), elliptic=True, recipient=state.recipient)
-        return self._leaf(self._steps.trace(text, state.memory, part), state)
+        return self._reading(self._steps.trace(text, state.memory, part), state)
 
-    def done(self, items: Sequence[Item], state: State, tokens: Sequence[Token] = ()) -> Leaf:
+    def commands_of_items(self, items: Sequence[Item], state: State, tokens: Sequence[Token] = ()) -> PlainReading:
         """The same of items, and the words that they were read from. Raises RefusalError."""
         trace = Trace("", tokens=tuple(tokens), items=tuple(items), memory=state.memory)
-        return self._leaf(self._steps.rest(trace, behind="reading"), state)
+        return self._reading(self._steps.rest(trace, behind="reading"), state)
 
-    def acted(self, trace: Trace, actions: Sequence[Action], state: State) -> Leaf:
+    def commands_of_actions(self, trace: Trace, actions: Sequence[Action], state: State) -> PlainReading:
         """The same of actions in the place of those of a trace. Raises RefusalError."""
         trace = replace(trace, actions=tuple(actions), memory=state.memory)
-        return self._leaf(self._steps.rest(trace, behind="understanding"), state)
+        return self._reading(self._steps.rest(trace, behind="understanding"), state)
 
-    def actions(self, text: str, state: State) -> Trace:
+    def actions_of(self, text: str, state: State) -> Trace:
         """What a plain part asks for up to its actions. Raises RefusalError."""
         return _unrefused(self._steps.trace(text, state.memory, Part(elliptic=True), upto="understanding"))
 
-    def _leaf(self, trace: Trace, state: State) -> Leaf:
+    def _reading(self, trace: Trace, state: State) -> PlainReading:
         commands = _without_taking(_unrefused(trace).commands, state.held)
-        return Leaf(commands, self._after(commands, trace.memory, state), trace)
+        return PlainReading(commands, self._after(commands, trace.memory, state), trace)
 
-    def read(self, text: str) -> tuple[Item, ...]:
+    def items_of(self, text: str) -> tuple[Item, ...]:
         """The items of some words. Raises RefusalError."""
         return _unrefused(self._steps.trace(text, upto="reading")).items
 
-    def going(self, text: str, state: State) -> Leaf:
+    def go_to(self, text: str, state: State) -> PlainReading:
         """Going to a place that is spoken of in a noun phrase, or "there". Raises RefusalError."""
-        items = (Adverb(here=False),) if text.lower() == "there" else self.read(text)
-        return self.done((verb("go"), *placed(items, "to")), state)
+        items = (Adverb(here=False),) if text.lower() == "there" else self.items_of(text)
+        return self.commands_of_items((verb("go"), *behind_preposition(items, "to")), state)
 
     def check(self, text: str, state: State, lead: Sequence[Item] = (), *, said: str | None = None) -> Supposed:
         """Whether what the text states, or denies, is so; `said` says more of it. Raises RefusalError."""
@@ -166,7 +177,7 @@ class Leaves:
         words = [token.word for token in read.tokens if token.index not in read.affirmed.silent]
         if (left_out := next((word for word in words if word in _LEFT_OUT), None)) is not None:
             raise RefusalError(f"I cannot see whether '{said or text}'; say it without '{left_out}'", [said or text])
-        found = self.looked(read.items, said or text, state, read.tokens)
+        found = self.look_by_items(read.items, said or text, state, read.tokens)
         return found.denied(said or text) if read.affirmed.denied else found
 
     def exists(self, what: str, text: str, state: State) -> Supposed:
@@ -175,34 +186,36 @@ class Leaves:
 
     def it_is_there(self, text: str, state: State) -> Supposed:
         """Whether a thing that was spoken of is where that was. Raises RefusalError."""
-        return self.looked((verb("check"), Whether(), IT, _IS, Adverb(here=False)), text, state)
+        return self.look_by_items((verb("check"), Whether(), IT, _IS, Adverb(here=False)), text, state)
 
     def anything_on(self, place: str, text: str, state: State) -> Supposed:
         """Whether anything lies in a place. Raises RefusalError."""
-        return self.looked((verb("find"), Chunk(OBJECTS), *placed(self.read(place), "on")), text, state)
+        return self.look_by_items(
+            (verb("find"), Chunk(OBJECTS), *behind_preposition(self.items_of(place), "on")), text, state
+        )
 
     def look(self, who: str, room: str, text: str, state: State) -> Supposed:
         """Whether somebody is in a room. Raises RefusalError."""
-        where = Chunk(named(room, NounKind.PLACE), "in", PrepositionRole.AT)
-        return self.looked((verb("check"), Whether(), *self.read(who), _IS, where), text, state)
+        where = Chunk(phrase_of_name(room, NounKind.PLACE), "in", PrepositionRole.AT)
+        return self.look_by_items((verb("check"), Whether(), *self.items_of(who), _IS, where), text, state)
 
-    def looked(self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()) -> Supposed:
+    def look_by_items(self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()) -> Supposed:
         """The condition that the looks of some items make; `text` says it. Raises RefusalError: they are no looks."""
         try:
-            leaf = self.done([self._by_name(item, state) for item in items], state, tokens)
+            reading = self.commands_of_items([self._by_name(item, state) for item in items], state, tokens)
         except RefusalError as refusal:
             if refusal.kind is not RefusalKind.NOT_UNDERSTOOD:
                 raise
             raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text]) from None
-        if any(action.choices for action in leaf.trace.actions):
+        if any(action.choices for action in reading.trace.actions):
             raise RefusalError(f"I cannot tell which of them is meant in '{text}'", [text])
-        looks = tuple(Look(command) for command in leaf.commands if command.task is Task.FIND)
-        if not looks or len(looks) != len(leaf.commands):
+        looks = tuple(Look(command) for command in reading.commands if command.task is Task.FIND)
+        if not looks or len(looks) != len(reading.commands):
             raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text])
-        known = self.seen(leaf, replace(state, goal=leaf.state.goal, at=leaf.state.at))
+        known = self.state_if_seen(reading, replace(state, goal=reading.state.goal, at=reading.state.at))
         fails = replace(known, memory=replace(known.memory, where=None, told=state.memory.told))
         condition = looks[0] if len(looks) == 1 else AllOf(looks)
-        return Supposed(condition, text, known, fails, leaf.trace.notes, items=tuple(items))
+        return Supposed(condition, text, known, fails, reading.trace.notes, items=tuple(items))
 
     def _by_name(self, item: Item, state: State) -> Item:
         """The person who was spoken of in place of "he"."""
@@ -215,20 +228,22 @@ class Leaves:
     def room_of(self, place: Location, state: State) -> str:
         """The room of a place that was read. Raises RefusalError."""
         assert place.phrase is not None
-        return self._room(self.done((verb("go"), Chunk(place.phrase, "to", PrepositionRole.GOAL)), state), place.text)
+        return self._room(
+            self.commands_of_items((verb("go"), Chunk(place.phrase, "to", PrepositionRole.GOAL)), state), place.text
+        )
 
     def room(self, text: str, state: State) -> str:
         """The room of a place as it is spoken. Raises RefusalError."""
-        return self._room(self.going(text, state), text)
+        return self._room(self.go_to(text, state), text)
 
-    def _room(self, leaf: Leaf, text: str) -> str:
-        first, *more = leaf.commands
+    def _room(self, reading: PlainReading, text: str) -> str:
+        first, *more = reading.commands
         goal = first.goal
         if more or first.item or first.task or goal is None or self.knowledge.place(goal) is None:
             raise RefusalError(f"'{text}' is no room", [text])
         return self.knowledge.room(goal)
 
-    def somebody(self, who: str, state: State) -> bool:
+    def is_somebody(self, who: str, state: State) -> bool:
         """Whether it is a known person, somebody who was spoken of, or anybody at all."""
         words = who.lower().removeprefix("a ").removeprefix("any ")
         if words in lexicon().anyone | lexicon().any_person or words in ("guest", "they"):
@@ -236,15 +251,15 @@ class Leaves:
         spoken_of = words in lexicon().somebody and state.memory.person is not None
         return spoken_of or self.knowledge.person(who) is not None
 
-    def seen(self, leaf: Leaf, state: State) -> State:
+    def state_if_seen(self, reading: PlainReading, state: State) -> State:
         """What is known when what was looked for is there."""
-        action = leaf.trace.resolved[-1]
-        memory = leaf.trace.memory
+        action = reading.trace.resolved[-1]
+        memory = reading.trace.memory
         target, where = action.target, action.source
         if target is None:
             return replace(state, memory=memory)
         told = memory.told if where is None else (*memory.told, (target, where))
-        sought = leaf.commands[-1].object
+        sought = reading.commands[-1].object
         somebody = sought is not None and self.knowledge.somebody(sought.name) is not None
         if somebody or target.person:
             known = sought is not None and self.knowledge.person(sought.name) is not None

@@ -206,8 +206,8 @@ def _named_robots(loaded: MissionFile | None, world: World, knowledge: Knowledge
 
 def _standing(request: Request, world: World, knowledge: Knowledge, ask: Answerer | None) -> Setting:
     """The setting with the only robot where the request has it. Raises InputError: it is not free there."""
-    start = None if request.start is None else request.start.pose
-    if start is not None:
+    start = request.start
+    if isinstance(start, Pose2D):
         refuse_blocked(world, start)
         world = replace(world, start=start)
         known = Pose(x=start.x_m, y=start.y_m, yaw=start.yaw_rad)

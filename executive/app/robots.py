@@ -104,7 +104,7 @@ def only_robot(
 ) -> PlacedRobot:
     """The only robot of a run, at the world's start or another, charging at the world's dock. Raises InputError."""
     pose = world.start if start is None else stand_at(world, start, seed)
-    return PlacedRobot(name, kind, pose, world.dock, stack, start is None or start.pose is not None)
+    return PlacedRobot(name, kind, pose, world.dock, stack, start != "unknown")
 
 
 def _dock(robot: RobotConfig, knowledge: Knowledge) -> Pose2D | None:
@@ -182,8 +182,8 @@ def stand_at(world: World, start: Start, seed: int) -> Pose2D:
 
     Raises InputError: there is nowhere.
     """
-    if start.pose is not None:
-        return start.pose
+    if isinstance(start, Pose2D):
+        return start
     from plant.worlds.placement import place_people
     from skills.estimate.grid_map import load_grid_map
 

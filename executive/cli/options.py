@@ -19,7 +19,7 @@ from typer.core import TyperCommand
 
 from executive.cli.number_options import quantity_option
 from executive.cli.output import refusals
-from executive.mission.request import Request, Start
+from executive.mission.request import Request, start_in
 from executive.words.option import Option
 from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
@@ -132,8 +132,14 @@ class _Typed:
         elif self.several:
             words = [*map(str, value)] if self.option.read is None else [",".join(map(str, value))]
         else:
-            words = [str(value.value if isinstance(value, enum.Enum) else value)]
+            words = [_text(value)]
         return [f"{self.names[0]}={word}" for word in words]
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, Pose2D):
+        return f"{value.x_m!r} {value.y_m!r} {value.yaw_rad!r}"
+    return str(value.value if isinstance(value, enum.Enum) else value)
 
 
 def _typed_fields(model: Any = Request, part: str = "") -> Iterator[_Typed]:
@@ -152,7 +158,8 @@ def _typed_fields(model: Any = Request, part: str = "") -> Iterator[_Typed]:
 
 def start_pose(text: str | None) -> Pose2D | None:
     """The pose in `X Y YAW`; None where none is said. Raises InputError."""
-    return None if text is None else Start.of(text).pose
+    start = None if text is None else start_in(text)
+    return start if isinstance(start, Pose2D) else None
 
 
 def request_arguments(request: Request) -> list[str]:

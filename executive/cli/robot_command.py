@@ -23,7 +23,7 @@ from executive.cli.keys import keys_pressed
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START
 from executive.cli.output import console_for, refusals
-from executive.mission.request import Start
+from executive.mission.request import start_in
 from executive.run.worker import LockStepWorker
 from executive.view.actions import Action, RefusedError
 from executive.view.feed import Feed
@@ -64,7 +64,7 @@ def teleop(
         if not _NAME.fullmatch(robot):
             raise InputError(f"'{robot[:60]}' is no name for a robot", hint="use letters and digits, as in Alice")
         opened = open_world(world)
-        placed = only_robot(robot, opened, seed=seed, start=None if start is None else Start.of(start))
+        placed = only_robot(robot, opened, seed=seed, start=None if start is None else start_in(start))
         if start is not None:
             refuse_blocked(opened, placed.start)
         from executive.app.simulated import compile_first

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import field, replace
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, TypeAdapter
 from pydantic.dataclasses import dataclass
@@ -23,32 +23,21 @@ from skills.files.plugins import installed_plugins
 from skills.quantities import LongDuration, QuantityError, Seed, clock_text
 from skills.robot import Pose2D
 
-__all__ = ["Request", "Start"]
-
-_UNKNOWN: Final = "unknown"
+__all__ = ["Request", "Start", "start_in"]
 
 
-@dataclass(frozen=True, config=ConfigDict(defer_build=True))
-class Start:
-    """Where the robot really stands, in place of the world's start.
+Start = Pose2D | Literal["unknown"]
+"""Where the robot really stands: a pose (world frame), or a free one that the seed chooses and that nobody tells it."""
 
-    Without a `pose`, it stands at a free pose that the seed chooses, and is not told where.
-    """
 
-    pose: Pose2D | None = None
-
-    def __str__(self) -> str:
-        return _UNKNOWN if self.pose is None else f"{self.pose.x_m!r} {self.pose.y_m!r} {self.pose.yaw_rad!r}"
-
-    @staticmethod
-    def of(text: str) -> Start:
-        """The start that `str` wrote, or a user. Raises InputError."""
-        if text == _UNKNOWN:
-            return Start()
-        try:
-            return Start(pose_in(text.split()))
-        except QuantityError as error:
-            raise InputError(f"--start {text[:60]}: {error.what}", hint=error.hint) from None
+def start_in(text: str) -> Start:
+    """The start in a text such as "1.5 2 0" (m, m, rad) or "unknown". Raises InputError."""
+    if text == "unknown":
+        return "unknown"
+    try:
+        return pose_in(text.split())
+    except QuantityError as error:
+        raise InputError(f"--start {text[:60]}: {error.what}", hint=error.hint) from None
 
 
 def _time_of_day(text: str) -> str:
@@ -141,7 +130,7 @@ class Request:
         Option(
             "Where the robot stands (m, rad); 'unknown' puts it anywhere, and it finds out where.",
             metavar="X Y YAW",
-            read=Start.of,
+            read=start_in,
         ),
     ] = None
     scenario: Scenario = NO_SCENARIO

@@ -6,7 +6,7 @@ import pytest
 
 from executive.app.prepare import prepare
 from executive.app.simulated import run_simulated
-from executive.mission.request import Request, Start
+from executive.mission.request import Request
 from skills.robot import Pose2D
 
 pytestmark = pytest.mark.mission
@@ -32,7 +32,7 @@ def test_a_door_that_bars_the_way_to_where_it_is_looked_at_is_found_closed(tmp_p
     request = Request(
         file=tmp_path / "look.yaml",
         scenario_files=(tmp_path / "closed.yaml",),
-        start=Start(Pose2D(5.2, 6.35, 1.57)),
+        start=Pose2D(5.2, 6.35, 1.57),
         out=tmp_path,
         record=False,
     )

@@ -8,7 +8,7 @@ import pytest
 
 from executive.app.prepare import prepare
 from executive.app.simulated import run_simulated
-from executive.mission.request import Request, Start
+from executive.mission.request import Request
 
 MISSION = Path(__file__).parents[2] / "missions" / "go_to_pose.yaml"
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.mission
 def test_it_finds_out_where_it_is_and_then_does_the_mission(localiser, tmp_path):
     stack = tmp_path / "stack.yaml"
     stack.write_text(f"localiser: {{use: {localiser}}}\n", encoding="utf-8")
-    request = Request(file=MISSION, seed=3, out=tmp_path, record=False, stack=stack, start=Start())
+    request = Request(file=MISSION, seed=3, out=tmp_path, record=False, stack=stack, start="unknown")
     report = run_simulated(prepare(request)).report
     assert report.achieved, (report.message, report.referee.why)
     assert report.referee.collisions == 0

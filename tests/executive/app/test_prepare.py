@@ -8,7 +8,7 @@ import pytest
 from executive.app.prepare import prepare
 from executive.app.worlds import open_world
 from executive.cli.wake_check import refuse_unaddressed
-from executive.mission.request import Request, Start
+from executive.mission.request import Request
 from executive.words.robots import RobotConfig
 from skills.files.errors import InputError
 from skills.robot import Pose2D
@@ -191,7 +191,7 @@ def test_parts_without_robots_are_refused(asked_file):
         asked_file(PARTS.replace("robots:\n  alice: spot\n  bob: fetch\n", ""))
 
 
-@pytest.mark.parametrize("own", [{"start": Start(Pose2D(2.0, 4.5, 0.0))}, {"stack": Path("stack.yaml")}])
+@pytest.mark.parametrize("own", [{"start": Pose2D(2.0, 4.5, 0.0)}, {"stack": Path("stack.yaml")}])
 def test_a_start_or_stack_for_one_robot_is_refused(own):
     with pytest.raises(InputError, match="are for a run with one robot"):
         prepare(Request("Hey Bob, go to the kitchen", robots=TWO, **own), ask=None)

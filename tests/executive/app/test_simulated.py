@@ -10,7 +10,6 @@ from executive.app import simulated
 from executive.app.robots import TURNING_M, shared_detector, stand_at
 from executive.app.simulated import compile_first
 from executive.app.worlds import refuse_blocked
-from executive.mission.request import Start
 from plant.worlds.placement import place_people
 from plant.worlds.world import load_world
 from skills.estimate.grid_map import load_grid_map
@@ -65,8 +64,8 @@ def test_a_model_that_cannot_be_used_is_named_before_anything_moves(tmp_path, co
 def test_an_unknown_start_is_free_ground_that_the_seed_chooses():
     world = load_world("flat")
     keepout = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
-    poses = [stand_at(world, Start(), seed) for seed in range(20)]
-    assert poses[3] == stand_at(world, Start(), 3)
+    poses = [stand_at(world, "unknown", seed) for seed in range(20)]
+    assert poses[3] == stand_at(world, "unknown", 3)
     assert len(set(poses)) == 20
     for seed, pose in enumerate(poses):
         here = np.array([[pose.x_m, pose.y_m]])

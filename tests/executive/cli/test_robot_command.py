@@ -15,7 +15,6 @@ from executive.app.worlds import open_world
 from executive.cli.entry import app
 from executive.cli.robot_command import TerminalKeys, context_for, page_actions, period
 from executive.mission.file.resolve import load_mission
-from executive.mission.request import Start
 from executive.view.actions import RefusedError
 from skills.arm.kinematics import arm_model
 from skills.files.errors import InputError
@@ -112,7 +111,7 @@ def test_the_plants_robot_is_driven_by_hand():
     """Half a metre ahead, the hand 10 cm up, the gripper closed; at rest half a second after the keys end."""
     world = open_world("flat")
     simulation = simulate(
-        world, {"Alice": only_robot("Alice", world, start=Start(Pose2D(5.2, 4.5, math.pi)))}, seed=1, record=False
+        world, {"Alice": only_robot("Alice", world, start=Pose2D(5.2, 4.5, math.pi))}, seed=1, record=False
     )
     robot = simulation.robots["Alice"]
     context = context_for(world, robot, simulation.clock, simulation.starts["Alice"])

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from py_trees.common import Status
 
-from executive.mission.request import Request, Start
+from executive.mission.request import Request
 from executive.mission.scenario import Scenario
 from executive.run.visitor import TickNote
 from executive.store.database import STORE_FILE
@@ -50,7 +50,7 @@ def test_a_simulated_world_is_kept_before_what_a_tick_brought_and_not_for_a_pose
         assert (kept, store.has_steps(mission)) == ([False], True)
 
 
-@pytest.mark.parametrize("start", [None, Start(), Start(Pose2D(1.25, -3.0, 0.1))])
+@pytest.mark.parametrize("start", [None, "unknown", Pose2D(1.25, -3.0, 0.1)])
 def test_a_mission_keeps_where_it_starts(path, start):
     request = replace(REQUEST, start=start)
     with MissionStore(path) as store:

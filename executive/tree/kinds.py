@@ -10,14 +10,11 @@ from py_trees.behaviour import Behaviour
 
 from executive.tree.behaviours import (
     answer,
-    aside,
     ask,
     blocks,
     composites,
     decisions,
     decorators,
-    fallen,
-    interrupts,
     leaves,
     policies,
     recovery,
@@ -26,6 +23,7 @@ from executive.tree.behaviours import (
 )
 from executive.tree.behaviours.context import RunContext
 from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.nodes import aside, fallen, interrupts
 
 __all__ = ["KINDS", "Changes", "build", "writes"]
 

@@ -11,8 +11,8 @@ from py_trees.common import Status
 
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import ExplainedLeaf
-from executive.tree.behaviours.fallen import floor_square
 from executive.tree.node import NodeKind
+from executive.tree.nodes.fallen import floor_square
 from skills.api import Cause, ObjectObservation, Surface
 from skills.quantities import Coordinate, Length
 from skills.robot import Pose2D

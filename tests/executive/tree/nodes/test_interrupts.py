@@ -7,8 +7,8 @@ from py_trees.common import Status
 from executive.tree.behaviours.composites import MemorySequence
 from executive.tree.behaviours.conditions import Waiting
 from executive.tree.behaviours.explained import Explained
-from executive.tree.behaviours.interrupts import Interrupt, Interrupts, Monitor
 from executive.tree.behaviours.skill_leaf import SkillLeaf
+from executive.tree.nodes.interrupts import Interrupt, Interrupts, Monitor
 from skills.api import Cause, Failed
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID

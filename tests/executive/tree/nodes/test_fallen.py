@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from py_trees.common import Status
 
-from executive.tree.behaviours.fallen import Fallen
+from executive.tree.nodes.fallen import Fallen
 from skills.api import Surface
 from skills.robot import Pose2D
 from skills.testing.blocks import Block

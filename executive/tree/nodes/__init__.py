@@ -1,0 +1,1 @@
+"""The nodes of trees by concept: how each is planned, and what it does."""

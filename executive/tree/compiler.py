@@ -11,10 +11,10 @@ from executive.tree.behaviours.decisions import buttons_of
 from executive.tree.compiling.assembly import StepPart, assemble, step_name
 from executive.tree.compiling.builder import PlanBuilder, Registry, start_key
 from executive.tree.compiling.doors import doorway
-from executive.tree.compiling.interrupts import watched
 from executive.tree.compiling.wiring import check_wiring
 from executive.tree.kinds import build
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.interrupts import watched
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.steps import Mission, MissionStep
@@ -29,7 +29,7 @@ class CompiledTree:
     """A mission's tree for one robot, as data; `parts` are its steps with their goal conditions, in order,
     `steps` what it was compiled from, and `doors` those of the world's knowledge.
 
-    Its root watches over the mission itself: see `executive.tree.compiling.interrupts`.
+    Its root watches over the mission itself: see `executive.tree.nodes.interrupts`.
     """
 
     robot_name: str

@@ -21,10 +21,10 @@ from executive.tree.compiling.decisions import (
     kind_in,
 )
 from executive.tree.compiling.doors import door_plan
-from executive.tree.compiling.interrupts import HANDLING, dock_plan
 from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.goals import command_goal, door_goal, held_goal
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.interrupts import HANDLING, dock_plan
 from executive.words.blocks import (
     Ask,
     Block,

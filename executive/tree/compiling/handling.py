@@ -12,7 +12,7 @@
 | grasping | PRECONDITION, EXECUTION | look again |
 | grasping | any, with the object in the gripper | draw it in: it is had |
 | tucking the arm in | the object was lost | look again, on the floor as well |
-| carrying | the object was lost | see `executive.tree.compiling.fallen` |
+| carrying | the object was lost | see `executive.tree.nodes.fallen` |
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from typing import Final
 from executive.tree.behaviours.board import BesideBoard, FromBoard, FromBoardOr, beside
 from executive.tree.behaviours.conditions import Holds
 from executive.tree.behaviours.recovery import Recovery
-from executive.tree.compiling.aside import can_move_aside, move_aside_plan
 from executive.tree.compiling.builder import PlanBuilder, after
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.aside import can_move_aside, move_aside_plan
 from executive.words.command import Thing
 from executive.words.geometry import inside
 from skills.api import Cause, Surface

@@ -10,9 +10,7 @@ from typing import Final
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import Holds, HoldsNothingElse
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
-from executive.tree.compiling.fallen import unless_fallen
 from executive.tree.compiling.handling import go_near_plan, held_plan, known_held_plan, pick_up_plan, tidied
-from executive.tree.compiling.interrupts import dock_plan
 from executive.tree.compiling.search import (
     look_plans,
     people_looks,
@@ -23,6 +21,8 @@ from executive.tree.compiling.search import (
     where,
 )
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.fallen import unless_fallen
+from executive.tree.nodes.interrupts import dock_plan
 from executive.words.command import START, TIME_UNITS_S, Task, Thing
 from executive.words.geometry import inside
 from executive.words.knowledge import ANYBODY, ANYTHING

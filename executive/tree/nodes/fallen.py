@@ -1,4 +1,12 @@
-"""Where an object lies that fell out of the gripper on the way."""
+"""Carrying, and what the robot does when the object falls: it looks on the floor and picks it up again.
+
+| what happened | how it is noticed | what is done |
+|---|---|---|
+| it slips | the gripper closes about it, or its force falls | it is gripped again more firmly, and carried on |
+| it slips on | the same once more | it is set down, gripped anew, and carried on |
+| it fell | the gripper is empty and has not opened | look where it fell, pick it up, carry it on |
+| it is not where it was put or handed over | the camera, the gripper | the same |
+"""
 
 from __future__ import annotations
 
@@ -10,17 +18,31 @@ from typing import Any, Final
 import numpy as np
 from py_trees.common import Status
 
+from executive.tree.behaviours.board import BesideBoard, FromBoard
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import ExplainedLeaf
-from executive.tree.node import NodeKind
+from executive.tree.behaviours.recovery import Recovery
+from executive.tree.compiling.builder import PlanBuilder, after
+from executive.tree.compiling.handling import LOOK_AGAIN_S, held_plan, pick_up_plan
+from executive.tree.compiling.search import detect_plan
+from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.nodes.aside import floor_square
+from executive.words.command import Thing
 from executive.words.geometry import distance_m
-from skills.api import FLOOR, Surface
+from skills.api import FLOOR, Cause, Surface
 from skills.geometry import compose
 from skills.quantities import Coordinate, Height
 from skills.robot import Pose2D
 
 _TURNS_RAD: Final = tuple(math.radians(turn) for turn in (0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180))
-_CORNERS: Final = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+LOST_WITHIN_M: Final = 2.0
+BACK_M: Final = 0.5
+"""What fell before the feet is then about as far ahead as it is grasped from; farther off it is hard to tell."""
+AHEAD_M: Final = 0.6
+"""So far before the middle of the body an object falls that is carried."""
+HALF_M: Final = 1.2
+ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
+"""Where else the floor is looked at from: forward and left of where the object was lost (m)."""
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -95,17 +117,123 @@ class Fallen(ExplainedLeaf):
         return turned[int(np.argmax(clear_m >= self.set_down_half_m))]
 
 
-def floor_square(pose: Pose2D, ahead_m: float, half_m: float) -> Surface:
-    """A square of floor about a point before the body."""
-    corners = (compose(pose, Pose2D(ahead_m + x * half_m, y * half_m, 0.0)) for x, y in _CORNERS)
-    return Surface(FLOOR, tuple((corner.x_m, corner.y_m) for corner in corners), 0.0)
-
-
 def _written(options: Mapping[str, Any]) -> Mapping[str, Any]:
     """The keys of the pose, of the point and of the pieces of floor."""
     surfaces = {options[key]: tuple[Surface, ...] for key in ("floor_key", "around_key")}
     spot = tuple[Coordinate, Coordinate, Height]
     return {options["pose_key"]: Pose2D, options["spot_key"]: spot, options["set_down_key"]: Surface, **surfaces}
+
+
+def unless_fallen(
+    builder: PlanBuilder,
+    item: Thing,
+    to: str,
+    carry: NodeSpec,
+    guards: tuple[NodeSpec, ...],
+    hands_on: tuple[NodeSpec, ...] = (),
+) -> NodeSpec:
+    """Carrying `to` somewhere; what is lost on the way (one of the guards breaks) is picked up again where it fell.
+
+    The same is done when a skill in `hands_on` has let go of the object and finds that it is not where it is to be. It
+    is done as often as the builder's `pick_ups` says; then the carrying begins anew.
+    """
+    if not builder.pick_ups:
+        return carry
+    broken = (after(Cause.EXECUTION, of=guard, own=True) for guard in guards)
+    missed = (after(Cause.POSTCONDITION, of=skill) for skill in hands_on)
+    lost = Recovery((*broken, *missed), uses=builder.pick_ups)
+    recovery = _pick_up_again_plan(builder.at("again"), item, to)
+    return builder.recover(f"carry {item}", carry, (recovery, lost), attempts=builder.pick_ups + 1)
+
+
+def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
+    keys = {name: builder.key(name) for name in ("pose", "spot", "floor", "around", "set-down", "detection")}
+    fell = builder.node(
+        "fallen",
+        f"where is the {item}?",
+        part="fell",
+        thing=str(item),
+        to=to,
+        pose_key=keys["pose"],
+        spot_key=keys["spot"],
+        floor_key=keys["floor"],
+        around_key=keys["around"],
+        set_down_key=keys["set-down"],
+        surfaces=tuple(map(builder.surface, builder.knowledge.surfaces)),
+        within_m=LOST_WITHIN_M,
+        ahead_m=AHEAD_M,
+        half_m=HALF_M,
+    )
+    look = _look_plan(builder, item, keys)
+    take = builder.at("take").sequence(
+        f"take {item} from where it lies",
+        _stand_back_plan(builder.at("back")),
+        pick_up_plan(builder, item, look, keys["detection"], FromBoard(keys["around"])),
+    )
+    return builder.sequence(
+        f"pick {item} up again",
+        fell,
+        _free_gripper_plan(builder.at("first"), item, keys["set-down"]),
+        builder.node("selector", f"have {item} again", held_plan(builder, item), take, part="have"),
+    )
+
+
+def _free_gripper_plan(builder: PlanBuilder, item: Thing, set_down_key: str) -> NodeSpec:
+    """Set down what is still held; where that fails, draw it in. An empty arm is stowed."""
+    below = builder.at("set-down")
+    set_down = below.skill("place", {"surface": FromBoard(set_down_key)})
+    held = below.node("only if holding", f"set the {item} down", set_down)
+    return builder.node("selector", "free the gripper", held, builder.skill("stow"))
+
+
+def _stand_back_plan(builder: PlanBuilder) -> NodeSpec:
+    """Back off, to see the floor before the feet; where there is no room, look from here."""
+    ports = {"distance_m": BACK_M} if builder.has_ports("back_off", ("distance_m",)) else {}
+    stay = builder.pause("stay", "look from here", LOOK_AGAIN_S)
+    return builder.node("selector", "stand back", builder.skill("back_off", ports), stay)
+
+
+def _look_plan(builder: PlanBuilder, item: Thing, keys: dict[str, str]) -> NodeSpec:
+    """Look from here where it fell and about there, then at the surfaces near, then at the floor from either side."""
+    floor, detection = FromBoard(keys["floor"]), keys["detection"]
+    aside = [
+        below.sequence(
+            f"look at the {FLOOR} from aside",
+            below.navigate(BesideBoard(keys["pose"], *offset), f"the side of where the {item} fell"),
+            detect_plan(below, item, floor, detection),
+        )
+        for below, offset in zip((builder.at("left"), builder.at("right")), ASIDE_M, strict=True)
+    ]
+    knows_spot = builder.has_ports("detect", ("expected_W",))
+    spot = [detect_plan(builder.at("spot"), item, floor, detection, {"expected_W": FromBoard(keys["spot"])})]
+    return builder.node(
+        "selector",
+        f"find {item} where it fell",
+        *(spot if knows_spot else []),
+        detect_plan(builder, item, floor, detection),
+        _near_plan(builder.at("near"), item, detection),
+        *aside,
+        part="find",
+        exhausted_cause=Cause.POSTCONDITION,
+        exhausted_message=f"the {item} is not found again where it fell",
+    )
+
+
+def _near_plan(builder: PlanBuilder, item: Thing, detection: str) -> NodeSpec:
+    """Look at the surfaces near where it was lost."""
+    facts, near = builder.knowledge, builder.key("surfaces")
+    surfaces = builder.node(
+        "surfaces near",
+        "which surfaces are near?",
+        part="surfaces-near",
+        surfaces=tuple(map(builder.surface, facts.surfaces)),
+        rooms={name: facts.places[surface.place].polygon for name, surface in facts.surfaces.items()},
+        within_m=LOST_WITHIN_M,
+        key=near,
+        otherwise="there is only the floor",
+    )
+    look = detect_plan(builder, item, FromBoard(near), detection)
+    return builder.sequence(f"look for {item} on the surfaces near", surfaces, look)
 
 
 KINDS: Final[Mapping[str, NodeKind]] = {"fallen": NodeKind(Fallen, ("context",), writes=_written)}

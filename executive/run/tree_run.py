@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
@@ -17,7 +18,6 @@ from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.context import Endings, RunContext
 from executive.tree.behaviours.decisions import Decide, WaitFor, buttons_of
 from executive.tree.behaviours.explained import Explained, message_of
-from executive.tree.behaviours.gate import Gate
 from executive.tree.behaviours.policies import Skip
 from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
@@ -250,6 +250,37 @@ class TreeRun:
     def _activity(self, path_id: str, state: NodeState) -> dict[str, object]:
         now_s = round(self.context.clock.now(), 6)
         return {"t": now_s, "robot": self.tree.robot_name, "node": path_id, "message": state.message}
+
+
+class Gate:
+    """A breakpoint before one node. While `closed()`, a tick that would begin the node makes it wait instead, once.
+
+    The next tick lets it pass; so whoever watches `waiting` must see to it that there is none too soon.
+    """
+
+    def __init__(self, node: Behaviour, closed: Callable[[], bool]) -> None:
+        """Stand before `node` from now on."""
+        self._node, self._closed = node, closed
+        self._pass_on: Callable[[], Iterator[Behaviour]] = node.tick
+        self.waiting = False
+        vars(node)["tick"] = self._tick
+
+    def _tick(self) -> Iterator[Behaviour]:
+        node, waited = self._node, self.waiting and self._node.status == Status.RUNNING
+        self.waiting = False
+        if waited:
+            node.status = Status.INVALID
+        elif node.status != Status.RUNNING and self._closed():
+            self._wait()
+            yield node
+            return
+        yield from self._pass_on()
+
+    def _wait(self) -> None:
+        self.waiting = True
+        self._node.status = Status.RUNNING
+        if isinstance(self._node, Explained):
+            self._node.cause, self._node.message = None, "waits at the breakpoint"
 
 
 _OUTCOMES = {Status.SUCCESS: Outcome.SUCCESS, Status.FAILURE: Outcome.FAILURE}

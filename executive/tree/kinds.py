@@ -18,12 +18,12 @@ from executive.tree.behaviours import (
     leaves,
     policies,
     recovery,
-    rounds,
     skill_leaf,
 )
 from executive.tree.behaviours.context import RunContext
 from executive.tree.node import NodeKind, NodeSpec
 from executive.tree.nodes import aside, fallen, interrupts
+from executive.tree.nodes import clearing as rounds
 
 __all__ = ["KINDS", "Changes", "build", "writes"]
 

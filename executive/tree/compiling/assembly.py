@@ -20,7 +20,6 @@ from executive.tree.compiling.blocks import (
     set_plan,
 )
 from executive.tree.compiling.builder import PICK_UPS, PlanBuilder, Registry, start_key
-from executive.tree.compiling.clearing import clear_plan, is_clearing, refuse_everything
 from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.compiling.policies import PolicyFrame, needs_way_back, under_policy
 from executive.tree.compiling.search import surfaces_elsewhere
@@ -29,6 +28,7 @@ from executive.tree.compiling.steps import step_plan
 from executive.tree.compiling.trips import are_trips, refuse_several, trips_plan
 from executive.tree.goals import clearing_goals, command_goal, drive_goal, given_goal, lifted_goal, put_goal
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.clearing import clear_plan, is_clearing, refuse_everything
 from executive.words.command import START, Command, Task
 from executive.words.expression import kind_of, literal
 from executive.words.goal import GoalCondition, When

@@ -14,12 +14,13 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from executive.mission.file.schema import MissionFile, mission_json_schema
+from executive.mission.json_schema import mission_json_schema
 from executive.mission.scenario_file import ScenarioFile
 from executive.testing.skill_test import SkillTestFile
 from executive.tree.registry import built_in_skills
 from executive.tree.types import describe_type, field_types
 from executive.words.knowledge import Knowledge
+from executive.words.mission import Mission
 from plant.worlds.world import SeedRules
 from skills.api import Skill
 from skills.durations import DURATION_PATTERN
@@ -55,7 +56,7 @@ SCHEMA_PAGES = (
         "Mission files",
         "A mission: a short list of steps. `errand check FILE` refuses a wrong one with file and line; "
         "`missions/mission.schema.json` is the same schema for editors.",
-        MissionFile,
+        Mission,
         "missions/guarded_delivery.yaml",
         constructs_text(),
     ),
@@ -106,8 +107,9 @@ def schema_page(page: SchemaPage) -> str:
     plain = page.model.model_json_schema(by_alias=True)
     schema = _words_inlined(plain, plain.get("$defs", {}))
     parts = {page.model.__name__: schema, **schema.get("$defs", {})}
-    order = [name for name in _reachable(schema, schema.get("$defs", {})) if "properties" in parts[name]]
-    sections = [_section(_heading(name), parts[name]) for name in order]
+    found = _reachable(schema, schema.get("$defs", {}))
+    order = [name for name in found if parts[name].keys() & {"properties", "anyOf"}]
+    sections = [_section(_heading(name), _without_policy(name, parts)) for name in order]
     main = _section("The file", schema)
     example = (ROOT / page.example).read_text(encoding="utf-8")
     shown = f"## Example\n\n`{page.example}`:\n\n```yaml\n{example}```\n"
@@ -149,6 +151,16 @@ def _words_inlined(value: Any, parts: Mapping[str, Any]) -> Any:
     return {**rest, **words}
 
 
+def _without_policy(name: str, parts: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A part of a schema without the keys of a policy, of which it tells."""
+    part, keys = parts[name], parts.get("Policy", {}).get("properties", {}).keys()
+    own = part.get("properties", {})
+    if name == "Policy" or not keys or not keys <= own.keys():
+        return part
+    words = f"{part.get('description', '')}\n\nIt also takes the keys of a [policy](#policy)."
+    return {**part, "description": words, "properties": {key: own[key] for key in own if key not in keys}}
+
+
 def _heading(name: str) -> str:
     """A model's name as a heading: "StepFile" is "Step"."""
     word = name.removesuffix("File").removesuffix("Setup").removesuffix("Facts").removesuffix("Rule")
@@ -156,6 +168,8 @@ def _heading(name: str) -> str:
 
 
 def _section(heading: str, part: Mapping[str, Any]) -> str:
+    if "properties" not in part:
+        return f"## {heading}\n\nOne of: {_takes(part).replace(' or ', ', ')}.\n\n"
     required = part.get("required", [])
     rows = [_row(key, facts, key in required) for key, facts in part["properties"].items()]
     table = "\n".join(["| key | type | default | meaning |", "|---|---|---|---|", *rows])

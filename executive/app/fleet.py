@@ -31,7 +31,7 @@ from executive.tree.estimate import RoutePlanner, load_estimates
 from executive.tree.node import NodeSpec
 from executive.words.command import Command, Task
 from executive.words.knowledge import BatteryFacts, Knowledge, SurfaceFacts
-from executive.words.steps import Mission
+from executive.words.steps import Do, Say, Step, steps_of_commands
 from plant.kinds import robot_kind
 from plant.worlds.world import World
 from skills.api import Surface
@@ -135,7 +135,8 @@ def _options(
     if alone.world.seed_rules != world.seed_rules:
         raise InputError("its file brings objects into the world", hint="run it by `errand run`")
     setting = Setting(alone.request, world, _patient(alone.knowledge), robots)
-    return {name: setting.for_robot(name).compiled(replace(alone.mission, robot_name=name)) for name in robots}
+    missions = {name: alone.mission.model_copy(update={"robot": name}) for name in robots}
+    return {name: setting.for_robot(name).compiled(mission) for name, mission in missions.items()}
 
 
 def _named(parts: Sequence[Part], robots: Mapping[str, PlacedRobot]) -> tuple[str, ...]:
@@ -159,8 +160,13 @@ def surfaces_of(prepared: Prepared) -> frozenset[str]:
 
 def with_commands(prepared: Prepared, commands: Sequence[Command]) -> Prepared:
     """A mission of plain commands with others in their place. Raises InputError: they cannot be carried out."""
-    (step,) = prepared.mission.steps
-    mission: Mission = replace(prepared.mission, steps=(replace(step, commands=tuple(commands)),))
+    steps: tuple[Step, ...] = steps_of_commands(commands)
+    match prepared.mission.steps:
+        case (Say() as said,):
+            steps = (said.meaning(tuple(commands)),)
+        case (Do() as only,):
+            steps = tuple(map(only.meaning, commands))
+    mission = prepared.mission.model_copy(update={"steps": steps})
     return prepared.with_mission(mission)
 
 
@@ -248,8 +254,8 @@ class MissionProgress:
 
 def is_plain(tree: CompiledTree) -> bool:
     """Whether a mission is nothing but commands, one after the other."""
-    plain = len(tree.parts) == len(tree.commands) and all(step.block is None for step in tree.steps)
-    return plain and len(tree.steps) == 1
+    commands = all(isinstance(step, Do | Say) for step in tree.steps) and len(tree.parts) == len(tree.commands)
+    return commands and (len(tree.steps) == 1 or all(step.source is None for step in tree.steps))
 
 
 def progress_of(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> MissionProgress:

@@ -17,8 +17,8 @@ from executive.app.robots import DEFAULT_KIND, only_robot
 from executive.app.simulated import SimulatedBackend
 from executive.app.worlds import open_world
 from executive.mission.request import Request
+from executive.words.mission import DEFAULT_WORLD
 from executive.words.robots import RobotConfig
-from executive.words.steps import DEFAULT_WORLD
 from skills.estimate.compiled import CompiledFunction
 
 __all__ = ["compile_kernels", "newly_compiled"]

@@ -19,7 +19,7 @@ from typing import Any, Final
 from executive.app.durable import as_it_was
 from executive.app.feasibility import refuse_impossible
 from executive.app.prepare import prepare
-from executive.mission.file.parameters import values_in_json
+from executive.mission.parameters import values_in_json
 from executive.mission.request import Request
 from executive.store.database import STORE_FILE
 from executive.store.missions import MissionStore, StoredMission

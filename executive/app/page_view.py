@@ -14,7 +14,7 @@ from executive.app.prepare import prepare
 from executive.app.prepared import Prepared
 from executive.app.talk import Talk, load_ahead
 from executive.conversation import ReplyKind
-from executive.mission.file.parameters import given_values
+from executive.mission.parameters import given_values
 from executive.mission.request import Request
 from executive.record.announce import map_message
 from executive.record.event_log import EventLog

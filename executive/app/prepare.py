@@ -12,12 +12,8 @@ from executive.app.prepared import Prepared, compiled_request, together
 from executive.app.robots import PlacedRobot, knowledge_for, only_robot, placed_robots
 from executive.app.worlds import knowledge_of, open_world, refuse_blocked, with_map
 from executive.language.parser import load_parser
-from executive.language.questions import Answerer, ClarifyingQuestion, QuestionPolicy, answer_by
-from executive.mission.file.objects import import_folders
-from executive.mission.file.overrides import overridden
-from executive.mission.file.people import routes_in
-from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
-from executive.mission.file.schema import MissionFile, PartFile
+from executive.language.questions import Answerer, ClarifyingQuestion, answer_by
+from executive.mission.load import for_robot, import_folders, load_mission, overridden, routes_in
 from executive.mission.mission import (
     mission_from_lines,
     mission_from_meaning,
@@ -26,15 +22,16 @@ from executive.mission.mission import (
     understood,
 )
 from executive.mission.request import Request
+from executive.mission.resolve import mission_from_file
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge, Pose
+from executive.words.mission import DEFAULT_WORLD, Mission, MissionPart, QuestionPolicy
 from executive.words.robots import RobotConfig, robot_called, robots_in
-from executive.words.steps import DEFAULT_WORLD, KeyPath, Mission
 from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
 from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.files.texts import LONGEST_ANSWER, plain_text
-from skills.files.yaml_source import read_yaml
+from skills.files.yaml_source import KeyPath, read_yaml
 from skills.robot import Pose2D
 
 if TYPE_CHECKING:
@@ -136,18 +133,18 @@ class Setting:
         steps = tuple(step for meant in meanings for step in steps_of(meant))
         notes = tuple(note for meant in meanings for note in meant.notes)
         mission = mission_from_steps(steps, world=self.world.name, robot_name=name)
-        return self.for_robot(name).compiled(replace(mission, notes=notes))
+        return self.for_robot(name).compiled(mission.noting(notes))
 
     def commanded(self) -> Mission:
-        """The mission of the request's commands in their text form, or of steps in their written form."""
+        """The mission of the request's commands in their text form, or of steps in YAML."""
         request = self.request
         try:
             mission = mission_from_lines(request.commands, world=self.world.name, robot_name=request.robot)
         except ValueError as error:
             raise InputError(f"the mission '{request.name}' cannot be read: {error}", hint="give it again") from error
-        return replace(mission, name=request.name)
+        return mission.model_copy(update={"name": request.name})
 
-    def filed(self, loaded: MissionFile) -> Prepared:
+    def filed(self, loaded: Mission) -> Prepared:
         """What a mission file asks of the robot that stands in this world. Raises InputError."""
         knowledge = overridden(loaded, self.knowledge)
         answer = self.answerer(self.request.questions or loaded.questions)
@@ -176,7 +173,7 @@ class Setting:
         return Prepared(compiled_request(request, tree), mission, world, self.knowledge, tree, robots, meant)
 
 
-def _opened(request: Request) -> tuple[Request, MissionFile | None, World, Knowledge]:
+def _opened(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
     """A request with its file read where it has one, its world, and what is known of that. Raises InputError."""
     loaded = None
     if request.file is not None:
@@ -193,14 +190,14 @@ def _opened(request: Request) -> tuple[Request, MissionFile | None, World, Knowl
     return request, loaded, world if request.map is None else with_map(world, request.map), knowledge
 
 
-def _named_robots(loaded: MissionFile | None, world: World, knowledge: Knowledge) -> tuple[RobotConfig, ...]:
+def _named_robots(loaded: Mission | None, world: World, knowledge: Knowledge) -> tuple[RobotConfig, ...]:
     """The robots that a mission file names, else its world; none where it is for the world's only robot."""
     named = knowledge.robots if loaded is None or loaded.robots is None else loaded.robots
     if named is None:
         return ()
     from plant.kinds import robot_kinds
 
-    own = read_yaml(world.knowledge_path) if loaded is None or loaded.robots is None else loaded.source
+    own = read_yaml(world.knowledge_path) if loaded is None or loaded.robots is None else loaded.document
     return robots_in(named, robot_kinds(), own)
 
 
@@ -215,7 +212,7 @@ def _standing(request: Request, world: World, knowledge: Knowledge, ask: Answere
     return Setting(request, world, knowledge, {}, ask)
 
 
-def _for_the_only_robot(setting: Setting, loaded: MissionFile | None) -> Prepared:
+def _for_the_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
     """What the world's only robot is to do. Raises InputError."""
     request, robot = setting.request, setting.knowledge.robot
     if loaded is not None:
@@ -240,7 +237,7 @@ def _for_whom_it_calls(setting: Setting) -> Prepared:
     request, robots = setting.request, setting.robots
     if request.sentence is None:
         name = robot_called(request.robot, robots) or next(iter(robots))
-        return setting.for_robot(name).compiled(replace(setting.commanded(), robot_name=name))
+        return setting.for_robot(name).compiled(setting.commanded().model_copy(update={"robot": name}))
     meant = setting.understood()
     setting = replace(setting, request=replace(request, sentence=meant.text))
     parts = [part for each in meant.parts for part in _expanded(each, setting)]
@@ -287,7 +284,7 @@ def _first_done(names: Collection[str], prepared_for: Callable[[str], Prepared])
     return first, every[first]
 
 
-def _for_one_robot(setting: Setting, loaded: MissionFile) -> Prepared:
+def _for_one_robot(setting: Setting, loaded: Mission) -> Prepared:
     """A mission file, done by the robot that it names, or that can do it and is done first. Raises InputError."""
     robots = setting.robots
     names = tuple(robots) if loaded.robot is None else (_robot_in(loaded, ("robot",), loaded.robot, robots),)
@@ -298,7 +295,7 @@ def _for_one_robot(setting: Setting, loaded: MissionFile) -> Prepared:
     return filed(names[0]) if len(names) == 1 else _first_done(names, filed)[1]
 
 
-def _in_parts(setting: Setting, loaded: MissionFile, parts: Mapping[str, PartFile]) -> Prepared:
+def _in_parts(setting: Setting, loaded: Mission, parts: Mapping[str, MissionPart]) -> Prepared:
     """The parts of a mission file, in the order of the robots. Raises InputError: one is for no robot of the run."""
     robots, written = setting.robots, dict[str, str]()
     for part in parts:
@@ -323,7 +320,7 @@ def _in_parts(setting: Setting, loaded: MissionFile, parts: Mapping[str, PartFil
     return together(made)
 
 
-def _robot_in(loaded: MissionFile, at: KeyPath, said: str, robots: Collection[str]) -> str:
+def _robot_in(loaded: Mission, at: KeyPath, said: str, robots: Collection[str]) -> str:
     """The robot that a file names. Raises InputError: it is none of those that it could be."""
     name = robot_called(said, robots)
     if name is None:
@@ -359,7 +356,7 @@ def _speaker_W(part: Part, robots: Mapping[str, PlacedRobot]) -> Pose2D | None:
     return robots[by].start if by is not None and by in robots and by != part.robot else None
 
 
-def _with_people(loaded: MissionFile, world: World, knowledge: Knowledge) -> World:
+def _with_people(loaded: Mission, world: World, knowledge: Knowledge) -> World:
     """The world with the people who walk in a mission's file. Raises InputError."""
     routes = {name: RouteRule.model_validate(values) for name, values in routes_in(loaded, knowledge).items()}
     try:
@@ -368,7 +365,7 @@ def _with_people(loaded: MissionFile, world: World, knowledge: Knowledge) -> Wor
         raise loaded.error(("people",), str(error), "change the route or its name here") from error
 
 
-def _with_objects(loaded: MissionFile, world: World, knowledge: Knowledge) -> World:
+def _with_objects(loaded: Mission, world: World, knowledge: Knowledge) -> World:
     """The world with the models and objects of a mission's file. Raises InputError."""
     problems = Problems()
     for index, folder in enumerate(import_folders(loaded)):

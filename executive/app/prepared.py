@@ -13,7 +13,7 @@ from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge
-from executive.words.steps import Mission
+from executive.words.mission import Mission
 from plant.worlds.world import World
 from skills.robot import Pose2D
 

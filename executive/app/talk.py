@@ -23,7 +23,7 @@ from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills
-from executive.words.steps import MissionStep
+from executive.words.steps import Step
 
 __all__ = ["Talk", "conversation_of", "load_ahead"]
 
@@ -110,11 +110,13 @@ def _understood(text: str, memory: Memory | None, prepared: Prepared) -> Underst
     )
 
 
-def _compiled(steps: Sequence[MissionStep], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
+def _compiled(steps: Sequence[Step], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
     """The tree of a mission of these steps, under a name that is not taken. Raises InputError, as `check` does."""
     mission = mission_from_steps(steps, world=prepared.world.name, robot_name=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)
-    tree = compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=installed_skills())
+    tree = compile_mission(
+        mission.model_copy(update={"name": name}), knowledge=prepared.knowledge, registry=installed_skills()
+    )
     refuse_impossible(replace(prepared, tree=tree))
     return tree

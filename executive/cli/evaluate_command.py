@@ -73,7 +73,7 @@ def evaluate(
     from executive.app.evaluate.evaluation import evaluate_runs, refuse_impossible_runs
     from executive.app.evaluate.random_missions import random_missions as drawn_missions
     from executive.app.evaluate.scenario import is_evaluation, load_evaluation
-    from executive.words.steps import DEFAULT_WORLD
+    from executive.words.mission import DEFAULT_WORLD
 
     console, out, request = console_for(as_json), request.out, replace(request, out=Request.out)
     has_own = each_fault or request != Request()

@@ -28,8 +28,8 @@ from executive.speech.recogniser import Vocabulary, of_world, read_vocabulary
 from executive.speech.voice import Voice, installed_voice
 from executive.speech.whisper import load_whisper
 from executive.words.knowledge import Knowledge
+from executive.words.mission import DEFAULT_WORLD
 from executive.words.robots import RobotConfig, display_name
-from executive.words.steps import DEFAULT_WORLD
 from skills.files.errors import InputError, listing
 
 __all__ = ["answer_line", "called_robots", "hear_request", "heard_sentence", "listen", "listener_for", "show_hearing"]

@@ -14,8 +14,8 @@ from executive.cli.output import BAD_INPUT, print_json, refusals
 from executive.language.explain import arcs_svg, explain, explanation_lines
 from executive.language.parser import load_parser
 from executive.language.understand import Status, Understanding, parse_lines
-from executive.words.steps import DEFAULT_WORLD
-from executive.words.written import written
+from executive.words.mission import DEFAULT_WORLD
+from executive.words.yaml_steps import steps_to_yaml
 from skills.files.errors import InputError
 from skills.files.outside import read_text
 
@@ -74,7 +74,7 @@ def _show(meaning: Understanding, as_json: bool, explained: bool) -> None:
     if explained and meaning.trace is not None:
         _echo(explanation_lines(explain(meaning.trace)), as_json)
     elif meaning.steps:
-        _echo(written(meaning.steps), as_json)
+        _echo(steps_to_yaml(meaning.steps), as_json)
     elif meaning.commands:
         _echo(map(str, meaning.commands), as_json)
     if meaning.status is not Status.OK:

@@ -13,7 +13,7 @@ from executive.language.understand import Understanding
 from executive.tree.compiler import CompiledTree
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
-from executive.words.steps import MissionStep
+from executive.words.steps import Step
 
 __all__ = ["NEVER_MIND", "OVER", "Reply", "ReplyKind", "Speech", "Waiting", "answer", "done", "refused"]
 
@@ -32,7 +32,7 @@ class Speech:
     knowledge: Knowledge
     robot_name: str
     understand: Callable[[str, Memory | None], Understanding]
-    compile: Callable[[Sequence[MissionStep], frozenset[str]], CompiledTree]
+    compile: Callable[[Sequence[Step], frozenset[str]], CompiledTree]
 
 
 class ReplyKind(enum.Enum):

@@ -41,8 +41,7 @@ from executive.run.control import Control, Mode
 from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree
 from executive.words.command import Command, Task, Thing
-from executive.words.steps import MissionStep
-from executive.words.written import written
+from executive.words.steps import Step, steps_of_commands
 from skills.files.errors import InputError
 
 __all__ = ["REMEMBERED_S", "Conversation"]
@@ -62,7 +61,7 @@ class _Spoken:
     memory: Memory | None
     at_s: float
     mission: str
-    steps: tuple[MissionStep, ...] = ()
+    steps: tuple[Step, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -110,7 +109,7 @@ class Conversation(RunVisitor):
         """The run begins with a mission: it can be corrected, and spoken of, as any other."""
         with self._lock:
             self._names |= {tree.mission_name}
-            steps = tree.steps if any(step.block is not None for step in tree.steps) else ()
+            steps = tree.steps if any(step.is_block for step in tree.steps) else ()
             self._last = _Spoken(tree.commands, memory, now_s, tree.mission_name, steps)
 
     def tick(self, progress: Progress) -> None:
@@ -303,7 +302,7 @@ class Conversation(RunVisitor):
         *,
         notes: Sequence[str] = (),
         memory: Memory | None = None,
-        steps: tuple[MissionStep, ...] = (),
+        steps: tuple[Step, ...] = (),
     ) -> Reply:
         """Have commands done, or steps that hold them, and remember them."""
         state = self._control.state
@@ -313,13 +312,14 @@ class Conversation(RunVisitor):
         if when is _When.INSTEAD and not steps:
             todo = without_fetching(todo, self._held(), self._speech.knowledge)
         try:
-            tree = self._speech.compile(steps or (MissionStep(todo),), self._names)
+            tree = self._speech.compile(steps or steps_of_commands(todo), self._names)
         except InputError as error:
             return refused(str(error))
         give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, self._replace)
         mode = state.robots.get(self._speech.robot_name, state).mode
         still = "; I stand still until you say 'go on'" if mode in (Mode.PAUSED, Mode.STOPPED) else ""
-        text = "; ".join((*notes, f"{when.value}: {'; '.join(written(steps) or map(str, todo))}{still}"))
+        told = "; ".join("; ".join(map(str, step.commands)) or step.words for step in steps or steps_of_commands(todo))
+        text = "; ".join((*notes, f"{when.value}: {told}{still}"))
         reply = self._tried(partial(give, tree), text, todo)
         if reply.kind is ReplyKind.DONE:
             self._names |= {tree.mission_name}

@@ -12,7 +12,7 @@ from executive.language.items import Predicate, spoken_words
 from executive.language.roles import Location
 from executive.language.steps import Trace
 from executive.language.tokens import Token
-from executive.words.written import written
+from executive.words.yaml_steps import steps_to_yaml
 
 __all__ = ["ActionRow", "Explanation", "ThingRow", "TokenRow", "arcs_svg", "explain", "explanation_lines", "tree_lines"]
 
@@ -91,7 +91,7 @@ def explain(trace: Trace) -> Explanation:
         stands_for=trace.meanings,
         frames=tuple(str(spoken_command(frame)) for frame in trace.frames),
         commands=tuple(map(str, trace.commands)),
-        mission=written(trace.steps),
+        mission=steps_to_yaml(trace.steps),
         notes=trace.notes,
         refused_at=trace.refused_at,
         reason=None if trace.refusal is None else trace.refusal.reason,

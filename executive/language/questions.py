@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
+from executive.words.mission import QuestionPolicy
 from skills.files.errors import listing
 
 __all__ = [
     "ABLE",
     "Answerer",
     "ClarifyingQuestion",
-    "QuestionPolicy",
     "RefusalError",
     "RefusalKind",
     "Slot",
@@ -67,14 +67,6 @@ class ClarifyingQuestion:
 
 Answerer = Callable[[ClarifyingQuestion], str | None]
 """Answers a question, or leaves it open (None)."""
-
-
-class QuestionPolicy(Enum):
-    """What becomes of a question that nobody is asked."""
-
-    ASK = "ask"  # somebody is asked where somebody is there; else the sentence is refused
-    FIRST = "first"  # the likeliest candidate is taken
-    REFUSE = "refuse"  # the sentence is refused
 
 
 def answer_by(policy: QuestionPolicy, person: Answerer | None = None) -> Answerer:

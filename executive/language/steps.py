@@ -25,7 +25,7 @@ from executive.language.spelling import WordFacts
 from executive.language.tokens import Affirmed, Token, affirmed, name_table, parse_with_names
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
-from executive.words.steps import MissionStep
+from executive.words.steps import Step
 from skills.files.errors import listing
 
 __all__ = ["Part", "Steps", "Trace", "trace_sentence"]
@@ -57,7 +57,7 @@ class Trace:
     refused_at: str | None = None
     memory: Memory = field(default_factory=Memory)
     parts: tuple[str, ...] = ()
-    steps: tuple[MissionStep, ...] = ()
+    steps: tuple[Step, ...] = ()
     affirmed: Affirmed | None = None
 
 

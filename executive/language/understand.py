@@ -17,8 +17,8 @@ from executive.language.steps import Trace, trace_sentence
 from executive.language.wake import strip_wake
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
-from executive.words.steps import MissionStep
-from executive.words.written import written
+from executive.words.steps import Step
+from executive.words.yaml_steps import steps_to_data
 
 if TYPE_CHECKING:
     from executive.language.clauses import Clause
@@ -63,7 +63,7 @@ class Understanding:
     notes: tuple[str, ...] = ()
     memory: Memory | None = None
     trace: Trace | None = field(default=None, compare=False, repr=False)
-    steps: tuple[MissionStep, ...] = ()
+    steps: tuple[Step, ...] = ()
 
     @property
     def refused_as(self) -> RefusalKind | None:
@@ -80,7 +80,7 @@ class Understanding:
             "question": None if self.question is None else self.question.to_json(),
             "notes": list(self.notes),
             "commands": [command.to_json() for command in self.commands],
-            "written": list(written(self.steps)),
+            "mission": steps_to_data(self.steps),
         }
 
 

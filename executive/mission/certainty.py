@@ -106,14 +106,14 @@ class _Cases:
     def of(self, condition: Condition) -> Callable[[Mapping[str, Any]], bool]:
         """The answer of a condition by the values that it reads."""
         match condition:
-            case AllOf(parts):
+            case AllOf(parts=parts):
                 return _joined(all, [self.of(part) for part in parts])
-            case AnyOf(parts):
+            case AnyOf(parts=parts):
                 return _joined(any, [self.of(part) for part in parts])
-            case Not(inner):
+            case Not(part=inner):
                 below = self.of(inner)
                 return lambda case: not below(case)
-            case ValueIs(expression):
+            case ValueIs(expression=expression):
                 self.part += 1 if self.apart else 0
                 return self._node(expression.tree)
         return self._free()

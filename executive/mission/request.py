@@ -12,8 +12,8 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, TypeAdapter
 from pydantic.dataclasses import dataclass
 
-from executive.language.questions import QuestionPolicy
 from executive.mission.scenario import NO_SCENARIO, Scenario
+from executive.words.mission import QuestionPolicy
 from executive.words.option import Option
 from executive.words.robots import RobotConfig, parse_robots, pose_in
 from executive.words.variation import NO_VARIATION, Variation
@@ -50,7 +50,7 @@ def _time_of_day(text: str) -> str:
 
 def _given(settings: list[str]) -> Mapping[str, Any]:
     """The values of parameters in texts such as "speed=0.5". Raises InputError."""
-    from executive.mission.file.parameters import given_values
+    from executive.mission.parameters import given_values
 
     return given_values(settings)
 

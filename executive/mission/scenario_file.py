@@ -11,9 +11,9 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
-from executive.mission.file.people import StopFile
 from executive.mission.scenario import RandomFaults, Scenario
 from executive.words.knowledge import Corner, Knowledge
+from executive.words.mission import Stop
 from skills.faults.words import parse_fault
 from skills.files.errors import InputError, Problems, suggestion
 from skills.files.schema import Name, Text, validate
@@ -31,7 +31,7 @@ _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
 
 
 Spot = tuple[Coordinate, Coordinate, Height]
-Stops = Annotated[tuple[Corner | Name | StopFile, ...], Field(min_length=1)]
+Stops = Annotated[tuple[Corner | Name | Stop, ...], Field(min_length=1)]
 
 
 class _Strict(BaseModel):
@@ -181,7 +181,7 @@ class _Events:
             raise self._source.error((*path, "person"), f"there is no {said} in the world", hint)
         if name in self._known_people and event.from_ is not None:
             raise self._source.error((*path, "from"), f"{name} stands in the world already", "take 'from' out")
-        stops = _stops(event.to) if event.from_ is None else [StopFile(at=event.from_, pause=0.0), *_stops(event.to)]
+        stops = _stops(event.to) if event.from_ is None else [Stop(at=event.from_, pause=0.0), *_stops(event.to)]
         route = {"start": event.at, "speed": event.speed, "loop": event.loop, "yields": event.yields}
         points = [{"at": self._point(stop.at, (*path, "to")), "pause": stop.pause} for stop in stops]
         self.people[name] = {**route, "waypoints": points}
@@ -233,7 +233,7 @@ class _Events:
         return place
 
 
-def _stops(to: Any) -> list[StopFile]:
+def _stops(to: Any) -> list[Stop]:
     """Where a person goes, one after the other."""
     single = isinstance(to, str) or isinstance(to[0], float | int)
-    return [each if isinstance(each, StopFile) else StopFile(at=each, pause=0.0) for each in ((to,) if single else to)]
+    return [each if isinstance(each, Stop) else Stop(at=each, pause=0.0) for each in ((to,) if single else to)]

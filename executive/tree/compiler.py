@@ -17,7 +17,8 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.interrupts import watched
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
-from executive.words.steps import Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import Step
 from skills.files.errors import InputError
 from skills.perception.doorway import Doorway
 
@@ -37,7 +38,7 @@ class CompiledTree:
     commands: tuple[Command, ...]
     root: NodeSpec
     parts: tuple[StepPart, ...] = ()
-    steps: tuple[MissionStep, ...] = ()
+    steps: tuple[Step, ...] = ()
     doors: tuple[Doorway, ...] = ()
 
     @property

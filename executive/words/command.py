@@ -20,9 +20,11 @@ __all__ = [
     "Command",
     "Task",
     "Thing",
+    "command_of_parts",
     "is_attribute",
     "may_be_attribute",
     "parse_command",
+    "parts_of_command",
     "thing",
 ]
 
@@ -155,6 +157,23 @@ def parse_command(text: str) -> Command:
     target_thing, target_count = _parse_thing(target)
     goal_name, goal_at = _parse_goal(goal)
     return Command(item_thing, goal_name, goal_at, _parse_task(task), target_thing, item_count, target_count)
+
+
+def parts_of_command(command: Command) -> dict[str, str]:
+    """The parts of a command's text form under the keys of mission files; those that are Nothing are left out."""
+    parts = {
+        "take": _thing_text(command.item, command.item_count),
+        "to": _goal_text(command.goal, command.goal_at),
+        "do": _NOTHING if command.task is None else command.task.value,
+        "object": _thing_text(command.object, command.object_count),
+    }
+    return {key: text for key, text in parts.items() if text != _NOTHING}
+
+
+def command_of_parts(parts: Mapping[str, str | None]) -> Command:
+    """The command of such parts. Raises ValueError: one of them is no name."""
+    take, to, do, target = (parts.get(key) or _NOTHING for key in ("take", "to", "do", "object"))
+    return parse_command(f"Take [{take}] to [{to}] and do [{do}] to [{target}]")
 
 
 def _words(of: Thing | None) -> tuple[str, ...]:

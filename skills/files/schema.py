@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from itertools import pairwise
 from types import UnionType
-from typing import Annotated, Any, Final, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, Final, ForwardRef, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import ErrorDetails
+from typing_extensions import TypeAliasType
 
 from skills.files.errors import InputError, did_you_mean, few, suggestion
 from skills.files.schema_errors import plain_hint, plain_words
@@ -43,7 +45,7 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
         what, hint = "none of its keys is known here", f"begin with the keys {few(known)}"
         raise InputError(what, hint=hint, file=source.path, line=1)
     try:
-        return model.model_validate(source.data)
+        return model.model_validate(source.data, by_alias=True, by_name=False)
     except ValidationError as error:
         telling = _telling(error.errors()[:MOST_ERRORS], source)
         first, *others = [_input_error(model, source, faults) for faults in telling]
@@ -97,7 +99,7 @@ def _input_error(model: type[BaseModel], source: YamlSource, errors: list[ErrorD
     error = errors[0]
     path = _path(error, source)
     where = ".".join(str(part) for part in path)
-    known = _field_names(_model_at(model, path[:-1]))
+    known = _field_names(*_models_at(model, path[:-1]))
     if error["type"] == "extra_forbidden":
         hint = suggestion(str(path[-1]), known, f"known keys are {few(known)}")
         return source.error(path, f"unknown {quoted(path[-1])}", hint)
@@ -127,33 +129,37 @@ def _comma_hint(error: ErrorDetails, path: KeyPath, source: YamlSource) -> str |
     return f"write '{before}: {above[before]}.{path[-1]}', with a point" if whole else None
 
 
-def _field_names(model: type[BaseModel] | None) -> list[str]:
-    """The keys of a model, those that are required first."""
-    fields = [] if model is None else list(model.model_fields.items())
+def _field_names(*models: type[BaseModel]) -> list[str]:
+    """The keys of models, those that are required first."""
+    fields = [item for model in models for item in model.model_fields.items()]
     ordered = sorted(fields, key=lambda item: not item[1].is_required())
-    return [field.alias or name for name, field in ordered]
+    return list(dict.fromkeys(field.alias or name for name, field in ordered))
 
 
-def _model_at(model: type[BaseModel], path: KeyPath) -> type[BaseModel] | None:
-    """The model that describes what stands at `path`."""
-    kind = without_range(_kind_at(model, path))
-    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
-
-
-def _kind_at(model: type[BaseModel], path: KeyPath) -> Any:
-    """The annotation of what stands at `path`, following fields, mappings and lists."""
-    kind: Any = model
+def _models_at(model: type[BaseModel], path: KeyPath) -> tuple[type[BaseModel], ...]:
+    """The models of which one describes what stands at `path`, following fields, mappings and lists."""
+    kinds: tuple[Any, ...] = (model,)
     for part in path:
-        kind = _inside(kind, part)
-    return kind
+        kinds = tuple(inner for kind in kinds for inner in _inside(kind, part))
+    return tuple(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel))
 
 
-def _inside(kind: Any, part: str | int) -> Any:
-    """The annotation of what stands under `part` in something annotated `kind`."""
-    kind = without_range(kind)
-    fields = {f.alias or n: Annotated[f.annotation, f] for n, f in getattr(kind, "model_fields", {}).items()}
+def _inside(kind: Any, part: str | int) -> tuple[Any, ...]:
+    """The types that may stand under `part` in something of a type."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        field = next((f for n, f in kind.model_fields.items() if (f.alias or n) == part), None)
+        return () if field is None else _choices(field.annotation)
     items = [arg for arg in get_args(kind) if arg is not Ellipsis]
-    inner = fields[part] if part in fields else next(iter(items[-1:]), None)
-    plain = without_range(inner)
-    optional = get_origin(plain) in (Union, UnionType)
-    return next(arg for arg in get_args(plain) if arg is not type(None)) if optional else inner
+    return _choices(items[-1]) if items else ()
+
+
+def _choices(hint: Any) -> tuple[Any, ...]:
+    """The types that a hint allows, without ranges and the names of types."""
+    plain = without_range(hint)
+    if isinstance(plain, TypeAliasType):
+        value = without_range(plain.__value__)
+        named = isinstance(value, ForwardRef) and vars(sys.modules[str(plain.__module__)])[value.__forward_arg__]
+        return _choices(named or value)
+    if get_origin(plain) in (Union, UnionType):
+        return tuple(choice for arg in get_args(plain) for choice in _choices(arg))
+    return (plain,)

@@ -14,7 +14,7 @@ from skills.files.outside import read_text
 from skills.files.yaml_nodes import MOST_NESTED, KeyPath, data_and_lines
 from skills.files.yaml_scalars import as_written, truth_words
 
-__all__ = ["KeyPath", "YamlSource", "read_yaml"]
+__all__ = ["KeyPath", "YamlSource", "parse_yaml", "read_yaml"]
 
 MAX_BYTES: Final = 1_000_000
 _SURELY_FLAT: Final = 1_000
@@ -40,6 +40,11 @@ class YamlSource:
         known = next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.lines), None)
         return self.first_line if known is None else self.lines[known]
 
+    def below(self, path: KeyPath, data: Any) -> YamlSource:
+        """A document of what stands at `path`, with its lines; `data` is in its place."""
+        lines = {each[len(path) :]: line for each, line in self.lines.items() if each[: len(path)] == path != each}
+        return YamlSource(self.path, data, lines, first_line=self.line(path))
+
     def error(self, path: KeyPath, message: str, hint: str = "") -> InputError:
         """An error at `path`."""
         return InputError(message, hint=hint, file=self.path, line=self.line(path))
@@ -54,7 +59,11 @@ def read_yaml(
         InputError: the file cannot be read, is too large, is no YAML, or has a key twice, or a tag.
     """
     file = Path(path)
-    text = read_text(file, most_bytes=MAX_BYTES, hint=hint)
+    return parse_yaml(read_text(file, most_bytes=MAX_BYTES, hint=hint), file, tags)
+
+
+def parse_yaml(text: str, file: Path, tags: frozenset[str] = frozenset()) -> YamlSource:
+    """Parse the text of such a document, which stands in a file. Raises InputError as `read_yaml`."""
     try:
         _refuse_deep(text, file)
         root = as_written(_composed(text))

@@ -42,8 +42,9 @@ from executive.store.missions import MissionState, MissionStore
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge
+from executive.words.mission import Mission
 from executive.words.robots import RobotConfig
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.steps import Do
 from tests.executive.conftest import (
     FETCH,
     KNOWLEDGE,
@@ -217,9 +218,9 @@ def _cycles_s(robots: int) -> list[float]:
 def _fetch(name: str) -> Any:
     script = Script(steps=STEPS_EACH, says=lambda skill, left: f"{skill}, {left} to go")
     registry = {skill: scripted_skill(script, skill, *ports) for skill, ports in PORTS.items()}
-    steps = tuple(MissionStep((parse_command(text),)) for text in FETCH)
+    steps = tuple(Do.of(parse_command(text)) for text in FETCH)
     knowledge = Knowledge.model_validate(KNOWLEDGE)
-    return compile_mission(Mission("fetch", DEFAULT_WORLD, name, steps), knowledge=knowledge, registry=registry)
+    return compile_mission(Mission(name="fetch", robot=name, steps=steps), knowledge=knowledge, registry=registry)
 
 
 def summary(results: Sequence[Result]) -> dict[str, object]:

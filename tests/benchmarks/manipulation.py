@@ -51,7 +51,8 @@ from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
-from executive.words.steps import Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import Do
 from plant.models.imported import FACTS_FILE, read_imported
 from plant.pictures import best_view, render_view, save_png
 from plant.simulation import Simulation
@@ -185,8 +186,8 @@ class Ran:
 
 def run_texts(simulation: Simulation, world: World, texts: Sequence[str], seed: int) -> Ran:
     """Run a mission of commands in their text form, timed and noted."""
-    steps = tuple(MissionStep((parse_command(text),)) for text in texts)
-    mission = Mission("trial", str(world.folder), ROBOT, steps)
+    steps = tuple(Do.of(parse_command(text)) for text in texts)
+    mission = Mission(name="trial", world=str(world.folder), robot=ROBOT, steps=steps)
     tree = compile_mission(mission, knowledge=knowledge_of(world), registry=built_in_skills())
     spot = LastSpot()
     entry = run_entry(simulation, world, tree)

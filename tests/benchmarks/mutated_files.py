@@ -23,8 +23,8 @@ import numpy as np
 
 from executive.app.evaluate.scenario import load_evaluation
 from executive.language.parser import load_parser
-from executive.mission.file.overrides import overridden
-from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
+from executive.mission.load import for_robot, load_mission, overridden
+from executive.mission.resolve import mission_from_file
 from executive.mission.scenario_file import load_scenario, scenario_of
 from executive.mission.stack_file import load_stack
 from executive.testing.skill_test import load_skill_tests
@@ -184,7 +184,7 @@ def kinds(folder: Path) -> dict[str, Kind]:
         "evaluation": Kind(
             {"e": EVALUATION.encode()},
             "evaluation.yaml",
-            lambda path: load_evaluation(path, mission_file=beside, stack_file=beside),
+            lambda path: load_evaluation(path),
         ),
         "skill test": Kind(
             contents(*(ROOT / "tests/skills").rglob("*.skilltest.yaml")),

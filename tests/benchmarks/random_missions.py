@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import dataclasses
 import functools
 import random
 import sys
@@ -37,32 +36,33 @@ from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.store.resuming import resumed_tree
 from executive.tree.compiler import CompiledTree, compile_mission
-from executive.words.blocks import (
+from executive.words.command import parse_command
+from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
+from executive.words.mission import Mission
+from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
+from executive.words.steps import (
     Ask,
+    Awaited,
+    CallSkill,
+    Charging,
     Check,
     Choose,
+    Do,
     Dock,
     Group,
     Handler,
+    Loop,
     Repeat,
+    Say,
     Set,
     Speak,
+    Step,
+    Steps,
     Together,
     Try,
+    UseMission,
     Wait,
-)
-from executive.words.command import parse_command
-from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
-from executive.words.expression import Expression, Template
-from executive.words.steps import (
-    DEFAULT_WORLD,
-    Mission,
-    MissionStep,
-    OnFailure,
-    OperatorQuestion,
-    SkillCall,
-    StepGuards,
-    StepPolicy,
+    While,
 )
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectObservation, Part, Running, Skill, Succeeded, Thing
 from skills.check_door.skill import CheckDoorInputs
@@ -129,163 +129,193 @@ class MissionMaker:
     def mission(self, name: str = "random") -> Mission:
         """The mission."""
         rng = self.rng
-        whole = None
-        if rng.random() < 0.4:
-            whole = self.group((), depth=2)
+        watched = self.watched(2) if rng.random() < 0.4 else {}
         steps = self.steps(0)
-        policy = self.policy(whole=True) if rng.random() < 0.2 else StepPolicy()
+        policy = self.policy(whole=True) if rng.random() < 0.2 else Policy()
         values = {"n": rng.choice([0, 1, 2.5]), "word": "tea", "flag": False}
-        return Mission(name, DEFAULT_WORLD, "Alice", steps, policy, variables=values, whole=whole)
+        return Mission(name=name, robot="Alice", steps=steps, variables=values, **watched).under(policy)
 
-    def steps(self, depth: int, *, still: bool = False) -> tuple[MissionStep, ...]:
+    def steps(self, depth: int, *, still: bool = False) -> tuple[Step, ...]:
         """Some steps in a row; those that are `still` use no part of the robot."""
         many = self.rng.choice([1, 1, 2, 2, 3]) if depth else max(1, min(self.left, self.rng.randint(1, 8)))
         return tuple(self.step(depth, still=still) for _ in range(many))
 
-    def step(self, depth: int, *, still: bool = False) -> MissionStep:
+    def step(self, depth: int, *, still: bool = False) -> Step:
         """A step, perhaps under a policy."""
         rng = self.rng
         self.left -= 1
-        policy = self.policy(still=still) if rng.random() < 0.35 else StepPolicy()
+        policy = self.policy(still=still) if rng.random() < 0.35 else Policy()
         if self.left > 0 and depth < 6 and rng.random() < 0.6:
             made = rng.choice([self.choose, self.repeat, self.try_, self.together, self.framed, self.asking, self.used])
-            return dataclasses.replace(made(depth + 1, still), policy=policy)
-        return dataclasses.replace(self.small(still), policy=policy)
+            return made(depth + 1, still).under(policy)
+        return self.small(still).under(policy)
 
-    def small(self, still: bool) -> MissionStep:
+    def small(self, still: bool) -> Step:
         """A step that holds no others."""
         rng = self.rng
         kind = rng.randrange(10) if not still else rng.randrange(4)
         if kind > 7:
-            return MissionStep(tuple(map(parse_command, rng.choice(PAIRS))))
+            return Say(say="get it and bring it").meaning(tuple(map(parse_command, rng.choice(PAIRS))))
         if kind == 0:
             return self.set()
         if kind == 1:
-            return MissionStep(block=rng.choice([Wait(seconds=rng.choice([0.5, 3.0])), self.wait(still)]))
+            return rng.choice([Wait(awaited=Awaited(seconds=rng.choice([0.5, 3.0]))), self.wait(still)])
         if kind == 2:
-            gives = rng.choice([None, "flag"])
-            return MissionStep(block=Check(self.condition(instant=still), gives))
+            gives = rng.choice([None, {"answer": "flag"}])
+            return Check(condition=self.condition(instant=still), gives=gives)
         if kind == 3:
-            return MissionStep(block=self.question({}))
+            return self.question({})
         if kind == 4:
-            return MissionStep(block=Speak(Template(rng.choice(["hello", "I have {n} {word}", "{1 / n}"]))))
+            return Speak(speak=rng.choice(["hello", "I have {n} {word}", "{1 / n}"]))
         if kind == 5:
-            return MissionStep(block=Dock(rng.choice([None, 0.5])))
+            return Dock(charging=Charging(level=rng.choice([None, 0.5])))
         if kind == 6:
-            return MissionStep(skill=SkillCall(rng.choice(SKILLS)))
-        return MissionStep((parse_command(rng.choice(COMMANDS)),))
+            return CallSkill(skill=rng.choice(SKILLS))
+        return Do.of(parse_command(rng.choice(COMMANDS)))
 
-    def set(self) -> MissionStep:
+    def set(self) -> Step:
         """Values that get others."""
         choice = {"n": NUMBERS, "word": TEXTS, "flag": TRUTHS}
         names = self.rng.sample(sorted(choice), self.rng.choice([1, 1, 2]))
-        return MissionStep(block=Set({name: Expression(self.rng.choice(choice[name])) for name in names}))
+        return Set(set={name: self.rng.choice(choice[name]) for name in names})
 
     def wait(self, instant: bool) -> Wait:
         """What is waited for may never come: a time limit stands around some."""
         rng = self.rng
         if rng.random() < 0.2:
-            return Wait(until_clock_s=8 * 3600.0 + rng.choice([0.0, 60.0]))
-        return Wait(self.condition(instant=instant), every_s=rng.choice([1.0, 15.0]))
+            return Wait(awaited=Awaited(until_clock=rng.choice(["08:00", "08:01"])))
+        return Wait(awaited=Awaited(condition=self.condition(instant=instant), every_s=rng.choice([1.0, 15.0])))
 
     def condition(self, *, instant: bool, depth: int = 0) -> Condition:
         """A condition; an `instant` one takes no look."""
         rng = self.rng
         kind = rng.randrange(8)
         if kind == 0 and depth < 3:
-            return AllOf(tuple(self.condition(instant=instant, depth=depth + 1) for _ in range(rng.randint(1, 3))))
+            return AllOf(
+                parts=tuple(self.condition(instant=instant, depth=depth + 1) for _ in range(rng.randint(1, 3)))
+            )
         if kind == 1 and depth < 3:
-            return AnyOf(tuple(self.condition(instant=instant, depth=depth + 1) for _ in range(rng.randint(1, 3))))
+            return AnyOf(
+                parts=tuple(self.condition(instant=instant, depth=depth + 1) for _ in range(rng.randint(1, 3)))
+            )
         if kind == 2 and depth < 3:
-            return Not(self.condition(instant=instant, depth=depth + 1))
+            return Not(part=self.condition(instant=instant, depth=depth + 1))
         if kind == 3:
-            return ButtonPressed(rng.choice(BUTTONS))
+            return ButtonPressed(button=rng.choice(BUTTONS))
         if kind == 4 and not instant:
-            return Look(parse_command(rng.choice(LOOKS)))
+            return Look.of(parse_command(rng.choice(LOOKS)))
         if kind == 5 and not instant:
-            return DoorOpen(("hall", "kitchen"))
-        return ValueIs(Expression(rng.choice(TRUTHS)))
+            return DoorOpen(door=("hall", "kitchen"))
+        return ValueIs(text=rng.choice(TRUTHS))
 
-    def choose(self, depth: int, still: bool) -> MissionStep:
+    def choose(self, depth: int, still: bool) -> Step:
         """`if`."""
         otherwise = self.steps(depth, still=still) if self.rng.random() < 0.6 else ()
-        return MissionStep(block=Choose(self.condition(instant=still), self.steps(depth, still=still), otherwise))
+        return Choose(condition=self.condition(instant=still), then=self.steps(depth, still=still), otherwise=otherwise)
 
-    def repeat(self, depth: int, still: bool) -> MissionStep:
+    def repeat(self, depth: int, still: bool) -> Step:
         """`repeat`, always with a number of rounds at most."""
         rng = self.rng
         kind = rng.randrange(3)
         until = self.condition(instant=still) if kind == 0 else None
         while_ = self.condition(instant=still) if kind == 1 else None
         every_s = rng.choice([None, None, 2.0])
-        return MissionStep(block=Repeat(self.steps(depth, still=still), rng.randint(1, 3), until, while_, every_s))
+        return Repeat(
+            loop=Loop(times=rng.randint(1, 3), until=until, while_=while_, every_s=every_s),
+            steps=self.steps(depth, still=still),
+        )
 
-    def try_(self, depth: int, still: bool) -> MissionStep:
+    def try_(self, depth: int, still: bool) -> Step:
         """`try`."""
-        return MissionStep(block=Try(self.steps(depth, still=still), self.steps(depth, still=still)))
+        return Try(steps=self.steps(depth, still=still), otherwise=self.steps(depth, still=still))
 
-    def together(self, depth: int, still: bool) -> MissionStep:
+    def together(self, depth: int, still: bool) -> Step:
         """`together`: one that may move, and some that use no part of the robot."""
         rng = self.rng
         steps = [self.step(depth, still=still), *(self.step(depth, still=True) for _ in range(rng.randint(1, 2)))]
         rng.shuffle(steps)
-        return MissionStep(block=Together(tuple(steps), rng.choice([None, 1, 2])))
+        return Together(steps=tuple(steps), done_when=rng.choice([None, 1, 2]))
 
-    def framed(self, depth: int, still: bool) -> MissionStep:
+    def framed(self, depth: int, still: bool) -> Step:
         """`group`."""
-        return MissionStep(block=self.group(self.steps(depth, still=still), depth, still=still))
+        return self.group(self.steps(depth, still=still), depth, still=still)
 
-    def group(self, steps: tuple[MissionStep, ...], depth: int, *, still: bool = False) -> Group:
+    def group(self, steps: Steps, depth: int, *, still: bool = False) -> Group:
         """A group of steps, with some of what it can have."""
+        return Group(steps=steps, name=self.rng.choice([None, "a group"]), **self.watched(depth, still=still))
+
+    def watched(self, depth: int, *, still: bool = False) -> dict[str, Any]:
+        """Some of what a group or a mission can have around its steps."""
         rng = self.rng
         always = self.steps(depth + 2, still=still) if rng.random() < 0.6 else ()
-        holds = self.condition(instant=True) if rng.random() < 0.2 else None
+        holds = While(holds=self.condition(instant=True)) if rng.random() < 0.2 else None
         handlers = rng.choice([0, 0, 1, 2])
         when = tuple(
-            Handler(self.condition(instant=True), self.steps(depth + 2, still=still), rng.randint(1, 3))
+            Handler(
+                condition=self.condition(instant=True),
+                steps=self.steps(depth + 2, still=still),
+                times=rng.randint(1, 3),
+            )
             for _ in range(handlers)
         )
-        return Group(steps, rng.choice([None, "a group"]), always, holds, when)
+        return {"always": always, "while_": holds, "when": when or None}
 
-    def asking(self, depth: int, still: bool) -> MissionStep:
+    def asking(self, depth: int, still: bool) -> Step:
         """`ask` with steps for its answers."""
         choices = {
             choice: self.steps(depth, still=still) if self.rng.random() < 0.7 else ()
             for choice in ("tea", "the coffee", "no!")
         }
-        return MissionStep(block=self.question(choices))
+        return self.question(choices)
 
-    def question(self, choices: Mapping[str, tuple[MissionStep, ...]]) -> Ask:
+    def question(self, choices: Mapping[str, tuple[Step, ...]]) -> Ask:
         """A question, with choices or without."""
         rng = self.rng
-        text = Template(rng.choice(["which?", "{n} {word}?", "{1 / n}?"]))
+        text = rng.choice(["which?", "{n} {word}?", "{1 / n}?"])
         limit_s = rng.choice([2.0, 20.0])
         if choices:
-            return Ask(text, choices, None, limit_s, rng.choice([None, "tea"]), rng.choice([None, "word"]))
+            return Ask(
+                ask=text,
+                choices=choices,
+                limit_s=limit_s,
+                default=rng.choice([None, "tea"]),
+                gives=rng.choice([None, {"answer": "word"}]),
+            )
         match, default, gives = rng.choice(
             [("number", 3, "n"), ("text", "milk", "word"), ("place", "kitchen", "word"), ("number", None, None)]
         )
-        return Ask(text, {}, match, limit_s, rng.choice([None, default]), gives)
+        return Ask(
+            ask=text,
+            match=match,
+            limit_s=limit_s,
+            default=rng.choice([None, default]),
+            gives={"answer": gives} if gives else None,
+        )
 
-    def used(self, depth: int, still: bool) -> MissionStep:
+    def used(self, depth: int, still: bool) -> Step:
         """Another mission."""
         values = {"n": 1, "word": "tea", "flag": True}
         steps = self.steps(depth, still=still)
-        whole = self.group((), depth, still=still) if self.rng.random() < 0.4 else None
-        return MissionStep(used=Mission("used", DEFAULT_WORLD, "Alice", steps, variables=values, whole=whole))
+        watched = self.watched(depth, still=still) if self.rng.random() < 0.4 else {}
+        used = Mission(name="used", robot="Alice", steps=steps, variables=values, **watched)
+        return UseMission(use="used.yaml").meaning(used)
 
-    def policy(self, *, whole: bool = False, still: bool = False) -> StepPolicy:
+    def policy(self, *, whole: bool = False, still: bool = False) -> Policy:
         """A policy; that of a whole mission skips nothing."""
         rng = self.rng
         ways = [OnFailure.STOP, OnFailure.STOP, OnFailure.RETRY, OnFailure.RETURN, OnFailure.ASK, OnFailure.SKIP]
-        guards = StepGuards(
-            rng.choice([None, None, None, 0.2]), rng.random() < 0.1, rng.choice([None, None, None, 60.0])
+        guards = Guards(
+            battery=rng.choice([None, None, None, 0.2]),
+            localised=rng.random() < 0.1,
+            time_s=rng.choice([None, None, None, 60.0]),
         )
-        return StepPolicy(
+        on_failure = rng.choice(ways[:5] if whole else [*ways[:3], *ways[4:]] if still else ways)
+        question = OperatorQuestion(limit_s=rng.choice([2.0, 10.0]), default="stop" if whole else "skip")
+        return Policy(
             timeout_s=rng.choice([None, 1.0, 4.0, 20.0]),
             retries=rng.choice([0, 0, 1, 2]),
-            on_failure=rng.choice(ways[:5] if whole else [*ways[:3], *ways[4:]] if still else ways),
-            question=OperatorQuestion(limit_s=rng.choice([2.0, 10.0]), default="stop" if whole else "skip"),
+            on_failure=on_failure,
+            question=question if on_failure is OnFailure.ASK else None,
             guards=guards,
         )
 
@@ -568,7 +598,7 @@ def _compiled(
     robotics = Robotics(rng, robot, failing=failing, world=world)
     registry = robotics.registry()
     tree = compile_mission(made_mission(seed), knowledge=WORLD, registry=registry)
-    between = Mission("between", DEFAULT_WORLD, "Alice", (MissionStep(skill=SkillCall("stow")),))
+    between = Mission(name="between", robot="Alice", steps=(CallSkill(skill="stow"),))
     return robotics, tree, compile_mission(between, knowledge=WORLD, registry=registry)
 
 

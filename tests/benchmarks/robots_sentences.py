@@ -21,9 +21,9 @@ from executive.language.parser import load_parser
 from executive.language.robots import Addressed, Part, Whom, understand_for_robots
 from executive.language.understand import Status
 from executive.words.knowledge import load_knowledge
-from executive.words.written import parse_written
 from plant.worlds.world import load_world
-from tests.benchmarks.structured_sentences import Score, as_lines, in_full, steps_of
+from tests.benchmarks.structured_sentences import Score, in_full, steps_of
+from tests.executive.language.notation import as_noted, noted
 
 __all__ = ["TABLES", "measured"]
 
@@ -60,12 +60,12 @@ def _wanted(text: str) -> tuple[str, tuple[int, ...], str]:
     match = _PART.fullmatch(text)
     assert match is not None, text
     after = tuple(int(number) - 1 for number in (match["after"] or "").split(",") if number.strip())
-    return match["who"], after, as_lines(parse_written(in_full(step) for step in match["steps"].split(" | ")))
+    return match["who"], after, as_noted(in_full(step) for step in match["steps"].split(" | "))
 
 
 def _said(part: Part) -> tuple[str, tuple[int, ...], str]:
     who = part.robot.value if isinstance(part.robot, Whom) else part.robot
-    return who, part.after, as_lines(steps_of(part.meaning))
+    return who, part.after, noted(steps_of(part.meaning))
 
 
 def _line(text: str, answer: Addressed) -> str:

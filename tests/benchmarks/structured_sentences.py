@@ -22,11 +22,11 @@ import yaml
 from executive.language.parser import load_parser
 from executive.language.understand import Status, Understanding, understand
 from executive.words.knowledge import load_knowledge
-from executive.words.steps import MissionStep
-from executive.words.written import parse_written, written
+from executive.words.steps import Step, steps_of_commands
 from plant.worlds.world import load_world
+from tests.executive.language.notation import as_noted, noted
 
-__all__ = ["TABLES", "Score", "as_lines", "in_full", "measured", "steps_of"]
+__all__ = ["TABLES", "Score", "in_full", "measured", "steps_of"]
 
 TABLES: Final = tuple(Path(__file__).with_name(f"structured_sentences{name}.yaml") for name in ("", "_later", "_last"))
 _SHORT: Final = re.compile(r"\b(fetch|carry|put|take|give|go|find|charge)\(([^()]*)\)")
@@ -80,20 +80,15 @@ def _answers(table: Path) -> Iterator[tuple[str, list[str] | str, Understanding]
 def _right(expected: list[str] | str, answer: Understanding) -> bool:
     if isinstance(expected, str):
         return answer.status is not Status.OK
-    return answer.status is Status.OK and as_lines(steps_of(answer)) == as_lines(parse_written(map(in_full, expected)))
+    return answer.status is Status.OK and noted(steps_of(answer)) == as_noted(map(in_full, expected))
 
 
 def _wrongly_accepted(expected: list[str] | str, answer: Understanding) -> bool:
     return answer.status is Status.OK and not _right(expected, answer)
 
 
-def steps_of(answer: Understanding) -> Sequence[MissionStep]:
-    return answer.steps or (MissionStep(answer.commands),)
-
-
-def as_lines(steps: Sequence[MissionStep]) -> str:
-    """The written form, with every command a step of its own."""
-    return re.sub(r"\]\s*then Take", "]; Take", "; ".join(written(steps)))
+def steps_of(answer: Understanding) -> Sequence[Step]:
+    return answer.steps or steps_of_commands(answer.commands)
 
 
 def in_full(text: str) -> str:
@@ -101,7 +96,7 @@ def in_full(text: str) -> str:
 
 
 def _line(text: str, answer: Understanding) -> str:
-    found = "; ".join(written(steps_of(answer))) if answer.status is Status.OK else answer.reason
+    found = noted(steps_of(answer)) if answer.status is Status.OK else answer.reason
     return f"{text}\n      {found}"
 
 

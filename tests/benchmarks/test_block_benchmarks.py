@@ -14,12 +14,26 @@ from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
-from executive.words.blocks import Choose, Group, Handler, Repeat, Set, Together, Try, Wait
 from executive.words.command import parse_command
 from executive.words.condition import AllOf, ButtonPressed, Not, ValueIs
-from executive.words.expression import Expression
 from executive.words.knowledge import Knowledge
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep, SkillCall, StepPolicy
+from executive.words.mission import Mission
+from executive.words.policy import Policy
+from executive.words.steps import (
+    Awaited,
+    CallSkill,
+    Choose,
+    Do,
+    Group,
+    Handler,
+    Loop,
+    Repeat,
+    Set,
+    Together,
+    Try,
+    Wait,
+    While,
+)
 from tests.executive.conftest import (
     KNOWLEDGE,
     PORTS,
@@ -33,29 +47,31 @@ from tests.executive.conftest import (
 from tests.visitors import OnTick
 
 WORLD = Knowledge.model_validate(KNOWLEDGE)
-FULL = ValueIs(Expression("battery > 0.1 and n < 100000"))
+FULL = ValueIs(text="battery > 0.1 and n < 100000")
 STEPS, NODES = 1000, 1000
 
 
-def block(made, **more):
-    return MissionStep(block=made, **more)
+def block(made, policy=None):
+    return made.under(policy)
 
 
 def go(text):
-    return MissionStep((parse_command(text),))
+    return Do.of(parse_command(text))
 
 
 def wait(seconds=1000.0):
-    return block(Wait(seconds=seconds))
+    return block(Wait(awaited=Awaited(seconds=seconds)))
 
 
 def mixed(number):
     """Ten steps in blocks, with policies and values."""
     drive = go("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]")
-    put = block(Set({f"v{number % 7}": Expression("n + 1")}))
-    inner = block(Choose(FULL, (drive, put), (wait(),)), policy=StepPolicy(timeout_s=60.0, retries=1))
-    tried = block(Try((MissionStep(skill=SkillCall("stow")), wait()), (drive,)))
-    return (block(Group((inner, tried), always=(wait(),), holds=FULL)),)
+    put = block(Set(set={f"v{number % 7}": "n + 1"}))
+    inner = block(
+        Choose(condition=FULL, then=(drive, put), otherwise=(wait(),)), policy=Policy(timeout_s=60.0, retries=1)
+    )
+    tried = block(Try(steps=(CallSkill(skill="stow"), wait()), otherwise=(drive,)))
+    return (block(Group(steps=(inner, tried), always=(wait(),), while_=While(holds=FULL))),)
 
 
 def registry():
@@ -66,7 +82,7 @@ def registry():
 @pytest.mark.benchmark(group="compiler")
 def test_compiling_a_mission_of_a_thousand_steps(benchmark):
     steps = tuple(step for number in range(STEPS // 10) for step in mixed(number))
-    mission = Mission("long", DEFAULT_WORLD, "Alice", steps, variables={"n": 0})
+    mission = Mission(name="long", robot="Alice", steps=steps, variables={"n": 0})
     assert sum(1 for _ in mission.walk()) >= STEPS
     skills = registry()
     tree = benchmark.pedantic(
@@ -77,17 +93,19 @@ def test_compiling_a_mission_of_a_thousand_steps(benchmark):
 
 def running(number):
     """About ten nodes that all run: rounds, conditions that are watched, waits for what never comes."""
-    never = Wait(AllOf((Not(FULL), ButtonPressed("go"))), every_s=0.0)
-    rounds = block(Repeat((block(never),), times=3))
-    return block(Group((rounds,), holds=FULL, when=(Handler(Not(FULL), (wait(),)),)))
+    never = Wait(awaited=Awaited(condition=AllOf(parts=(Not(part=FULL), ButtonPressed(button="go"))), every_s=0.0))
+    rounds = block(Repeat(loop=Loop(times=3), steps=(block(never),)))
+    return block(
+        Group(steps=(rounds,), while_=While(holds=FULL), when=(Handler(condition=Not(part=FULL), steps=(wait(),)),))
+    )
 
 
 @pytest.mark.benchmark(group="executive")
 def test_a_tick_of_a_tree_of_a_thousand_nodes(benchmark):
     width = 1
     while True:
-        steps = (block(Together(tuple(running(number) for number in range(max(2, width))))),)
-        mission = Mission("wide", DEFAULT_WORLD, "Alice", steps, variables={"n": 0})
+        steps = (block(Together(steps=tuple(running(number) for number in range(max(2, width))))),)
+        mission = Mission(name="wide", robot="Alice", steps=steps, variables={"n": 0})
         tree = compile_mission(mission, knowledge=WORLD, registry=registry())
         if len(tree.path_ids) >= NODES:
             break

@@ -27,7 +27,8 @@ from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import Do
 from tests.executive.conftest import (
     FETCH,
     KNOWLEDGE,
@@ -49,9 +50,9 @@ def fetch(steps_each, more=0):
     """The tree of a fetch, whose leaves drive for some ticks and say something new in each; `more` follow."""
     script = Script(steps=steps_each, says=lambda name, left: f"{name}, {left} to go")
     registry = {name: scripted_skill(script, name, *ports) for name, ports in PORTS.items()}
-    steps = tuple(MissionStep((parse_command(text),)) for text in FETCH * (1 + more))
+    steps = tuple(Do.of(parse_command(text)) for text in FETCH * (1 + more))
     knowledge = Knowledge.model_validate(KNOWLEDGE)
-    return compile_mission(Mission("fetch", DEFAULT_WORLD, "Alice", steps), knowledge=knowledge, registry=registry)
+    return compile_mission(Mission(name="fetch", robot="Alice", steps=steps), knowledge=knowledge, registry=registry)
 
 
 def ticks_of_a_run(tree, folder, most=None):

@@ -6,14 +6,15 @@ import sys
 from pathlib import Path
 
 import pytest
+from pydantic import TypeAdapter
 from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parent))
 from documents import DOCS, blocks
 
 from executive.cli.entry import app
-from executive.mission.file.condition_schema import ConditionFile
-from executive.mission.file.schema import BLOCKS
+from executive.words.condition import Condition
+from executive.words.steps import BLOCKS
 
 SPEC = importlib.util.spec_from_file_location("make_reference", DOCS / "make_reference.py")
 assert SPEC is not None
@@ -51,7 +52,7 @@ def test_the_schema_of_mission_files_is_current_and_shows_the_ranges_of_the_port
     """Run `python docs/make_reference.py` when this fails."""
     text = make_reference.MISSION_SCHEMA.read_text(encoding="utf-8")
     assert text == make_reference.mission_schema_text()
-    rules = json.loads(text)["$defs"]["StepFile"]["allOf"]
+    rules = json.loads(text)["$defs"]["CallSkill"]["allOf"]
     (navigate,) = (rule["then"] for rule in rules if rule["if"]["properties"]["skill"]["const"] == "navigate")
     speed, *_ = navigate["properties"]["with"]["properties"]["max_speed"]["anyOf"]
     assert speed == {"type": "number", "exclusiveMinimum": 0.0, "maximum": 3.0}
@@ -68,7 +69,8 @@ def test_every_kind_of_step_is_explained():
 
 def test_every_condition_is_explained():
     told = " ".join(what for what, *_ in mission_constructs.CONDITIONS)
-    keys = set(ConditionFile.model_json_schema(by_alias=True)["$defs"]["ConditionFile"]["properties"])
+    kinds = TypeAdapter(Condition).json_schema()["$defs"].values()
+    keys = {key for kind in kinds for key in kind.get("properties", ())}
     assert {key for key in keys - {"expression"} if f"`{key}`" not in told.replace(", ", "` `")} == set()
 
 

@@ -20,7 +20,8 @@ from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.snapshot import Change, Observed
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import steps_of_commands
 from skills.api import (
     Cause,
     Failed,
@@ -436,10 +437,8 @@ def compiled(knowledge: Knowledge, registry: dict[str, type[Skill[Any]]]) -> Cal
     """Compile commands given in their text form."""
 
     def compile_texts(*texts: str, name: str = "fetch drink") -> CompiledTree:
-        steps = [MissionStep((parse_command(text),)) for text in texts]
-        return compile_mission(
-            Mission(name, DEFAULT_WORLD, "Alice", tuple(steps)), knowledge=knowledge, registry=registry
-        )
+        steps = steps_of_commands(list(map(parse_command, texts)))
+        return compile_mission(Mission(name=name, robot="Alice", steps=steps), knowledge=knowledge, registry=registry)
 
     return compile_texts
 

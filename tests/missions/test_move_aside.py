@@ -18,7 +18,9 @@ from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
-from executive.words.steps import Mission, MissionStep, StepPolicy
+from executive.words.mission import Mission
+from executive.words.policy import Policy
+from executive.words.steps import Do
 from plant import simulation
 from plant.worlds.placement import place_objects
 from plant.worlds.world import load_world
@@ -52,8 +54,8 @@ def shelf(tmp_path, monkeypatch):
 
 
 def test_the_beer_before_it_is_moved_aside_and_the_coke_is_taken(shelf):
-    steps = (MissionStep((parse_command(f"Take [Nothing] to [{TAKEN}] and do [grasp] to [coke]"),)),)
-    mission = Mission("shelf", str(shelf.folder), "Alice", steps, StepPolicy(move_aside=1))
+    steps = (Do.of(parse_command(f"Take [Nothing] to [{TAKEN}] and do [grasp] to [coke]")),)
+    mission = Mission(name="shelf", world=str(shelf.folder), robot="Alice", steps=steps).under(Policy(move_aside=1))
     tree = compile_mission(mission, knowledge=knowledge_of(shelf), registry=built_in_skills())
     plant, said = simulation.Simulation(shelf, seed=SEED, visuals=False), list[str]()
     with LockStepWorker(plant.clock) as worker:

@@ -19,7 +19,8 @@ from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import Do
 from plant.diagram import LooseModel
 from plant.models.spot.description import HAND_LINK
 from plant.simulation import Simulation
@@ -49,9 +50,9 @@ class FlatMission:
     def __init__(self, texts, *, seed=1, **plant: Any) -> None:
         self.world = open_world("flat")
         self.knowledge = knowledge_of(self.world)
-        steps = [MissionStep((parse_command(text),)) for text in texts]
+        steps = [Do.of(parse_command(text)) for text in texts]
         self.tree = compile_mission(
-            Mission("m", DEFAULT_WORLD, "Alice", tuple(steps)), knowledge=self.knowledge, registry=built_in_skills()
+            Mission(name="m", robot="Alice", steps=tuple(steps)), knowledge=self.knowledge, registry=built_in_skills()
         )
         self.simulation = Simulation(self.world, seed=seed, robots={"Alice": "spot"}, visuals=False, **plant)
         self.entry = run_entry(self.simulation, self.world, self.tree)

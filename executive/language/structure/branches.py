@@ -17,7 +17,6 @@ from executive.language.structure.row import (
     LookedAt,
     Rounds,
     Row,
-    Steps,
     contrary_of,
     end_of,
     one_errand,
@@ -29,11 +28,9 @@ from executive.language.structure.row import (
     was_not,
     where_it_is_taken,
 )
-from executive.words.blocks import Choose, Group, Repeat, Together, Try, Wait
 from executive.words.command import Task
 from executive.words.condition import ValueIs
-from executive.words.expression import Expression
-from executive.words.steps import MissionStep
+from executive.words.steps import Awaited, Choose, Do, Group, Loop, Repeat, Steps, Together, Try, Wait
 
 
 class Branches(Base):
@@ -51,7 +48,7 @@ class Branches(Base):
         ended = re.sub(r"[, ]+(?:at the end|in the end)$", "", ended, flags=re.IGNORECASE)
         rest = [replace(first, joint="", text=ended), *clauses[at + 1 :]]
         always, state = self.sequence(rest, replace(row.state, goal=None, at=None))
-        row.steps = [MissionStep(block=Group(tuple(row.steps), always=always))]
+        row.steps = [Group(steps=tuple(row.steps), always=always)]
         row.state, row.asked = state, None
         return len(clauses)
 
@@ -69,7 +66,7 @@ class Branches(Base):
         if not rest and not follows:
             raise RefusalError(f"what am I to do {clause.cue.lower()} {clause.text}?", [f"{clause.cue} {clause.text}"])
         if asked is not None and same(supposed.condition, asked.supposed.condition):
-            row.steps[-1:] = asked.before
+            row.steps[-asked.steps :] = []
         body = [*cut(rest), *follows]
         if clause.kind is Cue.UNLESS:
             supposed = contrary_of(supposed)
@@ -137,7 +134,9 @@ class Branches(Base):
             end = stop
         if not (then or otherwise):
             raise RefusalError("then there is nothing to do", [supposed.said])
-        self.put(row, Choose(supposed.condition, then, otherwise), state_behind_both(after, other_state))
+        condition = supposed.condition if then else contrary(supposed.condition)
+        block = Choose(condition=condition, then=then or otherwise, otherwise=otherwise if then else ())
+        self.put(row, block, state_behind_both(after, other_state))
         return end
 
     def branch(self, clauses: Sequence[Clause], supposed: Supposed, state: State) -> tuple[Steps, State]:
@@ -169,12 +168,12 @@ class Branches(Base):
             raise RefusalError(f"'{clause.cue}' goes on from nothing that was said before", [clause.cue])
         body = [*cut(clause.text), *clauses[at + 1 : end]]
         if asked is not None and asked.looked and clause.kind is not Cue.FAILED:
-            row.steps[-1:] = asked.before
+            row.steps[-asked.steps :] = []
             supposed = asked.supposed if clause.kind is Cue.SO else contrary_of(asked.supposed)
             end = end_of(clauses, at + 1)
             body = [*cut(clause.text), *clauses[at + 1 : end]]
             return self.choose(row, supposed, body, clauses, end)
-        last = row.steps[-1].block if row.steps else None
+        last = row.steps[-1] if row.steps else None
         if asked is not None and asked.decided and isinstance(last, Choose) and clause.kind is not Cue.SO:
             return self._else_of(row, last, asked.supposed, body, end)
         if isinstance(last, Choose | Repeat) and clause.kind is not Cue.FAILED:
@@ -186,9 +185,10 @@ class Branches(Base):
         missing = clause.kind is Cue.NOT and clause.cue.lower() not in ("if not", "if no")
         if missing and asked is not None:
             otherwise, state = self.branch(body, contrary_of(asked.supposed), asked.supposed.fails)
-            done = tuple(row.steps[-1:])
-            row.steps[-1:] = []
-            self.put(row, Choose(asked.supposed.condition, done, otherwise), state_behind_both(row.state, state))
+            done = tuple(row.steps[-asked.steps :])
+            row.steps[-asked.steps :] = []
+            block = Choose(condition=asked.supposed.condition, then=done, otherwise=otherwise)
+            self.put(row, block, state_behind_both(row.state, state))
             return end
         if missing:
             raise RefusalError(f"'{clause.cue}' goes on from nothing that was looked at", [clause.cue])
@@ -197,14 +197,14 @@ class Branches(Base):
             [replace(body[0], joint=""), *body[1:]], replace(row.state, held=None, goal=None, at=None)
         )
         row.steps[row.begun :] = []
-        self.put(row, Try(tried, otherwise), state_behind_both(row.state, state))
+        self.put(row, Try(steps=tried, otherwise=otherwise), state_behind_both(row.state, state))
         return end
 
     def _else_of(self, row: Row, last: Choose, supposed: Supposed, body: Sequence[Clause], end: int) -> int:
         """The other branch of what was done only if something was so."""
         otherwise, state = self.branch(body, contrary_of(supposed), supposed.fails)
         row.steps[-1:] = []
-        self.put(row, replace(last, otherwise=otherwise), state_behind_both(row.state, state))
+        self.put(row, last.model_copy(update={"otherwise": otherwise}), state_behind_both(row.state, state))
         return end
 
     def soon(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
@@ -214,7 +214,7 @@ class Branches(Base):
         supposed, rest = self.split(clauses[at].text, row.state, clauses[at + 1 : end])
         if not rest and end == at + 1:
             raise RefusalError(f"what am I to do {clauses[at].cue.lower()} {supposed.said}?", [clauses[at].cue])
-        self.put(row, Wait(supposed.condition), supposed.holds)
+        self.put(row, Wait(awaited=Awaited(condition=supposed.condition)), supposed.holds)
         more, row.state = self.sequence([*cut(rest), *clauses[at + 1 :]], supposed.holds)
         row.steps += more
         return len(clauses)
@@ -250,9 +250,9 @@ class Branches(Base):
         """Put rounds of what the clauses ask for."""
         begun = replace(rounds.state, goal=None, at=None)
         steps, state = self.sequence([replace(body[0], joint=""), *body[1:]], begun)
-        if rounds.block.times is None and rounds.block.every_s is None and not _worth_repeating(steps):
+        if rounds.loop.times is None and rounds.loop.every_s is None and not _worth_repeating(steps):
             raise RefusalError("I do not see what is to be repeated; say 'wait there until ...'", [spoken(body)])
-        self.put(row, _one_repeat(replace(rounds.block, steps=steps)), state)
+        self.put(row, _one_repeat(Repeat(loop=rounds.loop, steps=steps)), state)
 
     def _how_often(self, row: Row, clause: Clause, follows: Sequence[Clause]) -> tuple[Rounds, str]:
         """How often what is behind it is to be done, and the rest of the words."""
@@ -260,12 +260,12 @@ class Branches(Base):
         if clause.kind is Cue.EVERY:
             return self._every(_span(clause.cue), clause.text, state, bool(follows))
         if clause.kind is Cue.TIMES:
-            return Rounds(Repeat((), times=_times(clause.cue)), state), clause.text
+            return Rounds(Loop(times=_times(clause.cue)), state), clause.text
         if clause.kind is Cue.UNTIL:
             for cut_at in (len(clause.text), *verb_positions(clause.text)):
                 if time_of(clause.text[:cut_at].strip(" ,")) is not None:
                     found = Behind("", Cue.UNTIL, clause.cue, clause.text[:cut_at].strip(" ,"))
-                    return self._rounds_behind(row, (), found) or Rounds(Repeat(()), state), clause.text[cut_at:]
+                    return self._rounds_behind(row, (), found), clause.text[cut_at:]
         supposed, rest = self.split(clause.text, state, follows)
         return _rounds_by(clause.kind, supposed), rest
 
@@ -278,35 +278,35 @@ class Branches(Base):
                 if found is not None:
                     return found, text[cut_at:]
             raise RefusalError(f"I do not understand for how long: '{text}'", [text])
-        return Rounds(Repeat((), every_s=every_s), state), text
+        return Rounds(Loop(every_s=every_s), state), text
 
     def limited(self, every_s: float, text: str, state: State) -> Rounds | None:
         """The rounds within "for an hour", "until three o'clock", "five times"."""
         if not text:
-            return Rounds(Repeat((), every_s=every_s), state)
+            return Rounds(Loop(every_s=every_s), state)
         match = ACTS.for_span.fullmatch(text)
         if match is not None:
             seconds = seconds_of(match[1])
             if seconds is None or seconds < every_s:
                 raise RefusalError(f"'{text}' is shorter than one round", [text])
-            return Rounds(Repeat((), times=int(seconds // every_s), every_s=every_s), state)
+            return Rounds(Loop(times=int(seconds // every_s), every_s=every_s), state)
         count = times_of(text)
         if count is not None:
-            return Rounds(Repeat((), times=count, every_s=every_s), state)
+            return Rounds(Loop(times=count, every_s=every_s), state)
         match = re.fullmatch(r"(?P<how>until|till|as long as|while) (?P<what>.+)", text, re.IGNORECASE)
         if match is None:
             return None
         if (time := time_of(match["what"])) is not None:
             self.notes += [f"I take '{match['what']}' as {time.text}"] if time.taken else []
-            until = ValueIs(Expression(f'clock >= "{time.text}"'))
-            return Rounds(Repeat((), until=until, every_s=every_s), state)
+            until = ValueIs(text=f'clock >= "{time.text}"')
+            return Rounds(Loop(until=until, every_s=every_s), state)
         try:
             supposed = suppose(match["what"], state, self.reader)
         except RefusalError:
             return None
         kind = Cue.UNTIL if match["how"].lower() in ("until", "till") else Cue.WHILE
         rounds = _rounds_by(kind, supposed)
-        return replace(rounds, block=replace(rounds.block, every_s=every_s))
+        return replace(rounds, loop=rounds.loop.model_copy(update={"every_s": every_s}))
 
     def _on_the_way(self, row: Row, clause: Clause, follows: Sequence[Clause]) -> bool:
         """ "While driving to the kitchen, say ...": both at once, where that is simple."""
@@ -328,7 +328,7 @@ class Branches(Base):
         first = said[0] if said else None
         if first is None or first.text is None or first.to is not None or len(reading.commands) != 1:
             raise RefusalError("while I go somewhere I can only say something", [spoken(body)])
-        self.put(row, Together((MissionStep(reading.commands), say(first.text))), reading.state)
+        self.put(row, Together(steps=(Do.of(reading.commands[0]), say(first.text))), reading.state)
 
     def modified(self, row: Row, clause: Clause, found: Behind) -> None:
         """What is done only if something is so, or several times."""
@@ -342,20 +342,20 @@ class Branches(Base):
         if found.kind is Cue.EVERY:
             rounds = self.limited(_span(found.cue), found.text, row.state)
         elif found.kind is Cue.TIMES:
-            rounds = Rounds(Repeat((), times=_times(found.cue)), row.state) if not found.text else None
+            rounds = None if found.text else Rounds(Loop(times=_times(found.cue)), row.state)
         else:
             rounds = self._rounds_behind(row, scope, found)
         if rounds is None:
             raise RefusalError(f"I do not understand how often: '{found.cue} {found.text}'".strip(), [found.cue])
         self.repeat_of(row, rounds, scope)
 
-    def _rounds_behind(self, row: Row, scope: Sequence[Clause], found: Behind) -> Rounds | None:
+    def _rounds_behind(self, row: Row, scope: Sequence[Clause], found: Behind) -> Rounds:
         """ "... until there are none left", "... until three o'clock"."""
         if not found.text:
             raise RefusalError(f"{found.cue.lower()} what?", [found.cue])
         if found.kind is Cue.UNTIL and (time := time_of(found.text)) is not None:
             self.notes += [f"I take '{found.text}' as {time.text}"] if time.taken else []
-            return Rounds(Repeat((), until=ValueIs(Expression(f'clock >= "{time.text}"'))), row.state)
+            return Rounds(Loop(until=ValueIs(text=f'clock >= "{time.text}"')), row.state)
         _, state = type(self)(self.reader).sequence(scope, row.state)
         supposed = suppose(found.text, state, self.reader)
         return replace(_rounds_by(found.kind, supposed), state=row.state)
@@ -402,7 +402,7 @@ class Branches(Base):
         both = Supposed(condition, supposed.said, supposed.holds, supposed.fails)
         if found.kind is Cue.UNLESS:
             both = replace(both, holds=supposed.fails, fails=supposed.holds)
-        self.put(row, Choose(condition, steps), state_behind_both(state, row.state))
+        self.put(row, Choose(condition=condition, then=steps), state_behind_both(state, row.state))
         row.asked = LookedAt(both, looked=False, decided=True)
 
 
@@ -410,24 +410,24 @@ def _worth_repeating(steps: Steps) -> bool:
     """Whether it is more than to go to one place, or to charge."""
     commands = [command for step in steps for each in step.walk() for command in each.commands]
     stays = len(commands) == 1 and commands[0].item is None and commands[0].task in (None, Task.CHARGE)
-    return not stays or any(step.block is not None for step in steps)
+    return not stays or not all(isinstance(step, Do) for step in steps)
 
 
 def _one_repeat(block: Repeat) -> Repeat:
     """Rounds that hold only rounds without an end become one, which ends as the outer ones."""
-    inner = block.steps[0].block if len(block.steps) == 1 else None
-    endless = isinstance(inner, Repeat) and inner.times is None and inner.until is None and inner.while_ is None
-    if not (isinstance(inner, Repeat) and endless):
+    inner, outer = block.steps[0], block.loop
+    if len(block.steps) > 1 or not isinstance(inner, Repeat) or not inner.loop.is_endless:
         return block
-    if block.every_s is not None or block.times is not None:
+    if outer.every_s is not None or outer.times is not None:
         raise RefusalError("what is repeated without end cannot be repeated again", [])
-    return replace(inner, until=block.until, while_=block.while_)
+    loop = inner.loop.model_copy(update={"until": outer.until, "while_": outer.while_})
+    return inner.model_copy(update={"loop": loop})
 
 
 def _rounds_by(kind: Cue | None, supposed: Supposed) -> Rounds:
     if kind is Cue.UNTIL:
-        return Rounds(Repeat((), until=supposed.condition), supposed.fails)
-    return Rounds(Repeat((), while_=supposed.condition), supposed.holds)
+        return Rounds(Loop(until=supposed.condition), supposed.fails)
+    return Rounds(Loop(while_=supposed.condition), supposed.holds)
 
 
 def _span(cue: str) -> float:

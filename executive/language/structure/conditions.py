@@ -16,7 +16,6 @@ from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
 from executive.language.structure.plain import PlainReader, State, Supposed, behind_preposition, contrary, verb
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Not, ValueIs
-from executive.words.expression import Expression
 from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
 
@@ -49,7 +48,7 @@ def _plain(condition: Condition, said: str, state: State, *notes: str) -> Suppos
 
 
 def _value(expression: str) -> Condition:
-    return ValueIs(Expression(expression))
+    return ValueIs(text=expression)
 
 
 _BELOW: Final = ("below", "under", "less than", "lower than", "smaller than", "beneath")
@@ -126,7 +125,7 @@ def _button(words: str, state: State, reader: PlainReader) -> Supposed | None:
 def button_condition(button: str, words: str, state: State) -> Supposed:
     """Whether a button is pressed, which is spoken of with its article; `words` say it."""
     name = re.sub(r"^(?:the|a|any)\b\s*|\s*\bbutton$", "", button.strip(), flags=re.IGNORECASE).strip()
-    return _plain(ButtonPressed(name.lower() or _BUTTON), words, state)
+    return _plain(ButtonPressed(button=name.lower() or _BUTTON), words, state)
 
 
 def _door(words: str, state: State, reader: PlainReader) -> Supposed | None:
@@ -162,7 +161,7 @@ def meeting(
     if room is None:
         raise RefusalError(f"in which room is '{words}' to be seen? Name it", [words])
     look = reader.look("anybody" if nobody or who.lower() in _ANY else who, room, words, state)
-    return replace(look, condition=Not(look.condition) if gone != nobody else look.condition)
+    return replace(look, condition=Not(part=look.condition) if gone != nobody else look.condition)
 
 
 def _where(where: str | None, state: State, reader: PlainReader) -> str | None:
@@ -225,7 +224,7 @@ def _joined(words: str, state: State, reader: PlainReader) -> tuple[Supposed | N
                 for each in (one.condition.parts if isinstance(one.condition, kind) else (one.condition,))
             ]
             known = second.holds if kind is AllOf else _either(first, second, state)
-            return Supposed(kind(tuple(flat)), words, known, state, (*first.notes, *second.notes)), None
+            return Supposed(kind(parts=tuple(flat)), words, known, state, (*first.notes, *second.notes)), None
     return None, left_open
 
 
@@ -292,9 +291,9 @@ def door_condition(words: str, last: DoorOpen | None, knowledge: Knowledge) -> C
     match = _P.stands.fullmatch(words) or _P.turns.fullmatch(words)
     if match is None or (match["it"] and last is None):
         return None
-    found = last if match["it"] and last is not None else DoorOpen(_between(match, knowledge))
+    found = last if match["it"] and last is not None else DoorOpen(door=_between(match, knowledge))
     is_open = (match["how"].lower() in _OPEN) != bool(match.groupdict().get("not"))
-    return found if is_open else Not(found)
+    return found if is_open else Not(part=found)
 
 
 def _between(match: re.Match[str], knowledge: Knowledge) -> tuple[str, str]:

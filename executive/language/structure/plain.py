@@ -89,7 +89,7 @@ class PlainReading:
 
 def contrary(condition: Condition) -> Condition:
     """The contrary."""
-    return condition.part if isinstance(condition, Not) else Not(condition)
+    return condition.part if isinstance(condition, Not) else Not(part=condition)
 
 
 def at_start(knowledge: Knowledge, memory: Memory) -> State:
@@ -209,12 +209,12 @@ class PlainReader:
             raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text]) from None
         if any(action.choices for action in reading.trace.actions):
             raise RefusalError(f"I cannot tell which of them is meant in '{text}'", [text])
-        looks = tuple(Look(command) for command in reading.commands if command.task is Task.FIND)
+        looks = tuple(Look.of(command) for command in reading.commands if command.task is Task.FIND)
         if not looks or len(looks) != len(reading.commands):
             raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text])
         known = self.state_if_seen(reading, replace(state, goal=reading.state.goal, at=reading.state.at))
         fails = replace(known, memory=replace(known.memory, where=None, told=state.memory.told))
-        condition = looks[0] if len(looks) == 1 else AllOf(looks)
+        condition = looks[0] if len(looks) == 1 else AllOf(parts=looks)
         return Supposed(condition, text, known, fails, reading.trace.notes, items=tuple(items))
 
     def _by_name(self, item: Item, state: State) -> Item:

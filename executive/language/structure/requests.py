@@ -24,10 +24,9 @@ from executive.language.structure.plain import (
     phrase_of_name,
     verb,
 )
-from executive.words.blocks import Dock, Wait
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
-from executive.words.steps import MissionStep
+from executive.words.steps import Awaited, Charging, Dock, Step, Steps, Wait, steps_of_commands
 from skills.files.errors import listing
 
 __all__ = [
@@ -51,7 +50,7 @@ __all__ = [
 
 _WAITING: Final = Patterns("structures.yaml", "waiting", AMOUNTS)
 
-Done = tuple[tuple[MissionStep, ...], State, tuple[str, ...]]
+Done = tuple[Steps, State, tuple[str, ...]]
 """Steps, what is known behind them, and notes."""
 
 
@@ -71,10 +70,10 @@ def wait(where: str, how: str, what: str, state: State, reader: PlainReader) -> 
     steps, there = _gone(where, state, reader)
     if how in ("until", "till"):
         if (passed := _WAITING.passed.fullmatch(what)) is not None and (span := seconds_of(passed["span"])) is not None:
-            return (*steps, MissionStep(block=Wait(seconds=span))), there, ()
+            return (*steps, Wait(awaited=Awaited(seconds=span))), there, ()
         if (time := time_of(_WAITING.time.sub(r"\g<time>", what))) is not None:
             notes = (f"I take '{what}' as {time.text}",) if time.taken else ()
-            return ((*steps, MissionStep(block=Wait(until_clock_s=time.seconds))), there, notes)
+            return ((*steps, Wait(awaited=Awaited(until_clock=time.text))), there, notes)
         return _until(suppose(what, there, reader), steps, there)
     if how == "for":
         more, there, found = _awaited(what, there, reader)
@@ -83,12 +82,12 @@ def wait(where: str, how: str, what: str, state: State, reader: PlainReader) -> 
     return _until(replace(found, condition=contrary(found.condition), holds=found.fails), steps, there)
 
 
-def _until(found: Supposed, steps: tuple[MissionStep, ...], there: State) -> Done:
+def _until(found: Supposed, steps: Steps, there: State) -> Done:
     after = replace(found.holds, goal=found.holds.goal or there.goal)
-    return (*steps, MissionStep(block=Wait(found.condition))), after, found.notes
+    return (*steps, Wait(awaited=Awaited(condition=found.condition))), after, found.notes
 
 
-def _gone(where: str, state: State, reader: PlainReader) -> tuple[tuple[MissionStep, ...], State]:
+def _gone(where: str, state: State, reader: PlainReader) -> tuple[Steps, State]:
     """Where it is to be waited, and going there."""
     if _WAITING.here.fullmatch(where):
         return (), state
@@ -98,10 +97,10 @@ def _gone(where: str, state: State, reader: PlainReader) -> tuple[tuple[MissionS
     if match["there"] and state.goal is not None and state.at is not None:
         return (), state
     reading = reader.go_to(match["place"] or match["there"], state)
-    return (MissionStep(reading.commands),), reading.state
+    return steps_of_commands(reading.commands), reading.state
 
 
-def _awaited(what: str, state: State, reader: PlainReader) -> tuple[tuple[MissionStep, ...], State, Supposed]:
+def _awaited(what: str, state: State, reader: PlainReader) -> tuple[Steps, State, Supposed]:
     """What "wait for ..." waits for, and going there where a place is said."""
     if (match := _WAITING.button.fullmatch(what)) is not None:
         return (), state, button_condition(match["button"] or match["of"], what, state)
@@ -110,7 +109,7 @@ def _awaited(what: str, state: State, reader: PlainReader) -> tuple[tuple[Missio
     if (match := _WAITING.person_at.fullmatch(what)) is not None and reader.is_somebody(match["who"], state):
         reading = reader.go_to(match["where"], state)
         found = meeting(match["who"], None, what, reading.state, reader)
-        return (MissionStep(reading.commands),), reading.state, found
+        return steps_of_commands(reading.commands), reading.state, found
     if reader.is_somebody(what, state):
         return (), state, meeting(what, None, what, state, reader)
     raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
@@ -127,7 +126,7 @@ def charging_in(text: str, state: State) -> Done | None:
     level = _FULL if match["level"].lower().startswith("full") else share_of(match["level"])
     if level is None:
         raise RefusalError(f"'{match['level']}' is no charge; say it in percent", [match["level"]])
-    return (MissionStep(block=Dock(level)),), replace(state, goal=None, at=None), ()
+    return (Dock(charging=Charging(level=level)),), replace(state, goal=None, at=None), ()
 
 
 @dataclass(frozen=True)
@@ -325,7 +324,7 @@ def serves_all(text: str) -> bool:
     return ACTS.gives.match(text) is not None and ACTS.everyone.search(text) is not None
 
 
-def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[tuple[MissionStep, ...], State] | None:
+def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, State] | None:
     """A step for each person to whom something is brought; None where it is brought to nobody of that kind.
 
     Raises RefusalError: it does not say in which room, nobody is known to be there, or there is only one of the thing.
@@ -341,7 +340,7 @@ def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[tuple[Mi
     people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
     if not people:
         raise RefusalError(f"I know nobody in the {room} to bring anything to: {who}", [who])
-    steps: list[MissionStep] = []
+    steps: list[Step] = []
     begun = state
     for name in people:
         person = Location(phrase_of_name(name, NounKind.PERSON), "to", to.within)
@@ -349,7 +348,7 @@ def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[tuple[Mi
         reading = reader.commands_of_actions(trace, actions, begun)
         if any(action.target is not None and not action.target.indefinite for action in reading.trace.resolved):
             raise RefusalError(f"there is one of it, and I cannot bring it to {who}", [who])
-        steps.append(MissionStep(reading.commands))
+        steps += steps_of_commands(reading.commands)
         begun = replace(reading.state, memory=state.memory)
     return tuple(steps), begun
 

@@ -12,14 +12,9 @@ from executive.language.questions import RefusalError
 from executive.language.roles import HERE
 from executive.language.structure.plain import PlainReader, PlainReading, State, Supposed, contrary
 from executive.language.structure.requests import Done, template
-from executive.words.blocks import Block, Repeat, Speak
 from executive.words.command import Command, Task
 from executive.words.condition import AllOf, Condition, Look, Not
-from executive.words.expression import Template
-from executive.words.steps import MissionStep
-from executive.words.written import written_condition
-
-Steps = tuple[MissionStep, ...]
+from executive.words.steps import Loop, Speak, Step, Steps, steps_of_commands
 
 
 @dataclass
@@ -30,7 +25,7 @@ class Row:
     """
 
     state: State
-    steps: list[MissionStep] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)
     plain: list[Clause] = field(default_factory=list)
     asked: LookedAt | None = None
     begun: int = 0
@@ -38,7 +33,7 @@ class Row:
 
 @dataclass(frozen=True)
 class LookedAt:
-    """A condition that the last step looked at (`looked`), or that must hold for it; `before` is the rest of it.
+    """A condition that the last steps looked at (`looked`), or that must hold for them; `steps` is how many they are.
 
     `decided` says that the last step is done only if it holds.
     """
@@ -46,14 +41,14 @@ class LookedAt:
     supposed: Supposed
     looked: bool
     decided: bool = False
-    before: Steps = ()
+    steps: int = 1
 
 
 @dataclass(frozen=True)
 class Rounds:
-    """A block without its steps, and what is known where a round begins."""
+    """How often something is done, and what is known where a round begins."""
 
-    block: Repeat
+    loop: Loop
     state: State
 
 
@@ -87,7 +82,7 @@ def _after_all(clause: Clause, first: bool) -> bool:
 
 def same(one: Condition, other: Condition) -> bool:
     """Whether they look at the same, whatever the verb was."""
-    return written_condition(one) in (written_condition(other), written_condition(contrary(other)))
+    return one in (other, contrary(other))
 
 
 def contrary_of(supposed: Supposed) -> Supposed:
@@ -130,22 +125,20 @@ def looked_at_by(reading: PlainReading, before: State, reader: PlainReader) -> L
     memory = reading.state.memory
     if last is not None and last.task is Task.FIND:
         looks = [c for c in reading.commands if c.task is Task.FIND]
-        others = reading.commands[: -len(looks)]
-        conditions = tuple(map(Look, looks))
+        conditions = tuple(map(Look.of, looks))
         known = reader.state_if_seen(reading, reading.state)
         fails = replace(known, memory=replace(known.memory, where=None, told=before.memory.told))
-        condition: Condition = conditions[0] if len(conditions) == 1 else AllOf(conditions)
-        steps = (MissionStep(others),) if others else ()
-        return LookedAt(Supposed(condition, "", known, fails), looked=True, before=steps)
+        condition: Condition = conditions[0] if len(conditions) == 1 else AllOf(parts=conditions)
+        return LookedAt(Supposed(condition, "", known, fails), looked=True, steps=len(looks))
     if taken is None:
         return None
-    look = Look(
+    look = Look.of(
         Command(goal=taken.goal, task=Task.FIND, object=taken.object, object_count=taken.object_count, verb="find")
     )
     fails = replace(
         reading.state, memory=replace(memory, where=None, told=before.memory.told), held=None, goal=None, at=None
     )
-    return LookedAt(Supposed(look, "", reading.state, fails), looked=False)
+    return LookedAt(Supposed(look, "", reading.state, fails), looked=False, steps=len(reading.commands))
 
 
 def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
@@ -156,8 +149,8 @@ def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
     placed = re.search(r"\b(?:in|on|at|inside|near)\b", text, re.IGNORECASE)
     if taken is None or placed or not isinstance(look, Look) or look.command.object != taken.object:
         return supposed
-    there = Look(replace(look.command, goal=taken.goal))
-    return replace(supposed, condition=Not(there) if isinstance(condition, Not) else there)
+    there = Look.of(replace(look.command, goal=taken.goal))
+    return replace(supposed, condition=Not(part=there) if isinstance(condition, Not) else there)
 
 
 def checked_statement(text: str) -> str | None:
@@ -182,9 +175,9 @@ def checked_statement(text: str) -> str | None:
     return None
 
 
-def say(text: str) -> MissionStep:
+def say(text: str) -> Speak:
     """A step that says a text."""
-    return MissionStep(block=Speak(Template(template(text))))
+    return Speak(speak=template(text))
 
 
 def unclear(found: Behind) -> RefusalError:
@@ -236,13 +229,13 @@ class Base:
     def add(self, row: Row, reading: PlainReading) -> None:
         """Put what a plain part asks for."""
         self.notes += reading.trace.notes
-        row.steps += [MissionStep(reading.commands)] if reading.commands else []
+        row.steps += steps_of_commands(reading.commands)
         before, row.state = row.state, reading.state
         row.asked = looked_at_by(reading, before, self.reader)
 
-    def put(self, row: Row, block: Block, state: State) -> None:
+    def put(self, row: Row, block: Step, state: State) -> None:
         """Put a block; `state` is what is known behind it."""
-        row.steps.append(MissionStep(block=block))
+        row.steps.append(block)
         row.state, row.asked = state, None
 
     def put_done(self, row: Row, done: Done) -> None:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from pydantic import ValidationError
+
 from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, behind, cut
 from executive.language.items import Adverb, Chunk
 from executive.language.lexicon import PrepositionRole
@@ -33,13 +35,26 @@ from executive.language.structure.requests import (
     wait_in,
     without_article,
 )
-from executive.language.structure.row import LookedAt, Row, Steps, checked_statement, end_of, sentence_of
-from executive.words.blocks import Ask, Check, Choose, Repeat, Speak, Together, Try, Wait, steps_of
+from executive.language.structure.row import LookedAt, Row, checked_statement, end_of, sentence_of
 from executive.words.command import Task
 from executive.words.condition import Look
-from executive.words.expression import Template
 from executive.words.knowledge import Knowledge
-from executive.words.steps import MissionStep
+from executive.words.steps import (
+    Ask,
+    Awaited,
+    Check,
+    Choose,
+    Do,
+    Repeat,
+    Speak,
+    Step,
+    Steps,
+    Together,
+    Try,
+    Wait,
+    steps_of_commands,
+)
+from skills.files.schema_errors import first_error
 
 __all__ = ["Structured", "structured"]
 
@@ -51,8 +66,8 @@ class Builder(Branches):
         """The steps of clauses, one after the other."""
         row, at = Row(state), 0
         while at < len(clauses):
-            last = row.steps[-1].block if row.steps and not row.plain else None
-            if isinstance(last, Repeat) and last.times is None and last.until is None and last.while_ is None:
+            last = row.steps[-1] if row.steps and not row.plain else None
+            if isinstance(last, Repeat) and last.loop.is_endless:
                 raise RefusalError(
                     "nothing can come after what is repeated without end; say how often", [clauses[at].text]
                 )
@@ -108,7 +123,7 @@ class Builder(Branches):
         self.flush(row)
         last = row.steps[-1] if row.steps else None
         looked = last is not None and (
-            isinstance(last.block, Check) or (bool(last.commands) and last.commands[-1].task is Task.FIND)
+            isinstance(last, Check) or (bool(last.commands) and last.commands[-1].task is Task.FIND)
         )
         self.special = self.special or looked
         return looked
@@ -154,7 +169,7 @@ class Builder(Branches):
             raise RefusalError(f"what am I to say in '{clause.text}'?", [clause.text])
         self.flush(row)
         self._to(row, said.to)
-        self.put(row, Speak(Template(template(text))), row.state)
+        self.put(row, Speak(speak=template(text)), row.state)
         return at + 1
 
     def _tells_when(self, row: Row, match: re.Match[str], at: int) -> int:
@@ -164,10 +179,10 @@ class Builder(Branches):
         told = sentence_of(supposed)
         if told is None:
             raise RefusalError(f"what am I to say in '{match[0]}'?", [match[0]])
-        self.put(row, Wait(supposed.condition), supposed.holds)
+        self.put(row, Wait(awaited=Awaited(condition=supposed.condition)), supposed.holds)
         said = speech_to(match["who"], told, self.reader.knowledge)
         self._to(row, said.to)
-        self.put(row, Speak(Template(template(said.text or told))), row.state)
+        self.put(row, Speak(speak=template(said.text or told)), row.state)
         return at + 1
 
     def _to(self, row: Row, listener: Listener | None) -> None:
@@ -196,7 +211,7 @@ class Builder(Branches):
             choices, end = self._agreed(asked, row.state, clauses, at + 1)
         else:
             choices, end = self._chosen(asked, row.state, clauses, at + 1)
-        self.put(row, Ask(Template(template(asked.text)), choices), replace(row.state, goal=None, at=None))
+        self.put(row, Ask(ask=template(asked.text), choices=choices), replace(row.state, goal=None, at=None))
         return end
 
     def _agreed(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
@@ -261,7 +276,7 @@ class Builder(Branches):
         self.flush(row)
         self.notes += supposed.notes
         look = supposed.condition.command if isinstance(supposed.condition, Look) else None
-        row.steps.append(MissionStep(block=Check(supposed.condition)) if look is None else MissionStep((look,)))
+        row.steps.append(Check(condition=supposed.condition) if look is None else Do.of(look))
         row.state, row.asked = supposed.holds, LookedAt(supposed, looked=True)
         return at + 1
 
@@ -303,7 +318,7 @@ class Builder(Branches):
             there = Chunk(phrase_of_name(room, NounKind.PLACE), "to", PrepositionRole.GOAL)
             reading = self.reader.commands_of_items((verb("go"), there), replace(row.state, goal=None))
             said, row.state = self.sequence([says], reading.state)
-            row.steps += [MissionStep(reading.commands), *said]
+            row.steps += [*steps_of_commands(reading.commands), *said]
         row.asked = None
 
 
@@ -382,8 +397,12 @@ def structured(
     if len(clauses) > MOST_CLAUSES:
         raise RefusalError(f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most")
     builder = Builder(PlainReader(parser, knowledge))
-    steps, state = builder.sequence(clauses, at_start(knowledge, memory or Memory()))
-    if all(step.block is None for step in steps) and not builder.special:
+    try:
+        steps, state = builder.sequence(clauses, at_start(knowledge, memory or Memory()))
+    except ValidationError as error:
+        _, wrong, _ = first_error(error.errors())
+        raise RefusalError(f"a number in it {wrong}") from error
+    if all(isinstance(step, Do) for step in steps) and not builder.special:
         return None
     if max(map(_depth, steps), default=0) > MOST_NESTED:
         raise RefusalError("one thing inside another inside a third is too much; say it in two sentences")
@@ -391,8 +410,7 @@ def structured(
     return Structured(steps, parts, tuple(dict.fromkeys(builder.notes)), state.memory)
 
 
-def _depth(step: MissionStep) -> int:
+def _depth(step: Step) -> int:
     """How deeply blocks stand within blocks; what is done at the end does not count."""
-    inner = max(map(_depth, () if step.block is None else steps_of(step.block)), default=0)
-    holds = isinstance(step.block, Choose | Repeat | Try | Together | Ask)
-    return inner + holds
+    inner = max(map(_depth, step.within), default=0)
+    return inner + isinstance(step, Choose | Repeat | Try | Together | Ask)

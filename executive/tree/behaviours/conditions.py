@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
 from executive.tree.behaviours.context import RunContext
-from executive.words.steps import StaleData
+from executive.words.policy import StaleData
 from skills.api import Cause, Failed, Thing
 from skills.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.perception.class_forms import THING

@@ -14,7 +14,6 @@ from executive.tree.compiling.blocks import (
     answering,
     block_name,
     block_plan,
-    block_words,
     framed,
     give,
     set_plan,
@@ -33,8 +32,10 @@ from executive.words.command import START, Command, Task
 from executive.words.expression import kind_of, literal
 from executive.words.goal import GoalCondition, When
 from executive.words.knowledge import Knowledge, Pose
+from executive.words.mission import Mission
+from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
-from executive.words.steps import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
+from executive.words.steps import CallSkill, Do, Say, Step, UseMission
 from skills.api import Skill, Surface
 from skills.files.errors import InputError, Problems, SourceLine, listing
 from skills.quantities import Quantity
@@ -42,7 +43,7 @@ from skills.robot import Pose2D
 
 __all__ = ["Assembled", "StepPart", "assemble", "step_name"]
 
-NO_POLICY: Final = StepPolicy()
+NO_POLICY: Final = Policy()
 _SKIPPING: Final = frozenset({"skip", "ask"})
 COUNTED: Final = Annotated[float, Quantity(ge=0.0, le=1_000.0)]
 """How many objects a look counts."""
@@ -56,7 +57,7 @@ class _Item:
 
     number: int
     place: int
-    step: MissionStep
+    step: Step
     command: Command | None = None
 
 
@@ -66,18 +67,18 @@ def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> t
     Raises InputError: unknown names, ports wired wrongly, commands that cannot be carried out; all in `others`.
     """
     base = f"{slug(mission.robot_name)}/{slug(mission.name)}"
-    pick_ups = PICK_UPS if mission.policy.pick_ups is None else mission.policy.pick_ups
-    move_aside = mission.policy.move_aside or 0
+    pick_ups = PICK_UPS if mission.pick_ups is None else mission.pick_ups
+    move_aside = mission.move_aside or 0
     assembler = _Assembler(knowledge, registry, start_key(mission.robot_name, mission.name), pick_ups, move_aside)
     builder = assembler.builder(base, mission.source)
     steps = assembler.mission(mission, base)
     remember = [builder.node("remember", "where it starts", part="remember-start", key=builder.start_key, keep=True)]
     first = remember if _leads_back(mission) else []
-    if mission.policy == NO_POLICY and not _may_skip(steps.nodes):
+    if mission.is_empty and not _may_skip(steps.nodes):
         return builder.sequence(mission.name, *first, *steps.nodes), steps.parts
     frame = PolicyFrame(builder.at("whole"), mission.name, may_skip=False)
     body = builder.node("sequence", "steps", *steps.nodes, part="steps")
-    whole = _under(Assembled((body,), steps.parts), mission.policy, frame)
+    whole = _under(Assembled((body,), steps.parts), mission, frame)
     (body,) = whole.nodes
     if _may_skip(whole.nodes):
         paths = tuple(node.path_id for node in steps.nodes)
@@ -120,14 +121,14 @@ class _Assembler:
             first = (self._declare(mission, builder),)
         before = self.flow.copy()
         steps = self.level(mission.steps, base)
-        if mission.whole is not None:
+        if mission.is_watched:
             row = replace(steps, nodes=(builder.node("sequence", "steps", *steps.nodes, part="all"),))
-            steps = framed(self, row, mission.whole, builder.at("whole"), before)
+            steps = framed(self, row, mission, builder.at("whole"), before)
         self.values_base, self.flow.declared = outer
-        self.flow.names.update({name: known[name] for name in mission.variables if name in known})
+        self.flow.names.update({name: known[name] for name in mission.variables or () if name in known})
         return replace(steps, nodes=(*first, *steps.nodes))
 
-    def level(self, steps: Sequence[MissionStep], base: str) -> Assembled:
+    def level(self, steps: Sequence[Step], base: str) -> Assembled:
         """The subtrees of steps: those under a policy each as one, the others' parts as they are."""
         made, problems = Assembled(), Problems()
         for items, policy in _groups(steps):
@@ -136,7 +137,7 @@ class _Assembler:
                 group = self._group(items, base)
                 if policy.on_failure in (OnFailure.SKIP, OnFailure.ASK):
                     self.flow.may_lack(before)
-                if policy != NO_POLICY:
+                if not policy.is_empty:
                     builder = self.builder(f"{base}/step-{items[0].place}", items[0].step.source)
                     words = f"step {items[0].place}: {_words(items)}"
                     if len(group.nodes) > 1:
@@ -184,13 +185,13 @@ class _Assembler:
     def _item(self, item: _Item, following: Command | None, base: str) -> Assembled:
         """The subtree of one command, skill or used mission; `following` is the command right after it."""
         step = item.step
-        if step.used is not None:
-            return self._used(step, step.used, f"{base}/{item.number}-{slug(step.used.name)}")
-        if step.skill is not None:
-            return self._skill(step, step.skill, f"{base}/{item.number}-{slug(step.skill.skill)}")
-        if step.block is not None:
-            builder = self.builder(f"{base}/{item.number}-{block_name(step.block)}", step.source)
-            return block_plan(self, step.block, builder, step.policy)
+        match step:
+            case UseMission():
+                return self._used(step, f"{base}/{item.number}-{slug(step.words)}")
+            case CallSkill():
+                return self._skill(step, f"{base}/{item.number}-{slug(step.skill)}")
+        if not isinstance(step, Do | Say):
+            return block_plan(self, step, self.builder(f"{base}/{item.number}-{block_name(step)}", step.source))
         flow = self.flow
         builder = replace(self._command_builder(item, base), avoided=_goals(following, self.knowledge))
         refuse_several(builder)
@@ -207,13 +208,12 @@ class _Assembler:
             (node,), (StepPart(builder.path_id, command, goal=goal, held=held, opening=opening, node=node.path_id),)
         )
 
-    def _skill(self, step: MissionStep, call: SkillCall, path_id: str) -> Assembled:
+    def _skill(self, step: CallSkill, path_id: str) -> Assembled:
         """The leaf of a skill on its own."""
         flow, builder = self.flow, self.builder(path_id, step.source)
         leaf = skill_plan(
-            call,
+            step,
             path_id,
-            step.source,
             knowledge=self.knowledge,
             registry=self.registry,
             names={name: named.key for name, named in flow.names.items()},
@@ -239,10 +239,10 @@ class _Assembler:
                 return given_goal(self.knowledge.person(str(inputs.get("person", ""))))
         return None
 
-    def _giving(self, step: MissionStep, command: Command, node: NodeSpec, builder: PlanBuilder) -> NodeSpec:
+    def _giving(self, step: Do | Say, command: Command, node: NodeSpec, builder: PlanBuilder) -> NodeSpec:
         """The subtree of a status check whose answer later steps read. Raises InputError: it gives no such thing."""
         keys: dict[str, str] = {}
-        for port, name in step.gives.items():
+        for port, name in (step.gives or {}).items():
             known = ("answer", "count") if command.object_count != 1 else ("answer",)
             if command.task is not Task.FIND or port not in known:
                 said = listing(known) if command.task is Task.FIND else "no answer"
@@ -256,32 +256,33 @@ class _Assembler:
     def _declare(self, mission: Mission, builder: PlanBuilder) -> NodeSpec:
         """The leaf that gives a mission's values as they are at the beginning."""
         flow, values = self.flow, {}
-        for name, value in mission.variables.items():
+        for name, value in (mission.variables or {}).items():
             key = give(self, name, f"{self.values_base}/{name}", PYTHON_TYPES[kind_of(value)], builder)
             values[key] = literal(value)
-        flow.declared = frozenset(mission.variables)
+        flow.declared = frozenset(mission.variables or ())
         return set_plan(builder, values, flow.names, "values", "values at the beginning")
 
-    def _used(self, step: MissionStep, used: Mission, base: str) -> Assembled:
+    def _used(self, step: UseMission, base: str) -> Assembled:
         """The subtree of a mission that a step uses."""
+        used: Mission = step.mission
         try:
             steps = self.mission(used, base)
         except InputError as error:
             raise error if step.source is None else error.within(step.source.file, step.source.line) from error
         builder = self.builder(base, step.source)
         body = replace(steps, nodes=(builder.sequence(used.name, *steps.nodes),))
-        return _under(body, used.policy, PolicyFrame(builder.at("whole"), used.name, may_skip=False))
+        return _under(body, used, PolicyFrame(builder.at("whole"), used.name, may_skip=False))
 
     def _command_builder(self, item: _Item, base: str) -> PlanBuilder:
         command = item.command
         if command is None:
             raise InputError("a step has no commands", hint="give it 'say', a command, a skill or a file to use")
         builder = self.builder(f"{base}/{item.number}-{step_name(command)}", item.step.source)
-        own = item.step.policy
+        own = item.step
         return replace(
             builder,
             command=command,
-            anywhere=item.step.elsewhere,
+            anywhere=not isinstance(own, Do | Say) or own.elsewhere is not False,
             pick_ups=self.pick_ups if own.pick_ups is None else own.pick_ups,
             move_aside=self.move_aside if own.move_aside is None else own.move_aside,
         )
@@ -297,20 +298,20 @@ def _go_together(get: Command, bring: Command) -> bool:
     return are_trips(get, bring) or is_clearing(get, bring)
 
 
-def _groups(steps: Sequence[MissionStep]) -> Iterator[tuple[tuple[_Item, ...], StepPolicy]]:
+def _groups(steps: Sequence[Step]) -> Iterator[tuple[tuple[_Item, ...], Policy]]:
     """Items that belong together: those of one step under a policy, or of steps in a row without any."""
     number, free = 1, []
     for place, step in enumerate(steps, start=1):
         commands: Sequence[Command | None] = step.commands or (None,)
         items = [_Item(number + offset, place, step, command) for offset, command in enumerate(commands)]
         number += len(items)
-        if step.policy == NO_POLICY:
+        if step.is_empty:
             free += items
             continue
         if free:
             yield tuple(free), NO_POLICY
         free = []
-        yield tuple(items), step.policy
+        yield tuple(items), step
     if free:
         yield tuple(free), NO_POLICY
 
@@ -330,7 +331,7 @@ def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
     return surfaces_elsewhere(knowledge, name, builder.place(command.goal), builder.avoided)
 
 
-def _under(body: Assembled, policy: StepPolicy, frame: PolicyFrame) -> Assembled:
+def _under(body: Assembled, policy: Policy, frame: PolicyFrame) -> Assembled:
     """One node under its policy."""
     (below,) = body.nodes
     node = under_policy(below, policy, frame)
@@ -344,20 +345,15 @@ def _may_skip(nodes: Sequence[NodeSpec]) -> bool:
 def _leads_back(mission: Mission) -> bool:
     """Whether something in a mission leads back to where the robot stands at its beginning."""
     steps = list(mission.walk())
-    used = (step.used.policy for step in steps if step.used is not None)
-    policies = (mission.policy, *(step.policy for step in steps), *used)
+    used = (step.mission for step in steps if isinstance(step, UseMission))
+    policies: tuple[Policy, ...] = (mission, *steps, *used)
     return any(map(needs_way_back, policies)) or any(command.goal == START for command in mission.commands)
 
 
 def _words(items: Sequence[_Item]) -> str:
     """What a step is called in sentences."""
-    step = items[0].step
-    if step.used is not None:
-        return step.used.name
-    if step.block is not None:
-        return block_words(step.block)
     commands = [item.command for item in items if item.command is not None]
-    return step.skill.skill if step.skill is not None else ", then ".join(map(_command_words, commands))
+    return ", then ".join(map(_command_words, commands)) or items[0].step.words
 
 
 def _command_words(command: Command) -> str:

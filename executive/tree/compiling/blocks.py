@@ -25,25 +25,28 @@ from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.goals import command_goal, door_goal, held_goal
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.interrupts import HANDLING, dock_plan
-from executive.words.blocks import (
+from executive.words.command import Command, Task
+from executive.words.condition import READINGS, AllOf, Condition, DoorOpen, Look, ValueIs, parts_of
+from executive.words.expression import Expression, Kind, Template, Value, kind_of
+from executive.words.mission import Mission
+from executive.words.slug import slug
+from executive.words.steps import (
     Ask,
-    Block,
+    CallSkill,
     Check,
     Choose,
+    Do,
     Dock,
     Group,
     Repeat,
+    Say,
     Set,
     Speak,
+    Step,
     Together,
     Try,
     Wait,
 )
-from executive.words.command import Command, Task
-from executive.words.condition import READINGS, AllOf, Condition, DoorOpen, Look, ValueIs, parts_of
-from executive.words.expression import Expression, Kind, Template, Value, kind_of
-from executive.words.slug import slug
-from executive.words.steps import MissionStep, StepPolicy
 from skills.api import Part
 from skills.files.errors import InputError, suggestion
 
@@ -54,7 +57,6 @@ __all__ = [
     "answering",
     "block_name",
     "block_plan",
-    "block_words",
     "framed",
     "give",
     "set_plan",
@@ -121,19 +123,21 @@ class Assembler(Protocol):
     flow: Flow
     values_base: str
 
-    def level(self, steps: Sequence[MissionStep], base: str) -> Assembled:
+    def level(self, steps: Sequence[Step], base: str) -> Assembled:
         """The subtrees of steps in a row; the flow goes on after them."""
 
     def builder(self, path_id: str, source: Any) -> PlanBuilder:
         """The builder of nodes that belong to no one command."""
 
 
-def block_plan(assembler: Assembler, block: Block, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+def block_plan(assembler: Assembler, block: Step, builder: PlanBuilder) -> Assembled:
     """The one subtree of a block, and what its parts are to bring about. Raises InputError."""
-    return _PLANS[type(block)](assembler, block, builder, policy)
+    return _PLANS[type(block)](assembler, block, builder)
 
 
-def framed(assembler: Assembler, body: Assembled, group: Group, builder: PlanBuilder, before: Flow) -> Assembled:
+def framed(
+    assembler: Assembler, body: Assembled, group: Group | Mission, builder: PlanBuilder, before: Flow
+) -> Assembled:
     """Steps under what is watched meanwhile, and with what is always done in the end; `before` is their flow."""
     (node,), parts = body.nodes, body.parts
     if group.when:
@@ -156,11 +160,12 @@ def framed(assembler: Assembler, body: Assembled, group: Group, builder: PlanBui
             )
         assembler.flow = after
         node = builder.node("interrupts", f"{node.name}, watched", *calls, node, part="watched")
-    if group.holds is not None:
-        decision = instant_decision(group.holds, builder.at("while"), before.names)
-        condition = MustHold(decision, str(group.holds))
-        node = builder.node("guard", f"while {group.holds}", node, part="while", condition=condition)
-        if _is_holding(group.holds):
+    if group.while_ is not None:
+        holds = group.while_.holds
+        decision = instant_decision(holds, builder.at("while"), before.names)
+        condition = MustHold(decision, str(holds))
+        node = builder.node("guard", f"while {holds}", node, part="while", condition=condition)
+        if _is_holding(holds):
             parts = (StepPart(node.path_id, goal=held_goal()), *parts)
     if group.always:
         assembler.flow.join([before.copy(), assembler.flow.copy()])
@@ -173,9 +178,9 @@ def framed(assembler: Assembler, body: Assembled, group: Group, builder: PlanBui
 def _is_holding(condition: Condition) -> bool:
     """Whether a condition says that the gripper holds something, alone or together with others."""
     match condition:
-        case ValueIs(expression):
-            return expression.text.strip() == "holding"
-        case AllOf(parts):
+        case ValueIs(text=text):
+            return text.strip() == "holding"
+        case AllOf(parts=parts):
             return any(map(_is_holding, parts))
     return False
 
@@ -190,35 +195,19 @@ def set_plan(
     return builder.node("set", name, part=part, **options, kinds=MappingProxyType(kinds))
 
 
-def block_name(block: Block) -> str:
+def block_name(block: Step) -> str:
     """A block as a part of a path id."""
-    return slug(block.name) if isinstance(block, Group) and block.name else _NAMES[type(block)]
+    return slug(block.name) if isinstance(block, Group) and block.name else block.key
 
 
-def block_words(block: Block) -> str:
-    """What a block is called in sentences."""
-    match block:
-        case Choose(condition):
-            return f"if {condition}"
-        case Group(name=str(name)):
-            return name
-        case Wait(condition=condition) if condition is not None:
-            return f"wait until {condition}"
-        case Check(condition):
-            return f"check whether {condition}"
-        case Speak(text) | Ask(text):
-            return f'{_NAMES[type(block)]} "{text.text}"'
-    return _NAMES[type(block)]
-
-
-def _row(assembler: Assembler, steps: Sequence[MissionStep], builder: PlanBuilder, name: str) -> Assembled:
+def _row(assembler: Assembler, steps: Sequence[Step], builder: PlanBuilder, name: str) -> Assembled:
     """Steps in a row as one node at the builder's path id."""
     made = assembler.level(steps, builder.path_id)
     return replace(made, nodes=(builder.node("sequence", name, *made.nodes, part="steps"),))
 
 
 def _branch(
-    assembler: Assembler, steps: Sequence[MissionStep], builder: PlanBuilder, name: str, before: Flow
+    assembler: Assembler, steps: Sequence[Step], builder: PlanBuilder, name: str, before: Flow
 ) -> tuple[Assembled, Flow]:
     """A branch that begins with the flow `before`; the assembler's own flow stays as it is."""
     here, assembler.flow = assembler.flow, before.copy()
@@ -245,7 +234,7 @@ def _checks(decided: Decided, builder: PlanBuilder) -> tuple[StepPart, ...]:
     )
 
 
-def _choose(assembler: Assembler, block: Choose, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+def _choose(assembler: Assembler, block: Choose, builder: PlanBuilder) -> Assembled:
     decide, key, parts = _decided(assembler, block.condition, builder.at("if"))
     flow = assembler.flow
     then, after_then = _branch(assembler, block.then, builder.at("then"), "then", flow)
@@ -257,10 +246,11 @@ def _choose(assembler: Assembler, block: Choose, builder: PlanBuilder, policy: S
     return Assembled((node,), (*parts, *then.parts, *other.parts))
 
 
-def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
-    condition = block.until or block.while_
-    mode = "times" if condition is None else "until" if block.until is not None else "while"
-    _refuse_endless(block, condition, builder, policy)
+def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder) -> Assembled:
+    rounds = block.loop
+    condition = rounds.until or rounds.while_
+    mode = "times" if condition is None else "until" if rounds.until is not None else "while"
+    _refuse_endless(block, condition, builder)
     changing = _given(block.steps)
     for name in changing & set(assembler.flow.names):
         assembler.flow.names[name] = replace(assembler.flow.names[name], quantity=None)
@@ -271,7 +261,7 @@ def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder, policy: S
         nodes = [decide]
     body = _row(assembler, block.steps, builder.at("round"), "round")
     flow = assembler.flow
-    if flow.held != before.held and block.times != 1:
+    if flow.held != before.held and rounds.times != 1:
         flow.names = dict(before.names)
         flow.held, flow.opening = either(before.held, flow.held), False
         body = _row(assembler, block.steps, builder.at("round"), "round")
@@ -283,8 +273,8 @@ def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder, policy: S
     elif assembler.flow.held != before.held:
         assembler.flow.held = either(before.held, assembler.flow.held)
     words = "" if condition is None else str(condition)
-    often = f"{mode} {words}" if condition is not None else f"{block.times} times" if block.times else "for ever"
-    every = f", every {block.every_s:g} s" if block.every_s else ""
+    often = f"{mode} {words}" if condition is not None else f"{rounds.times} times" if rounds.times else "for ever"
+    every = f", every {rounds.every_s:g} s" if rounds.every_s else ""
     node = builder.node(
         "repeat",
         f"{often}{every}",
@@ -294,15 +284,15 @@ def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder, policy: S
         words=words,
         count=builder.key("rounds"),
         key=key,
-        times=block.times,
-        every_s=block.every_s or 0.0,
+        times=rounds.times,
+        every_s=rounds.every_s or 0.0,
     )
     return Assembled((node,), (*parts, *body.parts))
 
 
-def _refuse_endless(block: Repeat, condition: Condition | None, builder: PlanBuilder, policy: StepPolicy) -> None:
+def _refuse_endless(block: Repeat, condition: Condition | None, builder: PlanBuilder) -> None:
     """Refuse rounds that go on for ever: nothing that the condition reads can change. Raises InputError."""
-    if condition is None or block.times is not None or policy.timeout_s is not None:
+    if condition is None or block.loop.times is not None or block.timeout_s is not None:
         return
     read: set[str] = set()
     for part in parts_of(condition):
@@ -314,20 +304,19 @@ def _refuse_endless(block: Repeat, condition: Condition | None, builder: PlanBui
         raise InputError.at(builder.source, f"nothing in a round changes whether {condition}", hint=hint)
 
 
-def _given(steps: Iterable[MissionStep]) -> set[str]:
+def _given(steps: Iterable[Step]) -> set[str]:
     """The names that steps may give a value."""
     found: set[str] = set()
     for step in (below for each in steps for below in each.walk()):
-        found |= set(step.gives.values()) | set(() if step.skill is None else step.skill.gives.values())
-        match step.block:
-            case Set(values):
+        match step:
+            case Set(set=values):
                 found |= set(values)
-            case Check(gives=str(name)) | Ask(gives=str(name)):
-                found.add(name)
+            case Do() | Say() | CallSkill() | Check() | Ask():
+                found |= set((step.gives or {}).values())
     return found
 
 
-def _try(assembler: Assembler, block: Try, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+def _try(assembler: Assembler, block: Try, builder: PlanBuilder) -> Assembled:
     flow = assembler.flow
     tried, after_tried = _branch(assembler, block.steps, builder.at("try"), "try", flow)
     midway = flow.copy()
@@ -338,14 +327,14 @@ def _try(assembler: Assembler, block: Try, builder: PlanBuilder, policy: StepPol
     return Assembled((builder.node("try", "else the other", *tried.nodes, *other.nodes),), (*tried.parts, *other.parts))
 
 
-def _together(assembler: Assembler, block: Together, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+def _together(assembler: Assembler, block: Together, builder: PlanBuilder) -> Assembled:
     flow, made, afters = assembler.flow, [], []
     for number, step in enumerate(block.steps, start=1):
         branch, after = _branch(assembler, (step,), builder.at(f"branch-{number}"), f"branch {number}", flow)
         made.append(branch)
         afters.append(after)
     _refuse_collisions([each.nodes[0] for each in made], builder)
-    everything = block.needed is None or block.needed == len(block.steps)
+    everything = block.needed == len(block.steps)
     if everything:
         before = dict(flow.names)
         for after in afters:
@@ -353,9 +342,8 @@ def _together(assembler: Assembler, block: Together, builder: PlanBuilder, polic
     moved = [after.held for after in afters if after.held != flow.held]
     if moved:
         flow.held, flow.opening = (moved[0] if everything else either(flow.held, *moved)), False
-    needed = block.needed or len(block.steps)
-    name = "side by side" if everything else f"side by side, until {needed} of {len(block.steps)} are done"
-    node = builder.node("together", name, *(each.nodes[0] for each in made), needed=needed)
+    name = "side by side" if everything else f"side by side, until {block.needed} of {len(block.steps)} are done"
+    node = builder.node("together", name, *(each.nodes[0] for each in made), needed=block.needed)
     return Assembled((node,), tuple(part for each in made for part in each.parts))
 
 
@@ -376,45 +364,45 @@ def _used_parts(branch: NodeSpec) -> frozenset[Part]:
     return frozenset(part for skill in skills for part in skill.uses)
 
 
-def _group(assembler: Assembler, block: Group, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+def _group(assembler: Assembler, block: Group, builder: PlanBuilder) -> Assembled:
     before = assembler.flow.copy()
     body = _row(assembler, block.steps, builder, block.name or "group")
     return framed(assembler, body, block, builder, before)
 
 
-def _wait(assembler: Assembler, block: Wait, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
-    if block.seconds is not None:
-        return Assembled((builder.pause("wait", f"wait {block.seconds:g} s", block.seconds),))
-    if block.until_clock_s is not None:
-        minutes = int(block.until_clock_s // 60)
-        words = f"{minutes // 60:02d}:{minutes % 60:02d}"
-        return Assembled((builder.node("wait until", f"wait until {words}", time_s=block.until_clock_s, words=words),))
-    assert block.condition is not None
-    decide, key, parts = _decided(assembler, block.condition, builder.at("for"))
-    words, every_s = str(block.condition), block.every_s if decide.children else 0.0
+def _wait(assembler: Assembler, block: Wait, builder: PlanBuilder) -> Assembled:
+    awaited = block.awaited
+    if awaited.seconds is not None:
+        return Assembled((builder.pause("wait", f"wait {awaited.seconds:g} s", awaited.seconds),))
+    if awaited.until_clock is not None:
+        time_s, words = awaited.until_clock_s, awaited.until_clock
+        return Assembled((builder.node("wait until", f"wait until {words}", time_s=time_s, words=words),))
+    assert awaited.condition is not None
+    decide, key, parts = _decided(assembler, awaited.condition, builder.at("for"))
+    words, every_s = str(awaited.condition), awaited.every_s if decide.children else 0.0
     name = f"wait until {words}"
     return Assembled((builder.node("wait for", name, decide, key=key, words=words, every_s=every_s),), parts)
 
 
-def _check(assembler: Assembler, block: Check, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+def _check(assembler: Assembler, block: Check, builder: PlanBuilder) -> Assembled:
     below = builder.at("check")
     decided = decision_of(block.condition, below, assembler.flow.names)
     if isinstance(block.condition, Look) and isinstance(decided.decision, AnswerIs) and not decided.decision.max_age_s:
-        key = _give_key(assembler, block.gives, decided.decision.key, bool, builder)
+        key = _give_key(assembler, block.answer_name, decided.decision.key, bool, builder)
         return Assembled((answering(decided.looks[0], {"key": key}),), _checks(decided, builder))
     if isinstance(block.condition, DoorOpen) and not block.condition.max_age_s:
-        key = _give_key(assembler, block.gives, below.key("answer"), bool, builder)
+        key = _give_key(assembler, block.answer_name, below.key("answer"), bool, builder)
         look = door_plan(below, block.condition.between, key)
         goal = door_goal(builder.knowledge, block.condition.between)
         return Assembled((look,), (StepPart(look.path_id, goal=goal),))
-    key = _give_key(assembler, block.gives, below.key("decided"), bool, builder)
+    key = _give_key(assembler, block.answer_name, below.key("decided"), bool, builder)
     decide = decide_plan(block.condition, decided, below, key)
     question = str(block.condition)
     node = builder.node("check", f"{question}?", decide, question=question, key=key)
     return Assembled((node,), _checks(decided, builder))
 
 
-def _dock(assembler: Assembler, block: Dock, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+def _dock(assembler: Assembler, block: Dock, builder: PlanBuilder) -> Assembled:
     facts = builder.knowledge
     if facts.dock is None:
         hint = "add 'dock' to its knowledge"
@@ -425,7 +413,7 @@ def _dock(assembler: Assembler, block: Dock, builder: PlanBuilder, policy: StepP
     return Assembled((node,), (StepPart(node.path_id, command, goal=command_goal(command, facts)),))
 
 
-def _speak(assembler: Assembler, block: Speak, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+def _speak(assembler: Assembler, block: Speak, builder: PlanBuilder) -> Assembled:
     if not block.text.names:
         return Assembled((builder.skill("speak", {"text": block.text.filled({})}),))
     _check_template(block.text, builder, assembler)
@@ -435,11 +423,12 @@ def _speak(assembler: Assembler, block: Speak, builder: PlanBuilder, policy: Ste
     return Assembled((builder.sequence("speak", fill, builder.skill("speak", {"text": FromBoard(key)})),))
 
 
-def _ask(assembler: Assembler, block: Ask, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+def _ask(assembler: Assembler, block: Ask, builder: PlanBuilder) -> Assembled:
     _check_template(block.text, builder, assembler)
     kind = float if block.match == "number" else str
-    key = _give_key(assembler, block.gives, builder.key("answer"), kind, builder)
-    names = {choice.lower(): choice for choice in block.choices} or _spoken(block.match, builder)
+    key = _give_key(assembler, block.answer_name, builder.key("answer"), kind, builder)
+    choices = block.choices or {}
+    names = {choice.lower(): choice for choice in choices} or _spoken(block.match, builder)
     default = _default(block, names, builder)
     leaf = builder.node(
         "question",
@@ -447,18 +436,18 @@ def _ask(assembler: Assembler, block: Ask, builder: PlanBuilder, policy: StepPol
         part="question",
         text=block.text,
         keys=MappingProxyType(dict(keys_of(block.text, assembler.flow.names))),
-        options=tuple(block.choices),
+        options=tuple(choices),
         names=MappingProxyType(names),
         gives=kind,
         limit_s=block.limit_s,
         default=default,
         key=key,
     )
-    if not any(block.choices.values()):
+    if not any(choices.values()):
         return Assembled((leaf,))
     flow, afters, branches, nodes = assembler.flow, [], {}, [leaf]
     parts: tuple[StepPart, ...] = ()
-    for choice, steps in block.choices.items():
+    for choice, steps in choices.items():
         branch, after = _branch(assembler, steps, builder.at(f"answer-{slug(choice)}"), f"if {choice}", flow)
         afters.append(after)
         parts += branch.parts
@@ -500,7 +489,7 @@ def _default(block: Ask, names: Mapping[str, str], builder: PlanBuilder) -> Valu
     return names.get(str(default).lower(), str(default))
 
 
-def _set(assembler: Assembler, block: Set, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+def _set(assembler: Assembler, block: Set, builder: PlanBuilder) -> Assembled:
     values: dict[str, Expression | Template] = {}
     for name, expression in block.values.items():
         kind = kind_in(expression, builder, assembler.flow.names)
@@ -554,22 +543,7 @@ def answering(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
     return replace(node, children=tuple(answering(child, keys) for child in node.children))
 
 
-_NAMES: Final[Mapping[type, str]] = MappingProxyType(
-    {
-        Choose: "if",
-        Repeat: "repeat",
-        Try: "try",
-        Together: "together",
-        Group: "group",
-        Wait: "wait",
-        Check: "check",
-        Dock: "dock",
-        Speak: "speak",
-        Ask: "ask",
-        Set: "set",
-    }
-)
-_Plan = Callable[[Assembler, Any, PlanBuilder, StepPolicy], Assembled]
+_Plan = Callable[[Assembler, Any, PlanBuilder], Assembled]
 _PLANS: Final[Mapping[type, _Plan]] = MappingProxyType(
     {
         Choose: _choose,

@@ -30,7 +30,9 @@ from executive.words.condition import (
     Condition,
     DoorOpen,
     Look,
+    LookFor,
     Not,
+    Question,
     ValueIs,
     parts_of,
 )
@@ -69,32 +71,34 @@ def decision_of(condition: Condition, builder: PlanBuilder, names: Mapping[str, 
     def made(part: Condition) -> Decision:
         """The decision of a part; its looks are gathered on the way."""
         match part:
-            case ValueIs(expression):
+            case ValueIs(expression=expression):
                 if kind_in(expression, builder, names) is not Kind.TRUTH:
                     hint = "compare it with something, as in 'count > 2'"
                     raise InputError.at(builder.source, f"'{expression}' is not true or false", hint=hint)
                 return ValueHolds(expression, keys_of(expression, names))
-            case Look(command, max_age_s):
+            case Look(command=command, max_age_s=max_age_s):
                 below = replace(builder.at(f"look-{len(looks) + 1}"), command=command)
                 refuse_several(below)
                 answer = AnswerIs(below.key("answer"), max_age_s)
                 looks.append(find_plan(below, answer.key))
                 checks.append((below.path_id, part))
                 return answer
-            case DoorOpen(between, max_age_s):
+            case DoorOpen(between=between, max_age_s=max_age_s):
                 below = builder.at(f"look-{len(looks) + 1}")
                 answer = AnswerIs(below.key("answer"), max_age_s)
                 looks.append(door_plan(below, between, answer.key))
                 checks.append((below.path_id, part))
                 return answer
-            case ButtonPressed(name):
+            case ButtonPressed(button=name):
                 return Pressed(name)
-            case AllOf(parts):
+            case AllOf(parts=parts):
                 return AllHold(tuple(map(made, parts)))
-            case AnyOf(parts):
+            case AnyOf(parts=parts):
                 return AnyHolds(tuple(map(made, parts)))
-            case Not(inner):
+            case Not(part=inner):
                 return DoesNotHold(made(inner))
+            case Question() | LookFor():
+                raise TypeError(f"{condition!r} was not resolved")
 
     decided = Decided(made(condition), tuple(looks), tuple(checks))
     try:

@@ -15,7 +15,7 @@ from executive.tree.behaviours.conditions import BatteryAtLeast, Condition, Know
 from executive.tree.behaviours.policies import FINAL_CAUSES, RETRY, SKIP, STOP
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.node import NodeSpec
-from executive.words.steps import OnFailure, StepGuards, StepPolicy
+from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
 from skills.api import Cause
 
 __all__ = ["PolicyFrame", "needs_way_back", "under_policy"]
@@ -32,26 +32,26 @@ class PolicyFrame:
     may_skip: bool = True
 
 
-def under_policy(body: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> NodeSpec:
+def under_policy(body: NodeSpec, policy: Policy, frame: PolicyFrame) -> NodeSpec:
     """The subtree under its policy; the subtree itself when the policy asks for nothing."""
     node, below = frame.builder.node, body
     if policy.timeout_s is not None:
         below = node("timeout", f"within {policy.timeout_s:g} s", below, part="timeout", limit_s=policy.timeout_s)
-    if policy.retries:
-        attempts = policy.retries + 1
+    if policy.further_attempts:
+        attempts = policy.further_attempts + 1
         name = f"up to {attempts} attempts"
         below = node("retry", name, below, part="retries", attempts=attempts, causes=RETRIED_CAUSES)
-    for part, name, condition in _conditions(policy.guards):
+    for part, name, condition in _conditions(policy.guards or Guards()):
         below = node("guard", name, below, part=part, condition=condition)
-    return _ON_FAILURE[policy.on_failure](below, policy, frame)
+    return _ON_FAILURE[policy.on_failure or OnFailure.STOP](below, policy, frame)
 
 
-def needs_way_back(policy: StepPolicy) -> bool:
+def needs_way_back(policy: Policy) -> bool:
     """True when the policy leads back to where the mission began."""
     return policy.on_failure is OnFailure.RETURN
 
 
-def _conditions(guards: StepGuards) -> Iterator[tuple[str, str, Condition]]:
+def _conditions(guards: Guards) -> Iterator[tuple[str, str, Condition]]:
     """Part of the path id, name and condition of each guard; the outermost last."""
     if guards.localised:
         yield "guard-localised", "knows where it is", KnowsPlace(stale=guards.stale)
@@ -65,11 +65,12 @@ def _conditions(guards: StepGuards) -> Iterator[tuple[str, str, Condition]]:
         )
 
 
-def _skip(below: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> NodeSpec:
+def _skip(below: NodeSpec, policy: Policy, frame: PolicyFrame) -> NodeSpec:
     return frame.builder.node("skip", "skip it if it fails", below, part="skip", step=frame.words)
 
 
-def _ask(below: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> NodeSpec:
+def _ask(below: NodeSpec, policy: Policy, frame: PolicyFrame) -> NodeSpec:
+    question = policy.question or OperatorQuestion()
     return frame.builder.node(
         "ask",
         "ask if it fails",
@@ -77,24 +78,24 @@ def _ask(below: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> NodeSpec:
         part="ask",
         step=frame.words,
         options=(RETRY, SKIP, STOP) if frame.may_skip else (RETRY, STOP),
-        default=policy.question.default,
-        limit_s=policy.question.limit_s,
-        text=policy.question.text,
+        default=question.default,
+        limit_s=question.limit_s,
+        text=question.text,
     )
 
 
-def _go_back(below: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> NodeSpec:
+def _go_back(below: NodeSpec, policy: Policy, frame: PolicyFrame) -> NodeSpec:
     builder = frame.builder.at("return")
     return builder.node(
         "go back", "go back if it fails", below, builder.navigate(FromBoard(builder.start_key), "the start")
     )
 
 
-def _stop(below: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> NodeSpec:
+def _stop(below: NodeSpec, policy: Policy, frame: PolicyFrame) -> NodeSpec:
     return below
 
 
-_ON_FAILURE: Final[Mapping[OnFailure, Callable[[NodeSpec, StepPolicy, PolicyFrame], NodeSpec]]] = {
+_ON_FAILURE: Final[Mapping[OnFailure, Callable[[NodeSpec, Policy, PolicyFrame], NodeSpec]]] = {
     OnFailure.STOP: _stop,
     OnFailure.RETRY: _stop,
     OnFailure.SKIP: _skip,

@@ -13,17 +13,16 @@ from executive.tree.registry import missing
 from executive.tree.types import field_types
 from executive.words.knowledge import Knowledge
 from executive.words.slug import slug
-from executive.words.steps import SkillCall
+from executive.words.steps import CallSkill
 from skills.api import Skill
-from skills.files.errors import SourceLine, listing, suggestion
+from skills.files.errors import listing, suggestion
 
 __all__ = ["skill_plan"]
 
 
 def skill_plan(
-    call: SkillCall,
+    call: CallSkill,
     path_id: str,
-    source: SourceLine | None,
     *,
     knowledge: Knowledge,
     registry: Registry,
@@ -38,25 +37,25 @@ def skill_plan(
     skill = _registered(call, registry)
     inputs = _inputs(call, skill, knowledge, names)
     outputs = {
-        port: gives_to(call.gives[port], f"{path_id}/{slug(port)}", skill.outputs[port])
+        port: gives_to((call.gives or {})[port], f"{path_id}/{slug(port)}", skill.outputs[port])
         for port in _given_ports(call, skill)
     }
-    return skill_spec(registry, call.skill, path_id, source, inputs, outputs)
+    return skill_spec(registry, call.skill, path_id, call.source, inputs, outputs)
 
 
-def _registered(call: SkillCall, registry: Registry) -> type[Skill[Any]]:
+def _registered(call: CallSkill, registry: Registry) -> type[Skill[Any]]:
     if call.skill not in registry:
         raise call.error(("skill",), *missing(call.skill, registry))
     return registry[call.skill]
 
 
 def _inputs(
-    call: SkillCall, skill: type[Skill[Any]], knowledge: Knowledge, names: Mapping[str, str]
+    call: CallSkill, skill: type[Skill[Any]], knowledge: Knowledge, names: Mapping[str, str]
 ) -> dict[str, Binding]:
     """A binding for each input port that has a value."""
     hints = field_types(skill.Inputs)
     try:
-        ports = gathered(call.values, skill.Inputs)
+        ports = gathered(call.values or {}, skill.Inputs)
         return {
             port: _named_output(call, path, value[FROM_KEY], names)
             if isinstance(value, dict) and set(value) == {FROM_KEY}
@@ -69,7 +68,7 @@ def _inputs(
         raise call.error(("with", *error.path), message, error.hint) from error
 
 
-def _named_output(call: SkillCall, path: tuple[str | int, ...], name: Any, names: Mapping[str, str]) -> FromBoard:
+def _named_output(call: CallSkill, path: tuple[str | int, ...], name: Any, names: Mapping[str, str]) -> FromBoard:
     if not isinstance(name, str) or name not in names:
         none = None if names else "name one with 'gives: {PORT: NAME}' in an earlier step"
         hint = suggestion(str(name), names, none)
@@ -77,10 +76,10 @@ def _named_output(call: SkillCall, path: tuple[str | int, ...], name: Any, names
     return FromBoard(names[name])
 
 
-def _given_ports(call: SkillCall, skill: type[Skill[Any]]) -> tuple[str, ...]:
-    for port in call.gives:
+def _given_ports(call: CallSkill, skill: type[Skill[Any]]) -> tuple[str, ...]:
+    for port in call.gives or ():
         if port not in skill.outputs:
             known = f"its outputs are {listing(skill.outputs)}" if skill.outputs else "it has none"
             hint = suggestion(port, skill.outputs, known)
             raise call.error(("gives", port), f"{call.skill} has no output port '{port}'", hint)
-    return tuple(call.gives)
+    return tuple(call.gives or ())

@@ -26,7 +26,8 @@ from executive.store.given import GivenMissions
 from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
 from executive.words.command import Command, Task, parse_command
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import Do, steps_of_commands
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError
 from skills.robot import Pose2D
@@ -97,8 +98,8 @@ class Fleet:
     def queue(self, *lines):
         request = Request(commands=lines, name="work", world_name="scripted")
         stored = self.store.add(request, queued=True)
-        step = MissionStep(tuple(map(parse_command, lines)))
-        missions = {name: Mission("work", DEFAULT_WORLD, name, (step,)) for name in ROBOTS}
+        steps = steps_of_commands(tuple(map(parse_command, lines)))
+        missions = {name: Mission(name="work", robot=name, steps=steps) for name in ROBOTS}
         options = {name: self._prepared(request, mission) for name, mission in missions.items()}
         self.missions[stored.id] = FleetMission(stored, options)
 
@@ -130,8 +131,8 @@ class Fleet:
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
 
     def _docking(self, name):
-        step = MissionStep((Command(task=Task.CHARGE),))
-        return self._prepared(Request(), Mission("charge", DEFAULT_WORLD, name, (step,)))
+        step = Do.of(Command(task=Task.CHARGE))
+        return self._prepared(Request(), Mission(name="charge", robot=name, steps=(step,)))
 
     def hold(self, skill):
         self.robots[skill.context.robot.name].holding = True

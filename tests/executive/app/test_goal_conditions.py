@@ -7,13 +7,13 @@ import pytest
 from executive.app.goal_conditions import conditions_of, verdict_of
 from executive.tree.compiler import compile_mission
 from executive.tree.goals import command_goal
-from executive.words import blocks
 from executive.words.command import parse_command
-from executive.words.expression import Template
 from executive.words.goal import GoalKind, When
-from executive.words.steps import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
+from executive.words.mission import Mission
+from executive.words.policy import OnFailure, Policy
+from executive.words.steps import CallSkill, Do, Loop, Repeat, Speak, UseMission
 from plant.referee import Verdict
-from skills.speak.skill import Speak
+from skills.speak.skill import Speak as SpeakSkill
 
 
 def conditions(knowledge, *texts):
@@ -82,7 +82,7 @@ def test_going_asks_for_the_body_there(knowledge, goal, point):
 
 GET = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
 GO = "Take [Nothing] to [hall] and do [Nothing] to [Nothing]"
-SKIPPED = StepPolicy(on_failure=OnFailure.SKIP)
+SKIPPED = Policy(on_failure=OnFailure.SKIP)
 
 
 @pytest.fixture
@@ -90,7 +90,7 @@ def conditions_by(knowledge, registry, run_tree):
     """The conditions of a mission's steps after it ran with the scripted robot."""
 
     def after_running(*steps):
-        mission = Mission("m", "flat", "Alice", steps)
+        mission = Mission(name="m", robot="Alice", steps=steps)
         tree = compile_mission(mission, knowledge=knowledge, registry=registry)
         return conditions_of(tree, run_tree(tree).robots[0])
 
@@ -98,7 +98,7 @@ def conditions_by(knowledge, registry, run_tree):
 
 
 def step(text, policy=SKIPPED):
-    return MissionStep((parse_command(text),), policy=policy)
+    return Do.of(parse_command(text)).under(policy)
 
 
 def test_a_step_that_was_skipped_has_no_condition(conditions_by, script):
@@ -112,13 +112,13 @@ def test_a_step_that_could_have_been_skipped_but_was_done_has_its_condition(cond
 
 def test_steps_of_a_used_mission_that_was_skipped_have_no_conditions(conditions_by, script):
     script.seen_on = ()
-    used = Mission("inner", "flat", "Alice", (step(GO, StepPolicy()), step(GET, StepPolicy())))
-    outer = MissionStep(policy=SKIPPED, used=used)
+    used = Mission(name="inner", robot="Alice", steps=(step(GO, Policy()), step(GET, Policy())))
+    outer = UseMission(use="inner.yaml").meaning(used).under(SKIPPED)
     assert [condition.kind for condition in conditions_by(outer, step(GO))] == [GoalKind.WENT]
 
 
 def test_a_drive_to_a_pose_asks_for_the_body_there(conditions_by):
-    (condition,) = conditions_by(MissionStep(skill=SkillCall("navigate", {"x": 4.0, "y": -1.0})))
+    (condition,) = conditions_by(CallSkill(skill="navigate", values={"x": 4.0, "y": -1.0}))
     assert condition.kind is GoalKind.WENT
     assert condition.goal[0].contains((4.1, -0.9, 0.5))
     assert not condition.goal[0].contains((4.5, -1.0, 0.5))
@@ -140,7 +140,7 @@ def verdict_on(knowledge, registry, run_tree):
     """The verdict on a mission that ran with the scripted robot, when all its conditions hold or none does."""
 
     def after_running(*steps, holds=True):
-        tree = compile_mission(Mission("m", "flat", "Alice", steps), knowledge=knowledge, registry=registry)
+        tree = compile_mission(Mission(name="m", robot="Alice", steps=steps), knowledge=knowledge, registry=registry)
 
         def judge(conditions):
             return Verdict(holds if conditions else None, "seen", 0, 0)
@@ -150,15 +150,15 @@ def verdict_on(knowledge, registry, run_tree):
     return after_running
 
 
-STOW = MissionStep(skill=SkillCall("stow"))
+STOW = CallSkill(skill="stow")
 
 # steps, whether their conditions hold -> the verdict
 VERDICTS = [
-    ((step(GO, StepPolicy()),), True, True),
-    ((step(GO, StepPolicy()),), False, False),
+    ((step(GO, Policy()),), True, True),
+    ((step(GO, Policy()),), False, False),
     ((STOW,), True, None),
-    ((step(GO, StepPolicy()), STOW), True, True),
-    ((step(GO, StepPolicy()), STOW), False, False),
+    ((step(GO, Policy()), STOW), True, True),
+    ((step(GO, Policy()), STOW), False, False),
 ]
 
 
@@ -169,7 +169,7 @@ def test_what_can_be_judged_decides_and_a_mission_of_nothing_else_is_not_judged(
 
 def test_a_step_without_condition_is_named(verdict_on):
     assert "No goal condition stands for stow" in verdict_on(STOW).why
-    assert "Not judged: stow." in verdict_on(step(GO, StepPolicy()), STOW).why
+    assert "Not judged: stow." in verdict_on(step(GO, Policy()), STOW).why
 
 
 def test_where_the_robot_went_must_hold_until_it_drives_again(conditions_by):
@@ -178,7 +178,7 @@ def test_where_the_robot_went_must_hold_until_it_drives_again(conditions_by):
 
 def test_a_mission_that_failed_is_never_fulfilled(verdict_on, script):
     script.seen_on = ()
-    verdict = verdict_on(step(GET, StepPolicy()), holds=True)
+    verdict = verdict_on(step(GET, Policy()), holds=True)
     assert verdict.success is False
     assert "failure" in verdict.why
 
@@ -189,7 +189,9 @@ def spoken(knowledge, registry, run_tree):
 
     def after_running(*steps, forgets=False):
         tree = compile_mission(
-            Mission("tell", "flat", "Alice", steps), knowledge=knowledge, registry={**registry, "speak": Speak}
+            Mission(name="tell", robot="Alice", steps=steps),
+            knowledge=knowledge,
+            registry={**registry, "speak": SpeakSkill},
         )
         result = run_tree(tree).worst
         asked = []
@@ -204,28 +206,28 @@ def spoken(knowledge, registry, run_tree):
     return after_running
 
 
-HELLO = MissionStep(skill=SkillCall("speak", {"text": "Hello"}))
+HELLO = CallSkill(skill="speak", values={"text": "Hello"})
 
 
 def test_what_is_said_does_not_keep_the_robot_from_staying_where_it_went(spoken):
-    verdict, asked = spoken(HELLO, step(GO, StepPolicy()), HELLO)
+    verdict, asked = spoken(HELLO, step(GO, Policy()), HELLO)
     assert verdict.success is True
     assert [(one.kind, one.when) for one in asked] == [(GoalKind.WENT, When.END_OF_MISSION)]
 
 
-@pytest.mark.parametrize("block", [HELLO, MissionStep(block=blocks.Speak(Template("Hello")))])
+@pytest.mark.parametrize("block", [HELLO, Speak(speak="Hello")])
 def test_a_mission_that_only_speaks_is_judged_by_what_was_said(spoken, block):
-    verdict, _ = spoken(MissionStep(block=blocks.Repeat((block,), 2)))
+    verdict, _ = spoken(Repeat(loop=Loop(times=2), steps=(block,)))
     assert (verdict.success, verdict.why) == (True, 'It said "Hello".')
-    verdict, _ = spoken(MissionStep(block=blocks.Repeat((block,), 2)), forgets=True)
+    verdict, _ = spoken(Repeat(loop=Loop(times=2), steps=(block,)), forgets=True)
     assert (verdict.success, verdict.why) == (False, 'It did not say "Hello".')
 
 
 # Was "Hello" a question that was asked while a step was to say it? Then the step has not said it.
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_question_does_not_count_as_the_text_of_a_step(knowledge, registry, run_tree, asked):
-    mission = Mission("tell", "flat", "Alice", (HELLO,))
-    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": Speak})
+    mission = Mission(name="tell", robot="Alice", steps=(HELLO,))
+    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": SpeakSkill})
     result = run_tree(tree).worst
     heard = dataclasses.replace(result, said=tuple(dataclasses.replace(each, asked=asked) for each in result.said))
     verdict = verdict_of(tree, heard, lambda given: Verdict(None, "", 0, 0))
@@ -233,9 +235,9 @@ def test_a_question_does_not_count_as_the_text_of_a_step(knowledge, registry, ru
 
 
 def test_one_sentence_counts_for_one_step(knowledge, registry, run_tree):
-    anything = MissionStep(block=blocks.Speak(Template("{n}")))
-    mission = Mission("tell", "flat", "Alice", (HELLO, anything), variables={"n": 1})
-    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": Speak})
+    anything = Speak(speak="{n}")
+    mission = Mission(name="tell", robot="Alice", steps=(HELLO, anything), variables={"n": 1})
+    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": SpeakSkill})
     result = run_tree(tree).worst
     heard = dataclasses.replace(result, said=result.said[:1])
     verdict = verdict_of(tree, heard, lambda given: Verdict(None, "", 0, 0))

@@ -165,7 +165,7 @@ class TwoRobots(ScriptedBackend):
 
 def test_a_run_with_two_robots_leaves_the_tree_and_the_steps_of_each(talk):
     def named(name):
-        mission = replace(talk.mission, robot_name=name)
+        mission = talk.mission.model_copy(update={"robot": name})
         return replace(talk.with_mission(mission), robots=robots)
 
     robots = dict.fromkeys(("Alice", "Bob"), SimpleNamespace(kind="spot"))

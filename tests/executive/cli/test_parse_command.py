@@ -2,6 +2,7 @@ import json
 from pathlib import Path
 
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 from executive.cli import entry
@@ -41,24 +42,26 @@ def test_without_explain_there_are_no_steps():
 
 
 DECIDES = "if there is a beer in the kitchen, tell Robin"
-MISSION = (
-    "If (Take [Nothing] to [kitchen] and do [find] to [beer])"
-    ' {Take [Nothing] to [Robin] and do [Nothing] to [Nothing]; Say "there is a beer in the kitchen"}'
-)
+MISSION = [
+    "- if: {object: beer, at: kitchen}",
+    "  then:",
+    "  - {to: Robin}",
+    "  - {speak: there is a beer in the kitchen}",
+]
 
 
-def test_what_decides_is_shown_in_its_written_form():
+def test_what_decides_is_shown_as_yaml():
     result = CliRunner().invoke(entry.app, ["parse", DECIDES, "--json"])
     values = json.loads(result.stdout.splitlines()[-1])
-    assert values["written"] == [MISSION]
+    assert values["mission"] == yaml.safe_load("\n".join(MISSION))
     assert [command["goal"] for command in values["commands"]] == ["Robin"]
-    assert CliRunner().invoke(entry.app, ["parse", DECIDES]).stdout.splitlines() == [MISSION]
+    assert CliRunner().invoke(entry.app, ["parse", DECIDES]).stdout.splitlines() == MISSION
 
 
 def test_explain_shows_the_clauses_and_the_mission():
     result = CliRunner().invoke(entry.app, ["parse", DECIDES, "--explain"])
     assert "parts:\n  if | there is a beer in the kitchen\n  tell Robin\n" in result.stdout
-    assert result.stdout.rstrip().endswith(MISSION)
+    assert result.stdout.rstrip().endswith("\n".join(f"  {line}" for line in MISSION))
 
 
 def test_the_arcs_are_drawn(tmp_path: Path):

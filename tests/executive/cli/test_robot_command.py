@@ -14,7 +14,7 @@ from executive.app.simulated import simulate
 from executive.app.worlds import open_world
 from executive.cli.entry import app
 from executive.cli.robot_command import TerminalKeys, context_for, page_actions, period
-from executive.mission.file.resolve import load_mission
+from executive.mission.load import load_mission
 from executive.view.actions import RefusedError
 from skills.arm.kinematics import arm_model
 from skills.files.errors import InputError
@@ -64,7 +64,7 @@ def test_a_saved_pose_is_a_mission_file(tmp_path):
     path = save_pose(tmp_path / "poses", "by_the_table", POSE, world="flat")
     navigate, pose_arm = load_mission(path).steps
     assert (navigate.skill, pose_arm.skill) == ("navigate", "pose_arm")
-    assert pose_arm.with_["joints"] == list(POSE.joints_rad)
+    assert pose_arm.values["joints"] == list(POSE.joints_rad)
 
 
 def test_poses_without_a_name_are_numbered(tmp_path):

@@ -5,12 +5,27 @@ import pytest
 from executive.app.goal_conditions import Share, conditions_of
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
-from executive.words import blocks
 from executive.words.command import parse_command
 from executive.words.condition import DoorOpen, Look, ValueIs
-from executive.words.expression import Expression
 from executive.words.goal import GoalKind, When
-from executive.words.steps import Mission, MissionStep, SkillCall, StepPolicy
+from executive.words.mission import Mission
+from executive.words.policy import Policy
+from executive.words.steps import (
+    Awaited,
+    CallSkill,
+    Check,
+    Choose,
+    Do,
+    Group,
+    Handler,
+    Loop,
+    Repeat,
+    Set,
+    Together,
+    Try,
+    Wait,
+    While,
+)
 from skills.api import Cause, Failed, Succeeded
 from skills.check_door.skill import CheckDoorInputs
 from tests.executive.conftest import KNOWLEDGE, scripted_skill
@@ -19,7 +34,7 @@ AT_END, AT_STEP = When.END_OF_MISSION, When.END_OF_STEP
 
 
 def step(text, **policy):
-    return MissionStep((parse_command(text),), policy=StepPolicy(**policy))
+    return Do.of(parse_command(text)).under(Policy(**policy))
 
 
 def go(place, **policy):
@@ -28,15 +43,15 @@ def go(place, **policy):
 
 GET = step("Take [Nothing] to [kitchen] and do [grasp] to [coke]")
 PUT = step("Take [coke] to [bedroom] and do [Nothing] to [Nothing]")
-LOOK = Look(parse_command("Take [Nothing] to [kitchen] and do [find] to [coke]"))
+LOOK = Look.of(parse_command("Take [Nothing] to [kitchen] and do [find] to [coke]"))
 
 
 def block(made):
-    return MissionStep(block=made)
+    return made
 
 
 def holds(text):
-    return ValueIs(Expression(text))
+    return ValueIs(text=text)
 
 
 @pytest.fixture
@@ -49,8 +64,8 @@ def ran(knowledge, registry, run_tree, script, robot):
 
     script.ends.setdefault("place", put)
 
-    def run(*steps, whole=None, name="Alice"):
-        mission = Mission("m", "flat", name, steps, whole=whole)
+    def run(*steps, name="Alice", **watched):
+        mission = Mission(name="m", robot=name, steps=steps, **watched)
         tree = compile_mission(mission, knowledge=knowledge, registry=registry)
         return tree, run_tree(tree).robots[0]
 
@@ -61,8 +76,8 @@ def ran(knowledge, registry, run_tree, script, robot):
 def asked(ran):
     """Runs steps that succeed: what is asked of where the robot went, in order, as (place, when)."""
 
-    def ask(*steps, whole=None):
-        tree, result = ran(*steps, whole=whole)
+    def ask(*steps, **watched):
+        tree, result = ran(*steps, **watched)
         assert result.outcome is Outcome.SUCCESS, result.message
         found = conditions_of(tree, result)
         return [(one.goal[0].name, one.when) for one in found if one.kind is GoalKind.WENT]
@@ -71,7 +86,7 @@ def asked(ran):
 
 
 def when(*steps, condition="elapsed > 0.05", times=1):
-    return (blocks.Handler(holds(condition), steps, times),)
+    return (Handler(condition=holds(condition), steps=steps, times=times),)
 
 
 def test_of_two_places_the_first_holds_at_the_end_of_its_step_and_the_last_until_the_end(asked):
@@ -79,12 +94,12 @@ def test_of_two_places_the_first_holds_at_the_end_of_its_step_and_the_last_until
 
 
 def test_if_is_asked_for_the_branch_that_was_taken(asked):
-    choose = blocks.Choose(holds("elapsed > 5000"), (go("hall"),), (go("kitchen"),))
+    choose = Choose(condition=holds("elapsed > 5000"), then=(go("hall"),), otherwise=(go("kitchen"),))
     assert asked(block(choose)) == [("kitchen", AT_END)]
 
 
 def test_each_look_of_a_condition_is_judged_at_its_time(ran):
-    tree, result = ran(block(blocks.Repeat((block(blocks.Choose(LOOK, (go("hall"),))),), 2)))
+    tree, result = ran(block(Repeat(loop=Loop(times=2), steps=(block(Choose(condition=LOOK, then=(go("hall"),))),))))
     looks = [one for one in conditions_of(tree, result) if one.kind is GoalKind.ANSWERED]
     assert [one.answer for one in looks] == [True, True]
     assert looks[0].answered_s < looks[1].answered_s
@@ -95,8 +110,8 @@ def test_each_look_at_a_door_is_judged_at_its_time(ran, knowledge, registry, scr
     monkeypatch.setattr(knowledge, "__dict__", knowledge.model_validate({**KNOWLEDGE, "doors": doors}).__dict__)
     registry["check_door"] = scripted_skill(script, "check_door", CheckDoorInputs, {"open": bool})
     script.ends["check_door"] = lambda skill: Succeeded("seen", {"open": script.begun.count("check_door") == 1})
-    door = DoorOpen(("hall", "kitchen"))
-    tree, result = ran(block(blocks.Choose(door, (go("hall"),))), block(blocks.Check(door)))
+    door = DoorOpen(door=("hall", "kitchen"))
+    tree, result = ran(block(Choose(condition=door, then=(go("hall"),))), block(Check(condition=door)))
     looks = [one for one in conditions_of(tree, result) if one.kind is GoalKind.DOOR_OPEN]
     assert [(one.answer, one.source[0].name) for one in looks] == [
         (True, "door between hall and kitchen"),
@@ -106,49 +121,49 @@ def test_each_look_at_a_door_is_judged_at_its_time(ran, knowledge, registry, scr
 
 
 def test_each_round_of_repeat_is_asked_for(asked):
-    repeat = blocks.Repeat((go("hall"), go("kitchen")), 2)
+    repeat = Repeat(loop=Loop(times=2), steps=(go("hall"), go("kitchen")))
     assert asked(block(repeat)) == [("hall", AT_STEP)] * 2 + [("kitchen", AT_STEP), ("kitchen", AT_END)]
 
 
 def test_rounds_are_asked_for_though_the_last_decision_reset_them(asked):
-    count = blocks.Set({"n": Expression("n + 1")})
-    repeat = blocks.Repeat((go("hall"), block(count)), 9, while_=holds("n < 2"))
-    assert asked(block(blocks.Set({"n": Expression("0")})), block(repeat)) == [("hall", AT_STEP), ("hall", AT_END)]
+    count = Set(set={"n": "n + 1"})
+    repeat = Repeat(loop=Loop(times=9, while_=holds("n < 2")), steps=(go("hall"), block(count)))
+    assert asked(block(Set(set={"n": "0"})), block(repeat)) == [("hall", AT_STEP), ("hall", AT_END)]
 
 
 def test_what_a_failed_branch_of_try_did_does_not_count(asked, script):
     script.seen_on = ()
-    tried = blocks.Try((go("hall"), GET), (go("kitchen"),))
+    tried = Try(steps=(go("hall"), GET), otherwise=(go("kitchen"),))
     assert asked(block(tried)) == [("kitchen", AT_END)]
 
 
 def test_what_together_stopped_does_not_count(asked):
-    slow = blocks.Group((go("hall"), go("kitchen"), go("hall")))
-    together = blocks.Together((block(slow), block(blocks.Wait(seconds=0.2))), 1)
+    slow = Group(steps=(go("hall"), go("kitchen"), go("hall")))
+    together = Together(steps=(block(slow), block(Wait(awaited=Awaited(seconds=0.2)))), done_when=1)
     assert asked(block(together), go("bedroom")) == [("bedroom", AT_END)]
 
 
 @pytest.mark.parametrize("as_whole", [True, False])
 def test_when_is_asked_for_at_the_end_of_its_own_steps(asked, as_whole):
-    group = blocks.Group(() if as_whole else (go("kitchen"),), when=when(go("hall")))
-    found = asked(go("kitchen"), whole=group) if as_whole else asked(block(group))
+    handlers = when(go("hall"))
+    found = asked(go("kitchen"), when=handlers) if as_whole else asked(Group(steps=(go("kitchen"),), when=handlers))
     assert sorted(found, key=str) == [("hall", AT_STEP), ("kitchen", AT_END)]
 
 
 def test_after_a_handler_that_went_elsewhere_the_last_place_is_asked_for_at_the_end_of_its_step(asked):
-    group = blocks.Group(
-        (go("kitchen"), block(blocks.Wait(seconds=9.0))), when=when(go("hall"), condition="elapsed > 4")
+    group = Group(
+        steps=(go("kitchen"), block(Wait(awaited=Awaited(seconds=9.0)))), when=when(go("hall"), condition="elapsed > 4")
     )
     assert sorted(asked(block(group)), key=str) == [("hall", AT_END), ("kitchen", AT_STEP)]
 
 
 def test_always_is_asked_for(asked):
-    group = blocks.Group((go("kitchen"),), always=(go("hall"),))
+    group = Group(steps=(go("kitchen"),), always=(go("hall"),))
     assert asked(block(group)) == [("kitchen", AT_STEP), ("hall", AT_END)]
 
 
 def test_a_group_and_the_rounds_of_for_each_are_asked_for_as_steps_in_a_row(asked):
-    group = blocks.Group((go("hall"), block(blocks.Group((go("kitchen"),)))))
+    group = Group(steps=(go("hall"), block(Group(steps=(go("kitchen"),)))))
     assert asked(block(group), go("hall")) == [("hall", AT_STEP), ("kitchen", AT_STEP), ("hall", AT_END)]
 
 
@@ -159,8 +174,8 @@ def test_a_failed_attempt_does_not_count(asked, script):
         return Failed(Cause.PLANNING, "stuck") if next(failures, False) else Succeeded("stowed")
 
     script.ends["stow"] = stow
-    group = blocks.Group((go("hall"), MissionStep(skill=SkillCall("stow"))))
-    tried = MissionStep(block=group, policy=StepPolicy(retries=6))
+    group = Group(steps=(go("hall"), CallSkill(skill="stow")))
+    tried = group.under(Policy(retries=6))
     assert asked(tried) == [("hall", AT_STEP)]
 
 
@@ -182,7 +197,7 @@ def test_an_object_may_leave_the_place_where_a_later_step_takes_it(ran):
 
 def test_what_a_failed_step_took_away_was_taken_by_the_mission(ran, script):
     script.ends["relocalise"] = lambda skill: Failed(Cause.PLANNING, "stuck")
-    taking = blocks.Try((GET, MissionStep(skill=SkillCall("relocalise"))), (block(blocks.Wait(seconds=0.2)),))
+    taking = Try(steps=(GET, CallSkill(skill="relocalise")), otherwise=(block(Wait(awaited=Awaited(seconds=0.2))),))
     tree, result = ran(GET, PUT, block(taking))
     placed = next(one for one in conditions_of(tree, result) if one.kind is GoalKind.PLACED)
     assert len(placed.taken_s) == 1
@@ -198,7 +213,7 @@ def test_what_another_robot_of_the_run_takes_away_was_taken_by_the_mission(ran):
 
 
 def test_what_is_held_while_holding_must_hold_always(ran):
-    group = blocks.Group((go("hall"),), holds=holds("holding"))
+    group = Group(steps=(go("hall"),), while_=While(holds=holds("holding")))
     tree, result = ran(GET, block(group))
     always = [one for one in conditions_of(tree, result) if one.when is When.ALWAYS]
     assert [(one.kind, one.classes) for one in always] == [(GoalKind.GRASPED, ())]
@@ -208,14 +223,14 @@ def test_what_is_held_while_holding_must_hold_always(ran):
 @pytest.mark.parametrize(
     ("call", "kind", "where"),
     [
-        (SkillCall("navigate", {"x": 4.0, "y": -1.0}), GoalKind.WENT, "(4.00, -1.00)"),
-        (SkillCall("place", {"surface": "counter"}), GoalKind.PLACED, "counter"),
-        (SkillCall("hand_over", {"person": "Sam"}), GoalKind.HANDED_OVER, None),
-        (SkillCall("stow"), None, None),
+        (CallSkill(skill="navigate", values={"x": 4.0, "y": -1.0}), GoalKind.WENT, "(4.00, -1.00)"),
+        (CallSkill(skill="place", values={"surface": "counter"}), GoalKind.PLACED, "counter"),
+        (CallSkill(skill="hand_over", values={"person": "Sam"}), GoalKind.HANDED_OVER, None),
+        (CallSkill(skill="stow"), None, None),
     ],
 )
 def test_a_skill_on_its_own_is_judged_by_what_its_inputs_say(ran, call, kind, where):
-    tree, _ = ran(GET, MissionStep(skill=call))
+    tree, _ = ran(GET, call)
     last = tree.parts[-1].goal
     assert (last and GoalKind[last.kind.name]) is kind
     assert where is None or last.goal[0].name == where

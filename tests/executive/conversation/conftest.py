@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import pytest
 
 from executive.conversation import Conversation, Speech
@@ -8,7 +6,7 @@ from executive.language.understand import understand
 from executive.mission.mission import mission_from_steps
 from executive.run.control import Control
 from executive.tree.compiler import compile_mission
-from executive.words.steps import MissionStep
+from executive.words.steps import steps_of_commands
 
 
 @pytest.fixture(scope="session")
@@ -24,7 +22,7 @@ def speech(parser, knowledge, registry):
     def compiled(steps, taken):
         mission = mission_from_steps(steps, world="test", robot_name="Alice")
         number = 1 + sum(name.startswith(mission.name) for name in taken)
-        named = mission if number == 1 else replace(mission, name=f"{mission.name} {number}")
+        named = mission if number == 1 else mission.model_copy(update={"name": f"{mission.name} {number}"})
         return compile_mission(named, knowledge=knowledge, registry=registry)
 
     return Speech(knowledge, "Alice", heard, compiled)
@@ -42,7 +40,7 @@ def talk(speech, control):
     def begin(sentence="fetch me a coke from the kitchen", **options):
         conversation = Conversation(speech, control, **options)
         meant = speech.understand(sentence, None)
-        tree = speech.compile(meant.steps or (MissionStep(meant.commands),), frozenset())
+        tree = speech.compile(meant.steps or steps_of_commands(meant.commands), frozenset())
         control.begin({"Alice": tree})
         conversation.begun(tree, memory=meant.memory)
         return conversation

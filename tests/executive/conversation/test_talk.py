@@ -9,8 +9,7 @@ from executive.conversation import Conversation, ReplyKind
 from executive.run.control import Mode
 from executive.run.outcome import Outcome
 from executive.words.command import Command
-from executive.words.steps import MissionStep
-from executive.words.written import written
+from executive.words.steps import Do, steps_of_commands
 from skills.api import Question
 from skills.testing.clock import VirtualClock
 
@@ -250,44 +249,44 @@ def test_odd_input_is_answered_at_once(talk, given, text):
 
 
 @pytest.fixture
-def written_talk(speech, control):
-    """A conversation whose missions are only their written forms."""
+def compiling_talk(speech, control):
+    """A conversation whose missions are all compiled as one drive; the steps that were asked for."""
     asked = []
 
     def compiled(steps, taken):
-        asked.append(written(steps))
-        plain = [MissionStep((Command(goal="hall"),))]
+        asked.append([step.words or str(step.command) for step in steps])
+        plain = [Do.of(Command(goal="hall"))]
         return replace(speech.compile(plain, taken), steps=tuple(steps))
 
     conversation = Conversation(replace(speech, compile=compiled), control)
-    tree = speech.compile([MissionStep((Command(goal="kitchen"),))], frozenset())
+    tree = speech.compile([Do.of(Command(goal="kitchen"))], frozenset())
     control.begin({"Alice": tree})
     conversation.begun(tree)
     return conversation, asked
 
 
-WAITING = "Wait for (Take [Nothing] to [kitchen] and do [find] to [person])"
+WAITING = "wait until person at kitchen"
 
 
-def test_a_sentence_that_waits_is_no_pause_but_a_mission(written_talk, control):
-    conversation, asked = written_talk
+def test_a_sentence_that_waits_is_no_pause_but_a_mission(compiling_talk, control):
+    conversation, asked = compiling_talk
     reply = conversation.hear("wait in the kitchen until somebody comes", 1.0)
     going = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
     assert (reply.kind, reply.text) == (ReplyKind.DONE, f"first: {going}; {WAITING}")
-    assert asked == [(going, WAITING)]
+    assert asked == [[going, WAITING]]
     assert control.state.mode is not Mode.PAUSED
 
 
-def test_it_is_done_again_whole(written_talk):
-    conversation, asked = written_talk
+def test_it_is_done_again_whole(compiling_talk):
+    conversation, asked = compiling_talk
     conversation.hear("wait in the kitchen until somebody comes", 1.0)
     conversation.hear("again", 2.0)
     assert len(asked) == 2
     assert asked[0] == asked[1]
 
 
-def test_a_part_of_it_cannot_be_changed(written_talk):
-    conversation, _ = written_talk
+def test_a_part_of_it_cannot_be_changed(compiling_talk):
+    conversation, _ = compiling_talk
     conversation.hear("bring me a coke if there is one in the kitchen", 1.0)
     reply = conversation.hear("no, the beer", 2.0)
     assert reply.kind is ReplyKind.REFUSED
@@ -297,7 +296,7 @@ def test_a_part_of_it_cannot_be_changed(written_talk):
 def test_a_corrected_mission_is_run_to_its_end(talk, speech, control, run_tree, compiled, script):
     """No coke but a beer, said while the robot drives."""
     meant = speech.understand("fetch me a coke from the kitchen", None)
-    tree = speech.compile([MissionStep(meant.commands)], frozenset())
+    tree = speech.compile(steps_of_commands(meant.commands), frozenset())
     conversation = Conversation(speech, control)
     conversation.begun(tree, memory=meant.memory)
     said = {2: "where are you", 3: "what are you doing", 4: "no, go to the bathroom"}
@@ -318,7 +317,7 @@ def test_a_corrected_mission_is_run_to_its_end(talk, speech, control, run_tree, 
 
 def test_an_addition_is_corrected_while_it_waits(talk, speech, control, run_tree, script):
     meant = speech.understand("go to the bedroom", None)
-    tree = speech.compile([MissionStep(meant.commands)], frozenset())
+    tree = speech.compile(steps_of_commands(meant.commands), frozenset())
     conversation = Conversation(speech, control)
     conversation.begun(tree, memory=meant.memory)
     said = {1: "and to the bathroom?", 2: "no, to the kitchen"}
@@ -335,7 +334,7 @@ def test_an_addition_is_corrected_while_it_waits(talk, speech, control, run_tree
 
 def test_what_is_held_is_put_down_before_another_thing_is_fetched(speech, control, run_tree, script, registry):
     meant = speech.understand("fetch me a coke from the kitchen", None)
-    tree = speech.compile([MissionStep(meant.commands)], frozenset())
+    tree = speech.compile(steps_of_commands(meant.commands), frozenset())
     conversation = Conversation(speech, control)
     conversation.begun(tree, memory=meant.memory)
     replies = []
@@ -354,7 +353,7 @@ def test_what_is_held_is_put_down_before_another_thing_is_fetched(speech, contro
 
 def test_what_is_held_is_not_fetched_again(speech, control, run_tree):
     meant = speech.understand("fetch me a coke from the kitchen", None)
-    tree = speech.compile([MissionStep(meant.commands)], frozenset())
+    tree = speech.compile(steps_of_commands(meant.commands), frozenset())
     conversation = Conversation(speech, control)
     conversation.begun(tree, memory=meant.memory)
     replies = []

@@ -1,7 +1,8 @@
 import pytest
 
-from executive.language.questions import ClarifyingQuestion, QuestionPolicy, Slot, answer_by, chosen, with_answer
+from executive.language.questions import ClarifyingQuestion, Slot, answer_by, chosen, with_answer
 from executive.language.understand import Status, understand
+from executive.words.mission import QuestionPolicy
 
 TABLE = ClarifyingQuestion(
     "Which table: kitchen table or coffee table?",

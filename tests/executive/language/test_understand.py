@@ -139,7 +139,7 @@ def test_lines_are_answered_in_order_and_one_by_one(parser):
                 "verb": "go",
             }
         ],
-        "written": [],
+        "mission": [],
     }
 
 

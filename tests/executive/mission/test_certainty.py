@@ -14,10 +14,10 @@ NAMES = {**RANGES, "count": Tries}
 
 
 def value(text: str) -> ValueIs:
-    return ValueIs(Expression(text))
+    return ValueIs(text=text)
 
 
-LOOK = Look(Command(item=None, goal=None, task=Task.FIND, object=Thing("beer")))
+LOOK = Look.of(Command(item=None, goal=None, task=Task.FIND, object=Thing("beer")))
 
 
 @pytest.mark.parametrize(
@@ -97,10 +97,10 @@ def test_a_comparison_that_may_go_either_way_is_taken(text: str) -> None:
         (value('drink == "tea" and drink == "coffee"'), "cannot hold"),
         (value('drink != "tea" or drink != "coffee"'), "always holds"),
         (value('clock >= "18:00" and clock < "08:00"'), "cannot hold"),
-        (AllOf((value("battery > 0.5"), value("battery < 0.3"))), "cannot hold"),
-        (AnyOf((value("holding"), Not(value("holding")))), "always holds"),
-        (AllOf((LOOK, value("n > 3 and n < 2"))), "cannot hold"),
-        (AllOf((ButtonPressed("go"), value("n > 3 and n < 2"))), "cannot hold"),
+        (AllOf(parts=(value("battery > 0.5"), value("battery < 0.3"))), "cannot hold"),
+        (AnyOf(parts=(value("holding"), Not(part=value("holding")))), "always holds"),
+        (AllOf(parts=(LOOK, value("n > 3 and n < 2"))), "cannot hold"),
+        (AllOf(parts=(ButtonPressed(button="go"), value("n > 3 and n < 2"))), "cannot hold"),
     ],
     ids=str,
 )
@@ -122,10 +122,10 @@ def test_a_condition_whose_parts_contradict_each_other_is_refused(condition: Con
         value("true"),
         value("5 > 3 and battery < 0.3"),
         value("false and battery < 0.3"),
-        AllOf((LOOK, Not(LOOK))),
-        AllOf((value("battery > 0.5"), LOOK, value("battery < 0.5"))),
-        AnyOf((ButtonPressed("go"), value("battery < 0.2"))),
-        ButtonPressed("go"),
+        AllOf(parts=(LOOK, Not(part=LOOK))),
+        AllOf(parts=(value("battery > 0.5"), LOOK, value("battery < 0.5"))),
+        AnyOf(parts=(ButtonPressed(button="go"), value("battery < 0.2"))),
+        ButtonPressed(button="go"),
         LOOK,
     ],
     ids=str,

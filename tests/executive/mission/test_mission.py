@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from executive.language.parser import load_parser
-from executive.mission.file.resolve import load_mission, mission_from_file
+from executive.mission.load import load_mission, overridden
 from executive.mission.mission import (
     lines_of,
     mission_from_commands,
@@ -11,12 +11,12 @@ from executive.mission.mission import (
     mission_from_meaning,
     understood,
 )
-from executive.words.blocks import Repeat
+from executive.mission.resolve import mission_from_file
 from executive.words.command import Command, parse_command
 from executive.words.knowledge import load_knowledge
-from executive.words.steps import MissionStep, SourceLine
-from executive.words.written import written
+from executive.words.steps import Do, Loop, Place, Repeat
 from skills.files.errors import InputError
+from skills.files.yaml_source import YamlSource
 
 WORLD = Path(__file__).parents[1] / "language" / "world.yaml"
 MISSION = """\
@@ -206,13 +206,13 @@ def test_what_a_sentence_asks_for_comes_back_from_its_lines(parser, knowledge, s
     mission = mission_from_meaning(meant, world="flat", robot_name="Alice")
     again = mission_from_lines(lines_of(mission.steps), world="flat", robot_name="Alice")
     assert (again.world, again.robot_name) == ("flat", "Alice")
-    assert written(again.steps) == written(mission.steps)
     assert lines_of(again.steps) == lines_of(mission.steps)
 
 
 def test_of_a_file_only_the_commands_are_lines():
-    step = MissionStep((Command(goal="hall"),), SourceLine(Path("mission.yaml"), 3))
-    assert lines_of((MissionStep(block=Repeat((step,), times=2), source=step.source),)) == (str(step.commands[0]),)
+    place = Place(YamlSource(Path("mission.yaml"), None, {}, first_line=3), ())
+    step = Do.of(Command(goal="hall")).at(place)
+    assert lines_of((Repeat(loop=Loop(times=2), steps=(step,)).at(place),)) == (str(step.commands[0]),)
 
 
 MISSIONS = [
@@ -224,7 +224,8 @@ MISSIONS = [
 def test_the_missions_that_come_with_it_load_in_their_world(path, parser):
     worlds = Path(__file__).parents[3] / "plant" / "worlds"
     file = load_mission(path)
-    mission = mission_from_file(file, parser=parser, knowledge=load_knowledge(worlds / file.world / "knowledge.yaml"))
+    knowledge = overridden(file, load_knowledge(worlds / file.world / "knowledge.yaml"))
+    mission = mission_from_file(file, parser=parser, knowledge=knowledge)
     assert mission.steps
 
 

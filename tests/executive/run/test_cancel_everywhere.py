@@ -12,7 +12,8 @@ from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import Do
 from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause, ObjectObservation, Running, Skill, Succeeded, Thing
 from skills.robot import ArmTrajectory
@@ -63,9 +64,9 @@ def moving_skill(skill_name, inputs, outputs_):
 @pytest.fixture
 def mission(make, knowledge):
     registry = {name: moving_skill(name, *ports) for name, ports in make.PORTS.items()}
-    steps = [MissionStep((parse_command(text),)) for text in make.FETCH]
+    steps = [Do.of(parse_command(text)) for text in make.FETCH]
     return compile_mission(
-        Mission("fetch drink", DEFAULT_WORLD, "Alice", tuple(steps)), knowledge=knowledge, registry=registry
+        Mission(name="fetch drink", robot="Alice", steps=tuple(steps)), knowledge=knowledge, registry=registry
     )
 
 

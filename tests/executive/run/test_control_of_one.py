@@ -11,9 +11,9 @@ from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
-from executive.words.blocks import Group
 from executive.words.command import parse_command
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import Do, Group
 from skills.api import Question
 from tests.visitors import OnMessage, OnTick
 
@@ -44,9 +44,7 @@ def control():
 def run_pair(clock, knowledge, registry, make, control):
     def runner(observe=None, *, after=(), time_limit_s=1200.0, step=None):
         log, robots = [], {name: make.ScriptedRobot(clock, name) for name in ("Alice", "Bob")}
-        missions = {
-            name: Mission("go", DEFAULT_WORLD, name, (step or MissionStep((parse_command(GO),)),)) for name in robots
-        }
+        missions = {name: Mission(name="go", robot=name, steps=(step or Do.of(parse_command(GO)),)) for name in robots}
         trees = {n: compile_mission(m, knowledge=knowledge, registry=registry) for n, m in missions.items()}
         entries = [
             RunEntry(
@@ -161,8 +159,8 @@ def test_a_stopped_robot_does_not_even_do_what_missions_do_in_the_end(run_pair, 
         control.stop_button("too near", robot="Bob")
         control.cancel("enough")
 
-    going = MissionStep((parse_command(GO),))
-    pair = run_pair(at({2: stop_and_cancel}), step=MissionStep(block=Group((going,), always=(going,))))
+    going = Do.of(parse_command(GO))
+    pair = run_pair(at({2: stop_and_cancel}), step=Group(steps=(going,), always=(going,)))
     assert set(pair.outcomes().values()) == {Outcome.CANCELLED}
     drives = {name: robot.calls.count("drive") for name, robot in pair.robots.items()}
     assert drives["Alice"] == drives["Bob"] + script.steps

@@ -5,19 +5,19 @@ import pytest
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
-from executive.words.blocks import Ask, Group, Set, Try, Wait
 from executive.words.command import parse_command
-from executive.words.expression import Expression, Template
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep, SkillCall, StepPolicy
+from executive.words.mission import Mission
+from executive.words.policy import Policy
+from executive.words.steps import Ask, Awaited, CallSkill, Do, Group, Set, Try, Wait
 from skills.api import Cause, Failed
 
 
 def skill(name):
-    return MissionStep(skill=SkillCall(name))
+    return CallSkill(skill=name)
 
 
-def group(*steps, always, **more):
-    return MissionStep(block=Group(tuple(steps), always=tuple(always)), **more)
+def group(*steps, always, policy=None):
+    return Group(steps=tuple(steps), always=tuple(always)).under(policy)
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def go(knowledge, registry, run_tree, control, script):
     """Run steps; `act(ticks)` is called after each tick. The result, and the skills that began."""
 
     def run_steps(*steps, act=lambda ticks: None, settings=None, **more):
-        mission = Mission("m", DEFAULT_WORLD, "Alice", steps, **more)
+        mission = Mission(name="m", robot="Alice", steps=steps, **more)
         tree = compile_mission(mission, knowledge=knowledge, registry=registry)
         result = run_tree(tree, control=control, observer=lambda progress: act(progress.ticks), settings=settings or {})
         assert script.begun == script.ended
@@ -39,7 +39,7 @@ def go(knowledge, registry, run_tree, control, script):
     return run_steps
 
 
-LONG = MissionStep(block=Wait(seconds=500.0))
+LONG = Wait(awaited=Awaited(seconds=500.0))
 
 
 def cancels(control, *ticks):
@@ -109,8 +109,8 @@ def test_after_the_time_of_the_run(go):
 
 
 def test_after_a_timeout_before_what_comes_next(go):
-    within = StepPolicy(timeout_s=1.0)
-    tried = MissionStep(block=Try((group(LONG, always=[skill("relocalise")], policy=within),), (skill("stow"), LONG)))
+    within = Policy(timeout_s=1.0)
+    tried = Try(steps=(group(LONG, always=[skill("relocalise")], policy=within),), otherwise=(skill("stow"), LONG))
     result, begun = go(tried, settings={"time_limit_s": 4.0})
     assert [name for name in begun if name == "relocalise"] == ["relocalise"]
     assert result.worst.cause is Cause.TIMEOUT
@@ -118,7 +118,7 @@ def test_after_a_timeout_before_what_comes_next(go):
 
 def test_before_the_next_attempt(go, script):
     script.ends["stow"] = lambda skill: Failed(Cause.EXECUTION, "no")
-    _, begun = go(group(skill("stow"), always=[skill("relocalise")], policy=StepPolicy(retries=1)))
+    _, begun = go(group(skill("stow"), always=[skill("relocalise")], policy=Policy(retries=1)))
     assert begun == ["stow", "relocalise"] * 2
 
 
@@ -136,14 +136,13 @@ def test_its_failure_is_told_and_does_not_change_how_a_cancelled_mission_ended(g
 
 
 def test_that_of_the_whole_mission(go, control):
-    whole = Group((), always=(skill("relocalise"),))
-    _, begun = go(LONG, whole=whole, act=cancels(control, 3))
+    _, begun = go(LONG, always=(skill("relocalise"),), act=cancels(control, 3))
     assert begun == ["relocalise"]
 
 
 def test_values_and_questions_in_it(go, control):
-    ask = MissionStep(block=Ask(Template("{n}?"), {"a": (skill("stow"),), "b": ()}, limit_s=2.0, default="a"))
-    put = MissionStep(block=Set({"n": Expression("n + 1")}))
+    ask = Ask(ask="{n}?", choices={"a": (skill("stow"),), "b": ()}, limit_s=2.0, default="a")
+    put = Set(set={"n": "n + 1"})
     _, begun = go(group(LONG, always=[put, ask]), act=cancels(control, 3), variables={"n": 1})
     assert begun == ["stow"]
     assert control.state.questions == ()
@@ -172,7 +171,7 @@ def test_a_run_that_is_held_stands_still_in_its_end_and_goes_on(go, control, rob
 def test_a_mission_in_between_that_is_cancelled_does_its_own_and_that_of_the_one_before(
     go, control, knowledge, registry
 ):
-    between = Mission("between", DEFAULT_WORLD, "Alice", (group(LONG, always=[skill("relocalise")]),))
+    between = Mission(name="between", robot="Alice", steps=(group(LONG, always=[skill("relocalise")]),))
     other = compile_mission(between, knowledge=knowledge, registry=registry)
 
     def act(ticks):
@@ -186,13 +185,13 @@ def test_a_mission_in_between_that_is_cancelled_does_its_own_and_that_of_the_one
 
 
 def test_where_a_command_is_cancelled_the_end_begins_at_once(go, control):
-    drive = MissionStep((parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"),))
+    drive = Do.of(parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"))
     _, begun = go(group(drive, always=[skill("relocalise")]), act=cancels(control, 2))
     assert begun == ["navigate", "relocalise"]
 
 
 def test_a_mission_that_is_given_up_for_another_does_it_before_the_other_begins(go, control, knowledge, registry):
-    other = Mission("other", DEFAULT_WORLD, "Alice", (skill("back_off"),))
+    other = Mission(name="other", robot="Alice", steps=(skill("back_off"),))
     tree = compile_mission(other, knowledge=knowledge, registry=registry)
     acts = {3: lambda: control.replace(tree)}
     steps = group(LONG, always=[skill("relocalise"), skill("stow")])
@@ -202,7 +201,7 @@ def test_a_mission_that_is_given_up_for_another_does_it_before_the_other_begins(
 
 def test_a_cancel_meanwhile_lets_a_mission_that_was_given_up_do_it_too(go, control, knowledge, registry, script):
     script.steps = 5
-    other = Mission("other", DEFAULT_WORLD, "Alice", (skill("back_off"),))
+    other = Mission(name="other", robot="Alice", steps=(skill("back_off"),))
     tree = compile_mission(other, knowledge=knowledge, registry=registry)
     acts = {3: lambda: control.replace(tree), 6: lambda: control.cancel("enough")}
     result, begun = go(group(LONG, always=[skill("relocalise")]), act=lambda now: acts.get(now, int)())

@@ -13,7 +13,8 @@ from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import Do
 from skills.api import Cause, Failed, Succeeded
 from tests.visitors import OnMessage
 
@@ -256,12 +257,12 @@ def test_overruns_are_counted(compiled, run_tree, make, script, published):
 @pytest.fixture
 def run_two(make, knowledge, registry, clock, published):
     """Runs a mission to the bedroom by Alice and Bob; `after` says who waits for whom."""
-    steps = (MissionStep((parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"),)),)
+    steps = (Do.of(parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")),)
 
     def run_them(**after):
         entries = [
             RunEntry(
-                compile_mission(Mission("go", DEFAULT_WORLD, name, steps), knowledge=knowledge, registry=registry),
+                compile_mission(Mission(name="go", robot=name, steps=steps), knowledge=knowledge, registry=registry),
                 make.ScriptedRobot(clock, name),
                 make.StillLocaliser(),
                 make.EmptyCostmap(),

@@ -18,7 +18,9 @@ from executive.tree.compiler import compile_mission
 from executive.tree.node import NodeSpec
 from executive.tree.registry import installed_skills
 from executive.words.command import parse_command
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep, StepPolicy
+from executive.words.mission import Mission
+from executive.words.policy import Policy
+from executive.words.steps import Do
 from skills.api import Cause, Failed, ObjectObservation, Running, Succeeded, Surface, Thing
 from skills.quantities import Coordinate, Length
 
@@ -135,11 +137,11 @@ def store(tmp_path):
 def live(store, clock, robot, make, world, script, handling, knowledge):
     """One life of the executive: it ends by itself, or is killed in some tick, before or after that was noted."""
 
-    def one_life(texts, *, kill_after=None, kill_when=None, lag=0, policy=StepPolicy()):  # noqa: B008 - frozen
+    def one_life(texts, *, kill_after=None, kill_when=None, lag=0, policy=Policy()):  # noqa: B008 - frozen
         missions = store.missions()
         mission = missions[0] if missions else store.add(REQUEST, queued=False)
-        steps = [MissionStep((parse_command(text),)) for text in texts]
-        mission_file = Mission("fetch drink", DEFAULT_WORLD, "Alice", tuple(steps), policy)
+        steps = [Do.of(parse_command(text)) for text in texts]
+        mission_file = Mission(name="fetch drink", robot="Alice", steps=tuple(steps)).under(policy)
         tree = compile_mission(mission_file, knowledge=knowledge, registry=handling)
         journal, recollection = store.journal(mission.id), None
         if missions:
@@ -232,7 +234,7 @@ def test_a_kill_in_any_round_moves_each_object_once(live, store, robot, world, s
 
 def test_a_kill_while_something_is_moved_aside_moves_it_once(live, store, robot, world, script, make):
     script.ends["approach"] = lambda skill: Succeeded("near", {"observation": skill.inputs.observation})
-    cube, allowed = dataclasses.replace(make.COKE, thing=Thing("cube")), StepPolicy(move_aside=1)
+    cube, allowed = dataclasses.replace(make.COKE, thing=Thing("cube")), Policy(move_aside=1)
     world.in_the_way = (cube,)
     result, ticks, _ = live(TIDY, policy=allowed)
     assert (result.outcome, world.grasps, world.places) == (Outcome.SUCCESS, 2, 2)

@@ -14,11 +14,25 @@ from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.store.resuming import resumed_tree
 from executive.tree.compiler import compile_mission
-from executive.words.blocks import Ask, Check, Choose, Group, Repeat, Set, Together, Try, Wait
 from executive.words.command import parse_command
 from executive.words.condition import Look, Not, ValueIs
-from executive.words.expression import Expression, Template
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep, OnFailure, SkillCall, StepPolicy
+from executive.words.mission import Mission
+from executive.words.policy import OnFailure, Policy
+from executive.words.steps import (
+    Ask,
+    Awaited,
+    CallSkill,
+    Check,
+    Choose,
+    Group,
+    Loop,
+    Repeat,
+    Set,
+    Together,
+    Try,
+    Wait,
+    While,
+)
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 
 REQUEST = Request("blocks", seed=3, name="m", world_name="flat", robot="Alice", fingerprint="print")
@@ -72,61 +86,97 @@ def works(done):
     return {**{name: work(name) for name in "abcd"}, "fails": work("fails", fails=True)}
 
 
-def block(made, **more):
-    return MissionStep(block=made, **more)
+def block(made, policy=None):
+    return made.under(policy)
 
 
 def do(*names):
-    return tuple(MissionStep(skill=SkillCall(name)) for name in names)
+    return tuple(CallSkill(skill=name) for name in names)
 
 
 def put(text):
-    return block(Set({"n": Expression(text)}))
+    return block(Set(set={"n": text}))
 
 
 def value(text):
-    return ValueIs(Expression(text))
+    return ValueIs(text=text)
 
 
-WAIT = block(Wait(seconds=0.2))
-BEER = Look(parse_command("Take [Nothing] to [shelf] and do [find] to [beer]"))
-RETRIES = StepPolicy(retries=1)
+WAIT = block(Wait(awaited=Awaited(seconds=0.2)))
+BEER = Look.of(parse_command("Take [Nothing] to [shelf] and do [find] to [beer]"))
+RETRIES = Policy(retries=1)
 
 # Each construct, and what is done in all, whenever the process is killed.
 BLOCKS = {
-    "if": ((put("1"), block(Choose(value("n > 0"), (*do("a"), put("0"), *do("b")), do("c"))), *do("d")), "abd"),
-    "else": ((block(Choose(value("n > 0"), do("a"), do("b", "c"))), *do("d")), "bcd"),
-    "repeat": ((block(Repeat(do("a", "b"), times=3)), *do("d")), "abababd"),
-    "until": ((block(Repeat((*do("a"), put("n + 1")), until=value("n >= 3"))), *do("d")), "aaad"),
-    "while": ((block(Repeat((put("n + 1"), *do("a")), while_=value("n < 3"))), *do("d")), "aaad"),
-    "every": ((block(Repeat(do("a"), times=3, every_s=0.5)), *do("d")), "aaad"),
-    "repeat in repeat": ((block(Repeat((block(Repeat(do("a"), times=2)), *do("b")), times=2)), *do("d")), "aabaabd"),
+    "if": (
+        (
+            put("1"),
+            block(Choose(condition=value("n > 0"), then=(*do("a"), put("0"), *do("b")), otherwise=do("c"))),
+            *do("d"),
+        ),
+        "abd",
+    ),
+    "else": ((block(Choose(condition=value("n > 0"), then=do("a"), otherwise=do("b", "c"))), *do("d")), "bcd"),
+    "repeat": ((block(Repeat(loop=Loop(times=3), steps=do("a", "b"))), *do("d")), "abababd"),
+    "until": ((block(Repeat(loop=Loop(until=value("n >= 3")), steps=(*do("a"), put("n + 1")))), *do("d")), "aaad"),
+    "while": ((block(Repeat(loop=Loop(while_=value("n < 3")), steps=(put("n + 1"), *do("a")))), *do("d")), "aaad"),
+    "every": ((block(Repeat(loop=Loop(times=3, every_s=0.5), steps=do("a"))), *do("d")), "aaad"),
+    "repeat in repeat": (
+        (
+            block(Repeat(loop=Loop(times=2), steps=(block(Repeat(loop=Loop(times=2), steps=do("a"))), *do("b")))),
+            *do("d"),
+        ),
+        "aabaabd",
+    ),
     "if in repeat": (
-        (block(Repeat((put("n + 1"), block(Choose(value("n == 2"), do("a"), do("b")))), times=3)), *do("d")),
+        (
+            block(
+                Repeat(
+                    loop=Loop(times=3),
+                    steps=(put("n + 1"), block(Choose(condition=value("n == 2"), then=do("a"), otherwise=do("b")))),
+                )
+            ),
+            *do("d"),
+        ),
         "babd",
     ),
-    "try": ((block(Try(do("a"), do("b"))), *do("d")), "ad"),
-    "try else": ((block(Try(do("a", "fails"), do("b", "c"))), *do("d")), "abcd"),
-    "together": ((block(Together((*do("a"), WAIT))), *do("d")), "ad"),
-    "group": ((block(Group(do("a", "b"))), *do("d")), "abd"),
-    "always": ((block(Group(do("a"), always=do("b", "c"))), *do("d")), "abcd"),
+    "try": ((block(Try(steps=do("a"), otherwise=do("b"))), *do("d")), "ad"),
+    "try else": ((block(Try(steps=do("a", "fails"), otherwise=do("b", "c"))), *do("d")), "abcd"),
+    "together": ((block(Together(steps=(*do("a"), WAIT))), *do("d")), "ad"),
+    "group": ((block(Group(steps=do("a", "b"))), *do("d")), "abd"),
+    "always": ((block(Group(steps=do("a"), always=do("b", "c"))), *do("d")), "abcd"),
     "always after a failure": (
-        (block(Try((block(Group(do("a", "fails"), always=do("b"))),), do("c"))), *do("d")),
+        (block(Try(steps=(block(Group(steps=do("a", "fails"), always=do("b"))),), otherwise=do("c"))), *do("d")),
         "abcd",
     ),
-    "always in always": ((block(Group((block(Group(do("a"), always=do("b"))),), always=do("c"))), *do("d")), "abcd"),
-    "while it holds": ((block(Group(do("a", "b"), holds=value("battery > 0.1"))), *do("d")), "abd"),
-    "set": ((put("n + 1"), *do("a"), put("n + 1"), block(Choose(value("n == 2"), do("b"))), *do("d")), "abd"),
+    "always in always": (
+        (block(Group(steps=(block(Group(steps=do("a"), always=do("b"))),), always=do("c"))), *do("d")),
+        "abcd",
+    ),
+    "while it holds": ((block(Group(steps=do("a", "b"), while_=While(holds=value("battery > 0.1")))), *do("d")), "abd"),
+    "set": (
+        (put("n + 1"), *do("a"), put("n + 1"), block(Choose(condition=value("n == 2"), then=do("b"))), *do("d")),
+        "abd",
+    ),
     "check": (
-        (block(Check(value("n == 0"), "so")), *do("a"), put("5"), block(Choose(value("so"), do("b"))), *do("d")),
+        (
+            block(Check(condition=value("n == 0"), gives={"answer": "so"})),
+            *do("a"),
+            put("5"),
+            block(Choose(condition=value("so"), then=do("b"))),
+            *do("d"),
+        ),
         "abd",
     ),
     "wait": ((*do("a"), WAIT, *do("d")), "ad"),
-    "ask": ((block(Ask(Template("q?"), {"x": do("a"), "y": do("b", "c")}, limit_s=0.2, default="y")), *do("d")), "bcd"),
-    "until it is seen": ((block(Repeat(do("a"), until=BEER)), *do("d")), "aad"),
-    "while it is not seen": ((block(Repeat(do("a"), while_=Not(BEER))), *do("d")), "aad"),
-    "skipped": ((block(Group(do("a", "fails", "b")), policy=StepPolicy(on_failure=OnFailure.SKIP)), *do("d")), "ad"),
-}  # fmt: skip
+    "ask": (
+        (block(Ask(ask="q?", choices={"x": do("a"), "y": do("b", "c")}, limit_s=0.2, default="y")), *do("d")),
+        "bcd",
+    ),
+    "until it is seen": ((block(Repeat(loop=Loop(until=BEER), steps=do("a"))), *do("d")), "aad"),
+    "while it is not seen": ((block(Repeat(loop=Loop(while_=Not(part=BEER)), steps=do("a"))), *do("d")), "aad"),
+    "skipped": ((block(Group(steps=do("a", "fails", "b")), policy=Policy(on_failure=OnFailure.SKIP)), *do("d")), "ad"),
+}
 
 
 @pytest.fixture
@@ -145,7 +195,7 @@ def live(tmp_path, clock, robot, make, works, registry, knowledge, script, done)
 
     def one_life(steps, number, kill_after=None):
         tree = compile_mission(
-            Mission("m", DEFAULT_WORLD, "Alice", steps, variables={"n": 0, "so": False}),
+            Mission(name="m", robot="Alice", steps=steps, variables={"n": 0, "so": False}),
             knowledge=knowledge,
             registry={**registry, **works},
         )
@@ -226,7 +276,7 @@ def test_after_a_kill_in_any_tick_each_look_is_one_finding(live, done):
 
 
 def test_after_a_kill_in_any_tick_a_check_of_several_things_is_one_finding(live, done):
-    steps = (block(Check(value("n == 0"))), *do("a"))
+    steps = (block(Check(condition=value("n == 0"))), *do("a"))
     whole = live(steps, "whole")
     counts = {}
     for tick in range(1, whole.ticks):

@@ -14,8 +14,9 @@ from executive.store.resuming import BEFORE, ended_tree, resumed_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.command import parse_command
+from executive.words.mission import Mission
 from executive.words.robots import RobotConfig
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.steps import Do
 from skills.api import Cause, Failed, Running, Succeeded
 
 TAKE_AND_PUT = (
@@ -127,8 +128,8 @@ def live(store, clock, robots, make, handling, knowledge):
     """One life of the executive: it ends by itself, or is killed when so many ticks of robots were noted."""
 
     def entry_for(mission, name, made, kill_after, after):
-        steps = tuple(MissionStep((parse_command(text),)) for text in TAKE_AND_PUT)
-        tree = compile_mission(Mission("tidy", DEFAULT_WORLD, name, steps), knowledge=knowledge, registry=handling)
+        steps = tuple(Do.of(parse_command(text)) for text in TAKE_AND_PUT)
+        tree = compile_mission(Mission(name="tidy", robot=name, steps=steps), knowledge=knowledge, registry=handling)
         journal, robots[name].holder = store.journal(mission.id, name), None
         if mission.starts:
             memory = store.memory(mission.id, name)

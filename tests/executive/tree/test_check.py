@@ -9,13 +9,14 @@ import pytest
 from executive.tree.check import Abilities, PlannedRoutes, check_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.estimate import Route, load_estimates
-from executive.words.blocks import Repeat, Together, Wait
 from executive.words.command import parse_command
 from executive.words.condition import Look
-from executive.words.steps import Mission, MissionStep, SkillCall, StepPolicy
+from executive.words.mission import Mission
+from executive.words.policy import Policy
+from executive.words.steps import Awaited, CallSkill, Do, Loop, Place, Repeat, Together, Wait
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap
-from skills.files.errors import SourceLine
+from skills.files.yaml_source import YamlSource
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import LatticePlanner
 from skills.robot import Pose2D
@@ -50,11 +51,10 @@ def check(knowledge, registry, tmp_path):
     def check_it(*steps, ways=None, abilities=ABLE):
         made = []
         for line, one in enumerate(steps, start=1):
-            source = SourceLine(tmp_path / "m.yaml", line)
-            command = (parse_command(one),) if isinstance(one, str) else ()
-            step = MissionStep(command, source, skill=None if command else one)
-            made.append(one if isinstance(one, MissionStep) else step)
-        mission = Mission("m", "flat", "Alice", tuple(made))
+            place = Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=line), ())
+            step = Do.of(parse_command(one)) if isinstance(one, str) else one
+            made.append(step.at(place) if isinstance(step, Do | CallSkill) else step)
+        mission = Mission(name="m", robot="Alice", steps=tuple(made))
         tree = compile_mission(mission, knowledge=knowledge, registry=registry)
         return check_tree(
             tree,
@@ -73,7 +73,7 @@ def told(checked):
 
 
 def test_steps_together_take_as_long_as_those_that_must_be_done(check):
-    drive, wait = MissionStep((parse_command(GO.format("kitchen")),)), MissionStep(block=Wait(seconds=300.0))
+    drive, wait = Do.of(parse_command(GO.format("kitchen"))), Wait(awaited=Awaited(seconds=300.0))
     alone, either, both = (check(one).estimate for one in (drive, *(_together(drive, wait, n) for n in (1, 2))))
     assert alone.duration_s < 60
     assert either.duration_s == pytest.approx(alone.duration_s)
@@ -82,7 +82,7 @@ def test_steps_together_take_as_long_as_those_that_must_be_done(check):
 
 
 def _together(first, second, needed):
-    return MissionStep(block=Together((first, second), needed))
+    return Together(steps=(first, second), done_when=needed)
 
 
 def test_a_good_mission_has_no_errors_and_an_estimate(check, make):
@@ -101,7 +101,7 @@ def test_what_empties_the_battery_is_warned_of_with_its_line_unless_it_charges_b
     trips = [there, back] * 2
     tired, rested = (
         check(*trips, ways=far),
-        check(*trips[:2], SkillCall("charge", {"level": 0.8}), *trips[2:], ways=far),
+        check(*trips[:2], CallSkill(skill="charge", values={"level": 0.8}), *trips[2:], ways=far),
     )
     assert [warning.line for warning in tired.warnings] == [1 + int(1.0 / one_way)]
     assert (tired.errors, rested.warnings) == ((), ())
@@ -145,7 +145,7 @@ def test_a_count_goes_to_all_surfaces_that_can_be_reached(check):
 
 
 def test_a_raw_pose_out_of_reach_is_refused(check):
-    call = SkillCall("navigate", {"x": 50.0, "y": 0.0})
+    call = CallSkill(skill="navigate", values={"x": 50.0, "y": 0.0})
     ((line, message),) = told(check(call, ways=StraightRoutes(far_m=9.0)))
     assert (line, "50.00" in message) == (1, True)
 
@@ -209,7 +209,7 @@ def test_ways_are_planned_on_the_map_for_the_whole_body(walled):
 
 
 BRING = "Take [{}] to [{}] and do [Nothing] to [Nothing]"
-DROPPED = SkillCall("place", {"surface": "counter"})
+DROPPED = CallSkill(skill="place", values={"surface": "counter"})
 
 # steps -> lines of the errors
 IN_GRIPPER = [
@@ -297,11 +297,11 @@ def test_a_surface_that_is_full_by_what_surely_lies_there_is_warned_of(check, kn
 
 
 def test_rounds_until_something_holds_are_a_range_up_to_the_most_of_them(check):
-    go, look = MissionStep((parse_command(GO.format("kitchen")),)), Look(parse_command(FIND))
-    once = check(MissionStep(block=Repeat((go,), times=1))).estimate
-    some = check(MissionStep(block=Repeat((go,), times=3, until=look))).estimate
-    endless = check(MissionStep(block=Repeat((go,), until=look))).estimate
-    fixed = check(MissionStep(block=Repeat((go,), times=3))).estimate
+    go, look = Do.of(parse_command(GO.format("kitchen"))), Look.of(parse_command(FIND))
+    once = check(Repeat(loop=Loop(times=1), steps=(go,))).estimate
+    some = check(Repeat(loop=Loop(times=3, until=look), steps=(go,))).estimate
+    endless = check(Repeat(loop=Loop(until=look), steps=(go,))).estimate
+    fixed = check(Repeat(loop=Loop(times=3), steps=(go,))).estimate
     assert once.spare_s == fixed.spare_s == 0.0
     assert some.reasons == ("1 to 3 rounds",)
     assert some.duration_s < some.most_s < math.inf
@@ -310,11 +310,11 @@ def test_rounds_until_something_holds_are_a_range_up_to_the_most_of_them(check):
 
 
 def test_a_wait_for_a_time_of_day_is_a_range_with_that_time_as_its_reason(check):
-    waited = check(MissionStep(block=Wait(until_clock_s=64800.0))).estimate
+    waited = check(Wait(awaited=Awaited(until_clock="18:00"))).estimate
     assert (waited.duration_s, waited.most_s, waited.reasons) == (0.0, 86400.0, ("until 18:00",))
 
 
 def test_a_time_limit_bounds_the_range(check):
-    limit = StepPolicy(timeout_s=600.0)
-    waited = check(MissionStep(block=Wait(until_clock_s=64800.0), policy=limit)).estimate
+    limit = Policy(timeout_s=600.0)
+    waited = check(Wait(awaited=Awaited(until_clock="18:00")).under(limit)).estimate
     assert (waited.most_s, waited.reasons[0]) == (600.0, "600 s at most")

@@ -32,7 +32,8 @@ from executive.view.server import PageContent, PageServer
 from executive.view.styles import Styles
 from executive.view.watch import SEND_LIMIT_S, ControlWatch
 from executive.words.command import parse_command
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import Do
 from skills.api import Cause, Failed, Question
 from skills.estimate.grid_map import GridMap
 from skills.robot import Pose2D
@@ -653,8 +654,8 @@ def test_the_report_is_drawn_without_scripts_in_the_width_of_a_telephone(browser
 @pytest.fixture
 def two(knowledge, registry, control):
     """A served page of Alice and Bob, each on the way to the kitchen: the feed, their trees and the page's address."""
-    step = MissionStep((parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"),))
-    missions = {name: Mission("go", DEFAULT_WORLD, name, (step,)) for name in ("Alice", "Bob")}
+    step = Do.of(parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"))
+    missions = {name: Mission(name="go", robot=name, steps=(step,)) for name in ("Alice", "Bob")}
     trees = {name: compile_mission(m, knowledge=knowledge, registry=registry) for name, m in missions.items()}
     feed = Feed()
     control.begin(trees)

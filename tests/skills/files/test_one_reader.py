@@ -8,7 +8,7 @@ ROOT = Path(__file__).parents[3]
 LOADING = ("load", "safe_load", "full_load", "unsafe_load", "load_all", "compose", "parse", "scan")
 ELSEWHERE = {
     "executive/language/lexicon.py": "tables of words, among them 'on' and 'no'",
-    "executive/mission/file/parameters.py": "a value of one line",
+    "executive/mission/parameters.py": "a value of one line",
 }
 
 

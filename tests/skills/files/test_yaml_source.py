@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from executive.mission.file.resolve import load_mission
-from executive.mission.file.schema import MissionFile
+from executive.mission.load import load_mission
 from executive.mission.stack_file import load_stack
 from executive.words.knowledge import load_knowledge
+from executive.words.mission import Mission
 from skills.files.errors import InputError
 from skills.files.yaml_source import MAX_BYTES, YamlSource, read_yaml
 from tests.hostile_values import FILES
@@ -90,7 +90,7 @@ def test_a_name_that_cannot_be_seen_is_refused_at_its_line(tmp_path, name):
 @pytest.mark.parametrize("name", ["kitchen", "Küche 2", "厨房", "a-b_c.d"])
 def test_a_name_in_any_writing_is_taken(tmp_path, name):
     (tmp_path / "m.yaml").write_text(f"name: {name}\nsteps: [{{say: 'go to\n  the hall'}}]\n", encoding="utf-8")
-    assert isinstance(load_mission(tmp_path / "m.yaml"), MissionFile)
+    assert isinstance(load_mission(tmp_path / "m.yaml"), Mission)
 
 
 def source_of(tmp_path, text) -> YamlSource:

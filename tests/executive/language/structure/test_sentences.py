@@ -7,7 +7,9 @@ import yaml
 
 from executive.language.structure.sentence import MOST_NESTED
 from executive.language.understand import Status, understand, understand_asking
-from executive.words.written import parse_written, written
+from executive.words.condition import DoorOpen
+from executive.words.yaml_steps import steps_from_yaml, steps_to_yaml
+from tests.executive.language.notation import as_noted, noted
 
 HERE = Path(__file__).parent
 
@@ -25,12 +27,13 @@ def rows(file, kind=None):
 @pytest.mark.parametrize(("world", "sentence", "lines"), rows("sentences.yaml", "understood"))
 def test_a_sentence_becomes_its_mission(meant, world, sentence, lines):
     answer = meant(sentence, world)
-    assert (answer.reason, list(written(answer.steps))) == (None, lines)
+    assert (answer.reason, noted(answer.steps)) == (None, as_noted(lines))
 
 
 @pytest.mark.parametrize(("world", "sentence", "lines"), rows("sentences.yaml", "understood"))
-def test_its_written_form_reads_back(world, sentence, lines):
-    assert list(written(parse_written(lines))) == lines
+def test_its_yaml_reads_back(meant, world, sentence, lines):
+    steps = meant(sentence, world).steps
+    assert steps_from_yaml(steps_to_yaml(steps)) == steps
 
 
 @pytest.mark.parametrize(("world", "sentence", "part"), rows("refused.yaml"))
@@ -78,7 +81,7 @@ def test_the_answer_tells_which_door(parser, worlds, reply, room):
         knowledge=worlds["shop"],
         require_wake=False,
     )
-    assert written(answer.steps)[0].startswith(f'If (door "kitchen" - "{room}" open)')
+    assert answer.steps[0].condition == DoorOpen(door=("kitchen", room))
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from executive.language.parser import load_parser
-from executive.mission.file.overrides import overridden
-from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
+from executive.mission.load import for_robot, load_mission, overridden
+from executive.mission.resolve import mission_from_file
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import load_knowledge

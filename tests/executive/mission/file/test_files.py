@@ -2,8 +2,8 @@
 
 import pytest
 
-from executive.mission.file.overrides import overridden
-from executive.mission.file.resolve import MAX_DEPTH, MAX_STEPS, load_mission, mission_from_file
+from executive.mission.load import load_mission, overridden
+from executive.mission.resolve import MAX_DEPTH, MAX_STEPS, mission_from_file
 from executive.tree.behaviours.board import Constant, FromBoard
 from skills.files.errors import InputError
 from skills.robot import Pose2D
@@ -146,7 +146,8 @@ def test_knowledge_of_the_file_is_laid_over_the_worlds(tmp_path, parser, flat):
     assert (knowledge.people["Sam"].at, knowledge.things["coke"].usual) == ("office", ("desk",))
     assert knowledge.things["coke"].categories == ("drink",)
     assert overridden(load_mission(path), knowledge) == knowledge
-    assert mission_from_file(path, parser=parser, knowledge=flat).commands[0].goal == "Sam"
+    own = overridden(load_mission(path), flat)
+    assert mission_from_file(path, parser=parser, knowledge=own).commands[0].goal == "Sam"
 
 
 @pytest.mark.parametrize(

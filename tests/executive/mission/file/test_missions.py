@@ -2,8 +2,8 @@
 
 import pytest
 
-from executive.mission.file.overrides import overridden
-from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
+from executive.mission.load import for_robot, load_mission, overridden
+from executive.mission.resolve import mission_from_file
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Succeeded

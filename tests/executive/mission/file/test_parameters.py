@@ -2,8 +2,9 @@
 
 import pytest
 
-from executive.mission.file.parameters import given_values
-from executive.mission.file.resolve import load_mission, mission_from_file
+from executive.mission.load import load_mission
+from executive.mission.parameters import given_values
+from executive.mission.resolve import mission_from_file
 from skills.files.errors import InputError
 
 FILE = """name: trial
@@ -33,7 +34,7 @@ def resolved(parser, flat, tmp_path):
 
 def test_values_take_the_places_of_the_defaults(resolved):
     step = resolved("room=office", "limit=12.5").steps[0]
-    assert (step.commands[0].goal, step.policy.timeout_s) == ("office", 12.5)
+    assert (step.commands[0].goal, step.timeout_s) == ("office", 12.5)
 
 
 @pytest.mark.parametrize(

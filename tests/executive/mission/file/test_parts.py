@@ -2,8 +2,8 @@
 
 import pytest
 
-from executive.mission.file.overrides import overridden
-from executive.mission.file.resolve import for_robot, load_mission, mission_from_file
+from executive.mission.load import for_robot, load_mission, overridden
+from executive.mission.resolve import mission_from_file
 from executive.words.robots import RobotConfig, robots_in
 from skills.files.errors import InputError
 from skills.robot import Pose2D
@@ -55,7 +55,7 @@ def part(load, parser, flat):
 
 def test_robots_stand_in_the_file_with_what_they_begin_with(load, tmp_path):
     loaded = load()
-    alice, bob = robots_in(loaded.robots, KINDS, loaded.source)
+    alice, bob = robots_in(loaded.robots, KINDS, loaded.document)
     own = RobotConfig("Bob", "fetch", Pose2D(1.0, 2.5, 0.0), "office", tmp_path / "own.yaml")
     assert (alice, bob) == (RobotConfig("Alice", "spot"), own)
     assert (bob.source.file.name, bob.source.line) == ("mission.yaml", 4)
@@ -70,10 +70,10 @@ def test_each_robot_has_its_steps(part):
 
 def test_what_stands_at_the_top_is_for_each_part_that_says_nothing_else(part):
     alice, bob = part("alice"), part("bob")
-    assert (alice.policy.timeout_s, bob.policy.timeout_s) == (100.0, 50.0)
-    assert alice.steps[0].policy.retries == 2
-    assert [str(step.block) != "None" for step in alice.whole.always] == [True]
-    assert [step.commands[0].goal for step in bob.whole.always] == ["hall"]
+    assert (alice.timeout_s, bob.timeout_s) == (100.0, 50.0)
+    assert alice.steps[0].retries == 2
+    assert [step.is_block for step in alice.always] == [True]
+    assert [step.commands[0].goal for step in bob.always] == ["hall"]
 
 
 def test_an_error_in_a_part_has_its_own_line(part):
@@ -114,7 +114,7 @@ NAMED = [
 def test_robots_that_cannot_be_are_refused_with_their_line(load, robots, line, words):
     loaded = load(f"name: x\nrobots:\n  {robots}\nsteps: [{{to: hall}}]\n")
     with pytest.raises(InputError) as error:
-        robots_in(loaded.robots, KINDS, loaded.source)
+        robots_in(loaded.robots, KINDS, loaded.document)
     assert (error.value.line, words in str(error.value)) == (line, True), str(error.value)
 
 

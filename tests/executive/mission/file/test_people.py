@@ -2,8 +2,7 @@
 
 import pytest
 
-from executive.mission.file.people import routes_in
-from executive.mission.file.resolve import load_mission
+from executive.mission.load import load_mission, routes_in
 from skills.files.errors import InputError
 
 WALKS = """\

@@ -4,9 +4,10 @@ import json
 
 import pytest
 
-from executive.mission.file.resolve import load_mission
-from executive.mission.file.schema import MissionFile, mission_json_schema
-from executive.words.steps import OnFailure, OperatorQuestion, StaleData, StepGuards, StepPolicy
+from executive.mission.json_schema import mission_json_schema
+from executive.mission.load import load_mission
+from executive.words.mission import Mission
+from executive.words.policy import Guards, OnFailure, OperatorQuestion, StaleData
 from skills.files.errors import InputError
 
 GOOD = """\
@@ -37,23 +38,24 @@ def load(tmp_path):
 
 def test_a_steps_policy_is_its_own_and_else_that_of_each(load):
     file = load(GOOD.replace("What now?", '"What now?"'))
-    first, second, third = (step.over(file.each) for step in file.steps)
-    guards = StepGuards(0.3, True, 300.0, StaleData.FAIL)
-    assert first == StepPolicy(20.0, 1, OnFailure.SKIP, OperatorQuestion(), guards)
-    assert second == StepPolicy(None, 0, OnFailure.ASK, OperatorQuestion("What now?", 9.0, "skip"))
-    assert third == StepPolicy(None, 1, OnFailure.SKIP)
-    assert file.over(None) == StepPolicy(600.0)
+    first, second, third = (step.under(file.each) for step in file.steps)
+    assert first.guards == Guards(battery=0.3, localised=True, time_s=300.0, stale=StaleData.FAIL)
+    assert (first.timeout_s, first.further_attempts, first.on_failure) == (20.0, 1, OnFailure.SKIP)
+    assert second.question == OperatorQuestion(text="What now?", limit_s=9.0, default="skip")
+    assert (second.timeout_s, second.further_attempts, second.on_failure) == (None, 0, OnFailure.ASK)
+    assert (third.timeout_s, third.further_attempts, third.on_failure) == (None, 1, OnFailure.SKIP)
+    assert (file.timeout_s, file.further_attempts, file.on_failure) == (600.0, 0, None)
 
 
 def test_on_failure_retry_is_one_retry_unless_said(load):
     text = "name: x\nsteps:\n  - {to: hall, on_failure: retry}\n  - {to: hall, on_failure: retry, retries: 3}\n"
-    assert [step.over(None).retries for step in load(text).steps] == [1, 3]
+    assert [step.further_attempts for step in load(text).steps] == [1, 3]
 
 
 def test_moving_aside_is_allowed_for_a_step_or_for_each(load):
     text = "name: x\neach: {move_aside: 1}\nsteps:\n  - {to: hall}\n  - {to: hall, move_aside: 0}\n"
     file = load(text)
-    assert [step.over(file.each).move_aside for step in file.steps] == [1, 0]
+    assert [step.under(file.each).move_aside for step in file.steps] == [1, 0]
 
 
 @pytest.mark.parametrize(
@@ -103,15 +105,16 @@ def test_all_errors_are_told_at_once(load):
 
 def test_the_json_schema_names_every_key_with_a_description():
     schema = mission_json_schema()
-    step = schema["$defs"]["StepFile"]
-    assert set(schema["properties"]) == {field.alias or name for name, field in MissionFile.model_fields.items()}
-    assert {"say", "take", "to", "do", "object", "skill", "use", "with", "gives", "timeout"} <= set(step["properties"])
-    assert all("description" in facts for facts in (*schema["properties"].values(), *step["properties"].values()))
-    assert step["additionalProperties"] is schema["additionalProperties"] is False
+    steps = [schema["$defs"][ref["$ref"].rpartition("/")[2]] for ref in schema["$defs"]["AnyStep"]["anyOf"]]
+    keys = {key: facts for step in steps for key, facts in step["properties"].items()}
+    assert set(schema["properties"]) == {field.alias or name for name, field in Mission.model_fields.items()}
+    assert {"say", "take", "to", "do", "object", "skill", "use", "with", "gives", "timeout"} <= set(keys)
+    assert all("description" in facts for facts in (*schema["properties"].values(), *keys.values()))
+    assert not any(each["additionalProperties"] for each in (schema, *steps))
 
 
 def test_where_a_number_is_wanted_a_parameter_may_stand():
-    timeout = mission_json_schema()["$defs"]["StepFile"]["properties"]["timeout"]
+    timeout = mission_json_schema()["$defs"]["Do"]["properties"]["timeout"]
     assert '"pattern"' in json.dumps(timeout)
 
 

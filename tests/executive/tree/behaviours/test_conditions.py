@@ -18,7 +18,7 @@ from executive.tree.behaviours.conditions import (
     Waiting,
 )
 from executive.tree.behaviours.decorators import Guard
-from executive.words.steps import StaleData
+from executive.words.policy import StaleData
 from skills.api import Cause, Failed
 from skills.robot import Lease, Pose2D
 

@@ -8,9 +8,11 @@ from executive.tree.compiler import compile_mission
 from executive.tree.estimate import expected
 from executive.tree.goals import surfaces_to_search
 from executive.words.command import parse_command
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import Do, Place
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
-from skills.files.errors import InputError, SourceLine
+from skills.files.errors import InputError
+from skills.files.yaml_source import YamlSource
 from skills.robot import Pose2D
 
 
@@ -198,7 +200,7 @@ def test_people_are_looked_for_in_rooms(
 
     script.ends["find_people"] = look
     command = parse_command(f"Take [Nothing] to [{goal}] and do [find] to [{asked}]")
-    mission = Mission("ask", DEFAULT_WORLD, "Alice", (MissionStep((command,)),))
+    mission = Mission(name="ask", robot="Alice", steps=(Do.of(command),))
     worst = run_tree(compile_mission(mission, knowledge=one_person, registry=registry)).worst
     assert (worst.outcome, list(worst.answers.values())) == (Outcome.SUCCESS, [answer])
     assert worst.message.startswith(told)
@@ -267,30 +269,28 @@ def test_what_cannot_be_done_is_refused_with_a_reason(compiled, text, words):
 
 def test_refusals_name_the_line(knowledge, registry, tmp_path):
     command = parse_command("Take [Nothing] to [moon] and do [Nothing] to [Nothing]")
-    step = MissionStep((command,), SourceLine(tmp_path / "m.yaml", 7))
+    step = Do.of(command).at(Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=7), ()))
     with pytest.raises(InputError, match=r"m\.yaml:7: the place 'moon'"):
-        compile_mission(Mission("m", DEFAULT_WORLD, "Alice", (step,)), knowledge=knowledge, registry=registry)
+        compile_mission(Mission(name="m", robot="Alice", steps=(step,)), knowledge=knowledge, registry=registry)
 
 
 def test_nodes_keep_their_line(knowledge, registry, tmp_path):
-    source = SourceLine(tmp_path / "m.yaml", 4)
+    place = Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=4), ())
     command = parse_command("Take [Nothing] to [kitchen] and do [grasp] to [coke]")
     tree = compile_mission(
-        Mission("m", DEFAULT_WORLD, "Alice", (MissionStep((command,), source),)),
+        Mission(name="m", robot="Alice", steps=(Do.of(command).at(place),)),
         knowledge=knowledge,
         registry=registry,
     )
-    assert {node.source for node in tree.mission.children[0].walk()} == {source}
+    assert {node.source for node in tree.mission.children[0].walk()} == {place.line}
 
 
 def test_an_absent_skill_and_an_empty_mission_are_refused(knowledge, registry):
     command = parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")
     with pytest.raises(InputError, match="no skill 'navigate'"):
-        compile_mission(
-            Mission("m", DEFAULT_WORLD, "Alice", (MissionStep((command,)),)), knowledge=knowledge, registry={}
-        )
+        compile_mission(Mission(name="m", robot="Alice", steps=(Do.of(command),)), knowledge=knowledge, registry={})
     with pytest.raises(InputError, match="no commands"):
-        compile_mission(Mission("m", DEFAULT_WORLD, "Alice", ()), knowledge=knowledge, registry=registry)
+        compile_mission(Mission(name="m", robot="Alice", steps=()), knowledge=knowledge, registry=registry)
 
 
 def test_a_mission_of_a_hundred_steps_compiles(compiled, make):

@@ -6,7 +6,9 @@ from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
-from executive.words.steps import Mission, MissionStep, OnFailure, OperatorQuestion, StepGuards, StepPolicy
+from executive.words.mission import Mission
+from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
+from executive.words.steps import Do
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.robot import Battery
 
@@ -15,13 +17,15 @@ GO = {
 }
 FIND = parse_command("Take [Nothing] to [kitchen] and do [grasp] to [coke]")
 BASE = "alice/round"
-NONE = StepPolicy()
+NONE = Policy()
 
 
 @pytest.fixture
 def compile_steps(knowledge, registry):
     def compile_it(*steps, policy=NONE):
-        return compile_mission(Mission("round", "flat", "Alice", steps, policy), knowledge=knowledge, registry=registry)
+        return compile_mission(
+            Mission(name="round", robot="Alice", steps=steps).under(policy), knowledge=knowledge, registry=registry
+        )
 
     return compile_it
 
@@ -33,7 +37,7 @@ def play(compile_steps, run_tree):
 
 
 def step(command, **policy):
-    return MissionStep((command,), policy=StepPolicy(**policy))
+    return Do.of(command).under(Policy(**policy))
 
 
 @pytest.fixture
@@ -46,7 +50,7 @@ def nowhere(script):
 @pytest.mark.parametrize(("mission", "own", "count"), [(None, None, 2), (None, 0, 0), (3, None, 3), (3, 1, 1)])
 def test_how_often_a_fallen_object_is_picked_up_is_the_steps_to_say_or_the_missions(compile_steps, mission, own, count):
     carry = parse_command("Take [coke] to [bedroom] and do [Nothing] to [Nothing]")
-    tree = compile_steps(step(carry, pick_ups=own), policy=StepPolicy(pick_ups=mission))
+    tree = compile_steps(step(carry, pick_ups=own), policy=Policy(pick_ups=mission))
     recovered = [node for node in tree.mission.walk() if node.path_id.endswith("carry-on")]
     assert [node.options["attempts"] for node in recovered] == ([count + 1] if count else [])
 
@@ -108,7 +112,7 @@ def test_a_timeout_counts_the_robots_clock_for_each_attempt(play, script, clock)
 
 def test_the_whole_mission_has_a_timeout(play, script, clock):
     script.ends["navigate"] = lambda skill: Running("goes on and on")
-    result = play(step(GO["hall"]), policy=StepPolicy(timeout_s=2.0))
+    result = play(step(GO["hall"]), policy=Policy(timeout_s=2.0))
     assert (result.outcome, result.cause, clock.now() < 2.5) == (Outcome.FAILURE, Cause.TIMEOUT, True)
 
 
@@ -132,7 +136,7 @@ def test_return_says_when_there_is_no_way_back(play, nowhere, script):
 
 
 def test_nobody_to_ask_means_the_default_answer(play, nowhere, clock):
-    ask = {"on_failure": OnFailure.ASK, "question": OperatorQuestion("What now?", 5.0, "skip")}
+    ask = {"on_failure": OnFailure.ASK, "question": OperatorQuestion(text="What now?", limit_s=5.0, default="skip")}
     result = play(step(FIND, **ask), step(GO["hall"]))
     assert (result.outcome, "skipped: step 1" in result.message) == (Outcome.SUCCESS, True)
 
@@ -153,7 +157,7 @@ def test_the_operators_answer_decides(compile_steps, run_tree, nowhere, answers,
             asked.append(question.question)
             control.answer(question.id, left.pop(0))
 
-    ask = {"on_failure": OnFailure.ASK, "question": OperatorQuestion(None, 60.0, "stop")}
+    ask = {"on_failure": OnFailure.ASK, "question": OperatorQuestion(text=None, limit_s=60.0, default="stop")}
     tree = compile_steps(step(FIND, **ask), step(GO["hall"]))
     result = run_tree(tree, control=control, observer=answering).robots[0]
     assert (result.outcome, says in result.message, left) == (outcome, True, [])
@@ -163,7 +167,7 @@ def test_the_operators_answer_decides(compile_steps, run_tree, nowhere, answers,
 
 
 def test_a_whole_mission_is_asked_about_but_not_skipped(compile_steps):
-    tree = compile_steps(step(GO["hall"]), policy=StepPolicy(on_failure=OnFailure.ASK))
+    tree = compile_steps(step(GO["hall"]), policy=Policy(on_failure=OnFailure.ASK))
     (ask,) = [node for node in tree.root.walk() if node.kind == "ask"]
     assert ask.options["options"] == ("retry", "stop")
 
@@ -171,7 +175,7 @@ def test_a_whole_mission_is_asked_about_but_not_skipped(compile_steps):
 @pytest.mark.parametrize(("charge", "outcome"), [(0.5, Outcome.SUCCESS), (0.35, Outcome.FAILURE)])
 def test_a_battery_guard(play, robot, charge, outcome, monkeypatch):
     monkeypatch.setattr(type(robot), "battery", lambda self: Battery(self.clock.now(), charge))
-    result = play(step(GO["hall"], guards=StepGuards(battery=0.4), retries=2))
+    result = play(step(GO["hall"], guards=Guards(battery=0.4), retries=2))
     assert result.outcome is outcome
     if outcome is Outcome.FAILURE:
         assert result.cause is Cause.PRECONDITION
@@ -181,19 +185,24 @@ def test_a_battery_guard(play, robot, charge, outcome, monkeypatch):
 
 def test_a_time_guard_counts_from_the_beginning_of_the_run(play, script):
     script.steps = 20
-    result = play(step(GO["bedroom"]), step(GO["hall"], guards=StepGuards(time_s=1.5)))
+    result = play(step(GO["bedroom"]), step(GO["hall"], guards=Guards(time_s=1.5)))
     assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.TIMEOUT)
     assert "since the mission began" in result.message
 
 
 def test_a_guard_on_the_place(compile_steps):
-    tree = compile_steps(step(GO["hall"], guards=StepGuards(localised=True)))
+    tree = compile_steps(step(GO["hall"], guards=Guards(localised=True)))
     (guard,) = [node for node in tree.root.walk() if node.path_id == f"{BASE}/step-1/guard-localised"]
     assert guard.kind == "guard"
 
 
 def test_the_nodes_of_a_policy_stand_around_the_step_in_this_order(compile_steps):
-    policy = {"timeout_s": 9.0, "retries": 1, "on_failure": OnFailure.SKIP, "guards": StepGuards(0.3, True, 60.0)}
+    policy = {
+        "timeout_s": 9.0,
+        "retries": 1,
+        "on_failure": OnFailure.SKIP,
+        "guards": Guards(battery=0.3, localised=True, time_s=60.0),
+    }
     tree = compile_steps(step(GO["hall"], **policy), step(GO["bedroom"]))
     parts = [node.path_id.removeprefix(f"{BASE}/") for node in tree.root.walk() if "/step-1/" in node.path_id]
     assert parts == [

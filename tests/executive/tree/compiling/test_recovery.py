@@ -13,7 +13,8 @@ from executive.tree.compiling.search import surfaces_elsewhere
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
 from executive.words.knowledge import load_knowledge
-from executive.words.steps import DEFAULT_WORLD, Mission, MissionStep
+from executive.words.mission import Mission
+from executive.words.steps import Do
 from skills.api import Cause, Failed, Succeeded, Thing
 from skills.robot import Pose2D
 
@@ -314,7 +315,7 @@ def test_what_falls_while_it_is_handed_over_is_picked_up_as_well(carrying, scrip
 
 
 def test_where_the_skill_can_be_told_it_looks_first_at_the_spot_where_it_must_lie(knowledge):
-    mission = Mission("m", DEFAULT_WORLD, "Alice", (MissionStep((parse_command(PUT),)),))
+    mission = Mission(name="m", robot="Alice", steps=(Do.of(parse_command(PUT)),))
     tree = compile_mission(mission, knowledge=knowledge, registry=built_in_skills())
     (find,) = [node for node in tree.mission.walk() if node.path_id.endswith("carry-on/again/find")]
     looks = [node.options["inputs"] for node in find.walk() if node.name == "detect"]

@@ -10,7 +10,9 @@ from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
-from executive.words.steps import Mission, MissionStep, StepPolicy
+from executive.words.mission import Mission
+from executive.words.policy import Policy
+from executive.words.steps import Do
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Surface, Thing
 from skills.quantities import Coordinate, Length
 from skills.robot import Pose2D
@@ -78,9 +80,11 @@ def compile_step(knowledge, make, script):
     registry = {name: make.scripted_skill(script, name, *each) for name, each in ports.items()}
 
     def compile_it(own=None, mission=None, registry=registry):
-        steps = (MissionStep((GRASP,), policy=StepPolicy(move_aside=own)),)
-        policy = StepPolicy(move_aside=mission)
-        return compile_mission(Mission("m", "flat", "Alice", steps, policy), knowledge=knowledge, registry=registry)
+        steps = (Do.of(GRASP).under(Policy(move_aside=own)),)
+        policy = Policy(move_aside=mission)
+        return compile_mission(
+            Mission(name="m", robot="Alice", steps=steps).under(policy), knowledge=knowledge, registry=registry
+        )
 
     return compile_it
 

@@ -16,14 +16,13 @@ from typing import Any, Final
 import yaml
 
 from executive.words.expression import Value
-from executive.words.steps import KeyPath
 from skills.files.errors import InputError, did_you_mean, listing, suggestion
 from skills.files.texts import json_object, plain_text
 from skills.files.yaml_scalars import scalar_of
-from skills.files.yaml_source import YamlSource
+from skills.files.yaml_source import KeyPath, YamlSource
 from skills.quantities import LARGEST, Number, QuantityError, number_of, shown
 
-__all__ = ["Given", "given_values", "part_source", "round_source", "values_in_json", "with_parameters"]
+__all__ = ["Given", "given_values", "round_source", "values_in_json", "with_parameters"]
 
 _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -37,7 +36,6 @@ _TYPES: Final[Mapping[str, tuple[type, ...]]] = {
     "object": (str,),
     "person": (str,),
 }
-_FOR_SEVERAL: Final = ("robots", "parts")
 _TEXTS: Final = frozenset(name for name, kinds in _TYPES.items() if str in kinds)
 
 Given = Mapping[str, Any]
@@ -152,27 +150,13 @@ def _number_hint(value: Any) -> str:
     return "give it a number"
 
 
-def round_source(source: YamlSource, steps: KeyPath, name: str, value: Value) -> YamlSource:
-    """The steps at a path with the value of a round of their `for_each` put in, as a document {steps: ..} of their own.
+def round_source(source: YamlSource, steps: KeyPath, data: Any, name: str, value: Value) -> YamlSource:
+    """The steps `data` of a `for_each`, which stand at a path, with a round's value put in, as a list of their own.
 
     Raises InputError: `${..}` of a name that is neither the round's nor that of a `for_each` within.
     """
-    data: Any = source.data
-    for part in steps:
-        data = data[part]
-    lines = {("steps", *path[len(steps) :]): line for path, line in source.lines.items() if path[: len(steps)] == steps}
-    first = source.line(steps)
-    below = replace(source, data={"steps": data}, lines=lines, first_line=first)
+    below = source.below(steps[:-1], {steps[-1]: data})
     return replace(below, data=_put_in(below.data, {name: value}, below, ()))
-
-
-def part_source(source: YamlSource, robot: str, part: str | None) -> YamlSource:
-    """The document for one robot alone: its part `part` (None: all steps) laid over what stands at the top."""
-    own = {} if part is None else {key: value for key, value in source.data["parts"][part].items() if key != "after"}
-    shared = {key: value for key, value in source.data.items() if key not in _FOR_SEVERAL}
-    lines = {path: line for path, line in source.lines.items() if path[0] not in {*_FOR_SEVERAL, *own}}
-    lines |= {path[2:]: line for path, line in source.lines.items() if len(path) > 2 and path[:2] == ("parts", part)}
-    return replace(source, data={**shared, **own, "robot": robot}, lines=lines)
 
 
 def _declared(source: YamlSource) -> dict[str, _Parameter]:

@@ -1,1 +1,0 @@
-"""Mission files: their schema, their parameters, and what becomes of them."""

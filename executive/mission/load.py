@@ -1,0 +1,121 @@
+"""Mission files: read, their parameters put in, and each step with its place in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+from pydantic import BaseModel
+
+from executive.mission.parameters import Given, with_parameters
+from executive.words.knowledge import Corner, Knowledge, knowledge_of_source
+from executive.words.mission import Mission, Stop
+from executive.words.steps import Place, Step
+from skills.files.errors import Problems, suggestion
+from skills.files.schema import validate
+from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
+
+__all__ = ["for_robot", "import_folders", "load_mission", "locate", "overridden", "routes_in"]
+
+_NONE_GIVEN: Final[Given] = MappingProxyType({})
+_KEY: Final = "knowledge"
+_ROBOTS: Final = "robots"
+
+
+def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN) -> Mission:
+    """Reads a mission file and puts its parameters in.
+
+    Raises:
+        InputError: with file, line and hint, for broken YAML, unknown keys, wrong values and unknown parameters.
+    """
+    document = with_parameters(read_yaml(path), parameters)
+    mission = validate(Mission, document).read_from(document)
+    locate(mission, document, ())
+    return mission
+
+
+def locate(value: Any, document: YamlSource, path: KeyPath) -> None:
+    """Tells each step in what was just read from `path` of a document its place there."""
+    if isinstance(value, Step):
+        value._place = Place(document, path)
+    if isinstance(value, BaseModel):
+        for name, field in type(value).model_fields.items():
+            locate(getattr(value, name), document, (*path, field.alias or name))
+    elif isinstance(value, tuple):
+        for index, part in enumerate(value):
+            locate(part, document, (*path, index))
+    elif isinstance(value, Mapping):
+        for key, part in value.items():
+            locate(part, document, (*path, key))
+
+
+def for_robot(mission: Mission, robot: str, part: str | None = None) -> Mission:
+    """What a mission has for one robot of several: the part that stands under the name `part`, or all its steps."""
+    own = None if part is None or mission.parts is None else mission.parts[part]
+    laid_over = {} if own is None else {key: getattr(own, key) for key in own.model_fields_set - {"after"}}
+    alone = mission.model_copy(update={**laid_over, "robot": robot, "robots": None, "parts": None})
+    return alone if own is None or part is None else alone.part_of(part)
+
+
+def import_folders(mission: Mission) -> tuple[Path, ...]:
+    """The folders of a mission's imports."""
+    folder = Path() if mission.document is None else mission.document.path.parent
+    return tuple(folder / each for each in mission.imports or ())
+
+
+def routes_in(mission: Mission, knowledge: Knowledge) -> dict[str, Mapping[str, Any]]:
+    """The routes of a mission's people by name, as values in which every place is a point.
+
+    Raises:
+        InputError: a place is not known; with the line in the file.
+    """
+    problems, routes = Problems(), dict[str, Mapping[str, Any]]()
+    for name, route in (mission.people or {}).items():
+        stops = []
+        for index, waypoint in enumerate(route.waypoints):
+            stop = waypoint if isinstance(waypoint, Stop) else Stop(at=waypoint, pause=0.0)
+            with problems:
+                path = ("people", name, "waypoints", index)
+                stops.append({"at": _point(mission, path, stop.at, knowledge), "pause": stop.pause})
+        routes[name] = {**route.model_dump(exclude={"waypoints"}), "waypoints": stops}
+    problems.raise_any()
+    return routes
+
+
+def _point(mission: Mission, path: tuple[str | int, ...], at: Corner | str, knowledge: Knowledge) -> Corner:
+    if not isinstance(at, str):
+        return at
+    place = knowledge.place(at)
+    if place is None:
+        hint = suggestion(at, knowledge.spellings(knowledge.place_names()), "give a point [x, y]")
+        raise mission.error(path, f"unknown place {at!r}", hint)
+    pose = knowledge.place_pose(place)
+    return pose.x, pose.y
+
+
+def overridden(mission: Mission, knowledge: Knowledge) -> Knowledge:
+    """The world's knowledge with the mission's own laid over it.
+
+    Mappings are merged key by key; lists and single values are replaced.
+
+    Raises:
+        InputError: the result is not valid knowledge; with the line in the mission file.
+    """
+    document = mission.document
+    if not mission.knowledge or document is None:
+        return knowledge
+    if _ROBOTS in mission.knowledge:
+        what = "the robots of a mission do not stand in its knowledge"
+        raise mission.error((_KEY, _ROBOTS), what, "write 'robots' at the top of the file")
+    merged = _merged(knowledge.model_dump(mode="json", exclude_none=True), mission.knowledge)
+    return knowledge_of_source(document.below((_KEY,), merged))
+
+
+def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    both = {
+        key: _merged(below[key], value) if isinstance(value, dict) and isinstance(below.get(key), dict) else value
+        for key, value in above.items()
+    }
+    return {**below, **both}

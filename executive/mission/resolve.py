@@ -1,0 +1,479 @@
+"""From a mission that was read to one that can be compiled: sentences understood, names checked against the world."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from pydantic import BaseModel
+
+from executive.language.questions import Answerer, answer_by
+from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
+from executive.mission.load import load_mission, locate
+from executive.mission.parameters import round_source
+from executive.words.command import START, TIME_UNITS_S, Command, Task, Thing, command_of_parts
+from executive.words.condition import (
+    RANGES,
+    AllOf,
+    AnyOf,
+    ButtonPressed,
+    Condition,
+    DoorOpen,
+    Look,
+    LookFor,
+    Not,
+    Question,
+    ValueIs,
+)
+from executive.words.expression import Expression, ExpressionError, Value, literal
+from executive.words.forms import Strict
+from executive.words.knowledge import ANYBODY, Knowledge
+from executive.words.mission import Mission, Parameter, QuestionPolicy
+from executive.words.policy import Policy
+from executive.words.steps import CallSkill, Do, ForEach, Group, Place, Say, Set, Step, Steps, UseMission
+from skills.files.errors import InputError, Problems, listing, suggestion
+from skills.files.outside import is_file
+from skills.files.schema import validate
+from skills.files.yaml_source import KeyPath
+
+if TYPE_CHECKING:
+    from executive.language.parser import DependencyParser
+    from executive.language.understand import Understanding
+
+__all__ = ["mission_from_file"]
+
+MAX_STEPS: Final = 5000
+MAX_DEPTH: Final = 20
+MAX_NESTING: Final = 25
+MOST_ROUNDS: Final = 1000
+REASON_LETTERS: Final = 500
+_NOT_UNDERSTOOD: Final = "the sentence was not understood"
+_ONLY_AT_THE_TOP: Final = ("imports", "knowledge", "objects", "people", "robot", "robots", "world")
+
+
+def mission_from_file(
+    file: Mission | Path | str,
+    *,
+    parser: DependencyParser,
+    knowledge: Knowledge,
+    answer: Answerer | None = None,
+) -> Mission:
+    """The mission of a file, its sentences understood and its names checked against `knowledge`.
+
+    What the file lays over the world's knowledge is in `knowledge` already (`overridden`). `answer` is asked where a
+    sentence could mean several things; unless given, the file's own policy decides.
+
+    Raises:
+        InputError: with file, line and hint, also for a sentence that is not understood, for unknown names, and for
+            used files that are wrong or use each other in a circle; all that was found stands in `others`.
+    """
+    loaded = file if isinstance(file, Mission) else load_mission(file)
+    chain = () if loaded.document is None else (loaded.document.path.resolve(),)
+    answers = answer or answer_by(loaded.questions or QuestionPolicy.REFUSE)
+    robot = loaded.robot or knowledge.robot.name
+    return _Resolver(parser, knowledge, robot, loaded.world, answers).mission(loaded, chain)
+
+
+@dataclass(frozen=True)
+class _Scope:
+    """The file of the steps that are resolved, and the files that led there, this one the last."""
+
+    file: Mission
+    chain: tuple[Path, ...] = ()
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the file."""
+        return Path() if self.file.document is None else self.file.document.path.parent
+
+
+class _Round(Strict):
+    """The steps of one round of a `for_each`."""
+
+    steps: Steps
+
+
+_Error = Callable[[KeyPath, str, str], InputError]
+
+
+@dataclass
+class _Resolver:
+    """Resolves a file and all that it uses, for one robot in one world."""
+
+    parser: DependencyParser
+    knowledge: Knowledge
+    robot_name: str
+    world: str
+    answer: Answerer
+    steps_so_far: int = 0
+    depth: int = 0
+    understood: dict[str, Understanding] = field(default_factory=dict)
+
+    def mission(self, file: Mission, chain: tuple[Path, ...]) -> Mission:
+        """The mission of a file that the files of `chain` led to, itself the last."""
+        if file.parts is not None:
+            what = "its parts are for several robots, and this is for one"
+            hint = "run the file by `errand run`, and name them: 'robots: {alice: spot, bob: fetch}', or --robots"
+            raise file.error(("parts",), what, hint)
+        scope, problems = _Scope(file, chain), Problems()
+        for name, value in (file.variables or {}).items():
+            with problems:
+                _refuse_large(file, name, value)
+        for name, parameter in (file.parameters or {}).items():
+            with problems:
+                self._refuse_unknown(file, name, parameter)
+        resolved: dict[str, Any] = {"world": self.world, "robot": self.robot_name}
+        for name in ("steps", "always", "while_", "when"):
+            with problems:
+                alias = name.removesuffix("_")
+                resolved[name] = self._part(scope, file.error, getattr(file, name), (alias,))
+        problems.raise_any()
+        return file.model_copy(update=resolved).noting(self._notes())
+
+    def _steps(self, scope: _Scope, steps: Steps) -> Steps:
+        """Steps in a row. Raises InputError: all that is wrong with them."""
+        if self.depth == MAX_NESTING:
+            what = f"steps hold steps more than {MAX_NESTING} deep"
+            raise steps[0].error((), what, "write some of them one after the other")
+        problems, made = Problems(), []
+        self.depth += 1
+        for step in steps:
+            with problems:
+                made.append(self._step(scope, step.under(scope.file.each)))
+        self.depth -= 1
+        problems.raise_any()
+        return tuple(made)
+
+    def _step(self, scope: _Scope, step: Step) -> Step:
+        self.steps_so_far += 1
+        if self.steps_so_far > MAX_STEPS:
+            raise step.error((), f"the mission has more than {MAX_STEPS} steps", "use fewer files, or fewer times")
+        for path, what, hint in step.faults:
+            raise step.error(path, what, hint)
+        match step:
+            case UseMission():
+                return step.meaning(self._used(scope, step))
+            case CallSkill():
+                return step
+            case Say():
+                return self._said(step)
+            case Do():
+                return step.meaning(self._command(step.error, _texts(step)))
+            case ForEach():
+                return _group(step, self._rounds(scope, step), f"for each {step.loop.name}")
+            case Set():
+                for name, expression in step.values.items():
+                    _refuse_decided(step.error, expression, ("set", name))
+        return step.model_copy(update=self._parts(scope, step.error, step, ()))
+
+    def _parts(self, scope: _Scope, error: _Error, model: BaseModel, path: KeyPath) -> dict[str, Any]:
+        """The fields of a model in which steps or conditions were resolved."""
+        found = {}
+        for name, facts in type(model).model_fields.items():
+            if name not in Policy.model_fields:
+                value = getattr(model, name)
+                found[name] = self._part(scope, error, value, (*path, facts.alias or name))
+        return found
+
+    def _part(self, scope: _Scope, error: _Error, value: Any, path: KeyPath) -> Any:
+        """A value that stands at a path below a step or the file, with the steps and conditions in it resolved."""
+        match value:
+            case (Step(), *_):
+                return self._steps(scope, value)
+            case tuple():
+                return tuple(self._part(scope, error, each, (*path, n)) for n, each in enumerate(value))
+            case dict():
+                return {key: self._part(scope, error, each, (*path, key)) for key, each in value.items()}
+            case ValueIs() | Question() | Look() | LookFor() | DoorOpen() | ButtonPressed() | AllOf() | AnyOf() | Not():
+                return self._condition(error, value, path)
+            case Strict():
+                return value.model_copy(update=self._parts(scope, error, value, path))
+        return value
+
+    def _condition(self, error: _Error, condition: Condition, path: KeyPath) -> Condition:
+        """A condition in the world's own names.
+
+        Raises:
+            InputError: an unknown name, no question, or a condition that cannot hold or cannot fail.
+        """
+        resolved = self._named(error, condition, path)
+        try:
+            refuse_certain(resolved, RANGES)
+        except ExpressionError as fault:
+            raise error(path, fault.message, fault.hint) from fault
+        return resolved
+
+    def _named(self, error: _Error, condition: Condition, path: KeyPath) -> Condition:
+        match condition:
+            case ValueIs():
+                _refuse_decided(error, condition.text, path)
+            case AllOf(parts=parts) | AnyOf(parts=parts):
+                key = "all" if isinstance(condition, AllOf) else "any"
+                named = tuple(self._condition(error, each, (*path, key, n)) for n, each in enumerate(parts))
+                return condition.model_copy(update={"parts": named})
+            case Not(part=part):
+                return Not(part=self._condition(error, part, (*path, "not")))
+            case Question(look=question):
+                commands = self._meaning(error, (*path, "look"), question).commands
+                if len(commands) != 1 or commands[0].task is not Task.FIND:
+                    hint = "ask one thing, as in 'is there a hammer in the workshop'"
+                    raise error((*path, "look"), f"'{question}' is not one question that a look answers", hint)
+                return Look.of(commands[0], condition.max_age_s)
+            case Look(object=found, at=at) | LookFor(person=found, at=at):
+                if isinstance(condition, LookFor):
+                    found = self._person(error, found, (*path, "person"))
+                check = {"do": Task.FIND.value, "object": found, "to": at}
+                return Look.of(self._command(error, check, path), condition.max_age_s)
+            case DoorOpen():
+                return condition.model_copy(update={"door": self._door(error, condition.door, (*path, "door"))})
+        return condition
+
+    def _command(self, error: _Error, parts: dict[str, str | None], path: KeyPath = ()) -> Command:
+        """The command of its parts in the world's own names.
+
+        Raises:
+            InputError: a part that is no name, or names that the world does not have.
+        """
+        try:
+            command = command_of_parts(parts)
+        except ValueError as fault:
+            raise error(path, str(fault), "write names in plain words") from fault
+        problems = Problems()
+        for key, what, hint in _unknown_names(command, self.knowledge):
+            problems.add(error((*path, key), what, hint))
+        problems.raise_any()
+        return _known(command, self.knowledge)
+
+    def _person(self, error: _Error, name: str, path: KeyPath) -> str:
+        """The person who is meant, perhaps anybody."""
+        known = self.knowledge.somebody(ANYBODY if name.strip().lower() == "anybody" else name)
+        if known is None:
+            hint = suggestion(name, ("anybody", *self.knowledge.people))
+            raise error(path, f"unknown person '{name[:60]}'", hint)
+        return known
+
+    def _door(self, error: _Error, rooms: tuple[str, ...], path: KeyPath) -> tuple[str, str]:
+        """The rooms of the door that is meant, as the knowledge file has it."""
+        facts, named = self.knowledge, list[str]()
+        for n, room in enumerate(rooms):
+            known = facts.place(room)
+            if known not in facts.places:
+                raise error((*path, n), f"unknown room '{room}'", suggestion(room, facts.places))
+            named.append(known)
+        doors = [door.between for door in facts.doors if set(named) <= set(door.between)]
+        if len(doors) == 1:
+            return doors[0]
+        told = " and ".join(named)
+        if doors:
+            raise error(path, f"there are {len(doors)} doors of {told}", "name the two rooms that it joins")
+        all_doors = listing(" and ".join(door.between) for door in facts.doors)
+        hint = f"known are the doors of {all_doors}" if facts.doors else "add it under 'doors' in the knowledge file"
+        raise error(path, f"no door of {told} is known", hint)
+
+    def _said(self, step: Say) -> Step:
+        """The step of a sentence: its commands, or a group of what it decides or repeats."""
+        meant = self._meaning(step.error, ("say",), step.say)
+        return _group(step, meant.steps, step.say) if meant.steps else step.meaning(meant.commands)
+
+    def _meaning(self, error: _Error, path: KeyPath, sentence: str) -> Understanding:
+        """What a sentence means; one that stands there again means the same. Raises InputError: not understood."""
+        from executive.language.understand import Status, understand_asking
+
+        if sentence not in self.understood:
+            self.understood[sentence] = understand_asking(
+                sentence,
+                answer=self.answer,
+                parser=self.parser,
+                knowledge=self.knowledge,
+                require_wake=False,
+                robot_name=self.robot_name,
+                correct=False,
+            )
+        meant = self.understood[sentence]
+        if meant.status is not Status.OK:
+            hint = "say it in other words, or write take, to, do and object"
+            raise error(path, (meant.reason or _NOT_UNDERSTOOD)[:REASON_LETTERS], hint)
+        return meant
+
+    def _notes(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(note for meant in self.understood.values() for note in meant.notes))
+
+    def _rounds(self, scope: _Scope, step: ForEach) -> Steps:
+        """One group for each value. Raises InputError."""
+        place, name = step.place, step.loop.name
+        assert place is not None and name is not None
+        made = []
+        for value in self._round_values(step):
+            document = round_source(place.source, (*place.path, "steps"), step.steps, name, value)
+            steps = validate(_Round, document).steps
+            locate(steps, document, ("steps",))
+            made.append(_group(Group.model_construct().at(place), self._steps(scope, steps), str(value)))
+        return tuple(made)
+
+    def _round_values(self, step: ForEach) -> Sequence[Value]:
+        """The values of the rounds. Raises InputError: no values, too many, or one that is no plain value."""
+        at, listed = ("repeat", "for_each"), step.loop.for_each
+        if isinstance(listed, str):
+            values = list[Value](self._known_values(step.error, listed, at))
+        else:
+            values = list(listed or ())
+            wrong = next((n for n, value in enumerate(values) if not isinstance(value, str | bool | int | float)), None)
+            if wrong is not None:
+                raise step.error((*at, wrong), "no plain value", "list texts, numbers, or true and false")
+        if not 0 < len(values) <= MOST_ROUNDS:
+            said = "there is nothing to go through" if not values else f"{len(values)} values are too many"
+            raise step.error(at, said, f"list up to {MOST_ROUNDS} values")
+        return values
+
+    def _known_values(self, error: _Error, of: str, path: KeyPath) -> tuple[str, ...]:
+        """The rooms, people or surfaces of a world, perhaps those in one room."""
+        facts, (kind, _, room) = self.knowledge, of.partition(" in ")
+        if kind not in ("rooms", "people", "surfaces") or (kind == "rooms" and room):
+            hint = "write a list, or one of rooms, people, people in ROOM and surfaces in ROOM"
+            raise error(path, f"'{of[:60]}' is no list", hint)
+        place = facts.place(room.removeprefix("the ")) if room else None
+        if room and place is None:
+            raise error(path, f"unknown place '{room[:60]}'", suggestion(room, facts.place_names()))
+        if kind == "rooms":
+            return tuple(facts.places)
+        if kind == "surfaces":
+            return tuple(facts.surfaces) if place is None else facts.surfaces_in(place)
+        inside = {place, facts.room(place)} if place is not None else set()
+        people = facts.people.items()
+        return tuple(name for name, who in people if place is None or inside & {who.at, _room(who.at, facts)})
+
+    def _refuse_unknown(self, file: Mission, name: str, parameter: Parameter) -> None:
+        """Refuse a parameter that names no place, object or person of the world."""
+        known = {
+            "place": (self.knowledge.place, self.knowledge.place_names()),
+            "object": (self.knowledge.thing, self.knowledge.thing_names()),
+            "person": (self.knowledge.person, tuple(self.knowledge.people)),
+        }
+        if parameter.type in known:
+            find, names = known[parameter.type]
+            said = str(parameter.default)
+            if said != START and find(said) is None:
+                what = f"parameter '{name}': unknown {parameter.type} '{said[:60]}'"
+                hint = suggestion(said, self.knowledge.spellings(names), shown=names)
+                raise file.error(("parameters", name), what, hint)
+
+    def _used(self, scope: _Scope, step: UseMission) -> Mission:
+        """The mission of the file that a step uses."""
+        used_path, chain = _found(scope, step), scope.chain
+        if used_path.resolve() in chain:
+            names = [one.name for one in (*chain[chain.index(used_path.resolve()) :], used_path)]
+            what = f"the files use each other in a circle: {' -> '.join(names)}"
+            raise step.error(("use",), what, "break the circle")
+        if len(chain) >= MAX_DEPTH:
+            what = f"more than {MAX_DEPTH} files use each other in a row"
+            raise step.error(("use",), what, "put what they say into fewer files")
+        try:
+            used = load_mission(used_path, step.values or {})
+            _refuse_top_keys(used, scope.file)
+            return self.mission(used, (*chain, used_path.resolve()))
+        except InputError as error:
+            here = None if step.place is None else Place(step.place.source, (*step.place.path, "use")).line
+            raise error if here is None else error.within(here.file, here.line) from error
+
+
+def _group(step: Step, steps: Steps, name: str) -> Group:
+    """Steps in a row in the place of a step, under its policy. Any text may be their name."""
+    policy = {key: getattr(step, key) for key in Policy.model_fields}
+    return Group.model_construct(steps=steps, name=name, **policy).at(step.place)
+
+
+def _refuse_large(file: Mission, name: str, value: Value) -> None:
+    """Refuse a value that is too long or too large."""
+    try:
+        literal(value)
+    except ExpressionError as fault:
+        raise file.error(("variables", name), fault.message, fault.hint) from fault
+
+
+def _refuse_decided(error: _Error, expression: str | Expression, path: KeyPath) -> None:
+    """Refuse an expression that cannot be read, or compares what it reads with a value out of its range."""
+    try:
+        read = Expression(expression) if isinstance(expression, str) else expression
+        refuse_certain_comparisons(read, RANGES)
+    except ExpressionError as fault:
+        raise error(path, fault.message, fault.hint) from fault
+
+
+def _texts(step: Do) -> dict[str, str | None]:
+    do = None if step.do is None else step.do.value
+    return {"take": step.take, "to": step.to, "do": do, "object": step.object}
+
+
+def _unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
+    """The names that a world does not have: the key, a sentence and a hint for each."""
+
+    def unknown(kind: str, name: str, known: Sequence[str]) -> tuple[str, str]:
+        return f"unknown {kind} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
+
+    waits = command.task is Task.WAIT and command.object is not None and command.object.name in TIME_UNITS_S
+    for key, thing in (("take", command.item), ("object", None if waits else command.object)):
+        person = command.task is Task.FIND and thing is not None and knowledge.somebody(thing.name) is not None
+        if thing is not None and knowledge.thing(thing.name) is None and not person:
+            yield key, *unknown("object", thing.name, knowledge.thing_names())
+    goals = (*knowledge.place_names(), *knowledge.people, START)
+    if command.goal is not None and _goal(command.goal, knowledge) is None:
+        yield "to", *unknown("place or person", command.goal, goals)
+    if command.goal_at is not None and knowledge.place(command.goal_at) is None:
+        yield "to", *unknown("place", command.goal_at, knowledge.place_names())
+
+
+def _known(command: Command, knowledge: Knowledge) -> Command:
+    """The command in the world's own names."""
+
+    def named(thing: Thing | None) -> Thing | None:
+        known = thing and (knowledge.thing(thing.name) or knowledge.somebody(thing.name))
+        return thing and Thing(known or thing.name, thing.attributes)
+
+    return Command(
+        item=named(command.item),
+        goal=command.goal and _goal(command.goal, knowledge),
+        goal_at=command.goal_at and knowledge.place(command.goal_at),
+        task=command.task,
+        object=named(command.object),
+        item_count=command.item_count,
+        object_count=command.object_count,
+    )
+
+
+def _goal(name: str, knowledge: Knowledge) -> str | None:
+    return START if name == START else knowledge.place(name) or knowledge.person(name)
+
+
+def _room(place: str, knowledge: Knowledge) -> str | None:
+    known = knowledge.place(place)
+    return None if known is None else knowledge.room(known)
+
+
+def _found(scope: _Scope, step: UseMission) -> Path:
+    """The file that a step uses, as seen from the folder of the file in which the step stands.
+
+    Raises InputError: there is none, or it lies outside of the folder of the first file.
+    """
+    use, found = step.use, scope.folder / step.use
+    home = scope.chain[0].parent if scope.chain else scope.folder.resolve()
+    if not found.resolve().is_relative_to(home):
+        hint = f"put it into {home.name or home} or a folder in it"
+        raise step.error(("use",), f"'{use[:60]}' leaves the folder of the mission", hint)
+    if is_file(found):
+        return found
+    beside = sorted(one.name for one in scope.folder.glob("*.yaml"))
+    near = difflib.get_close_matches(use, beside, n=1)
+    hint = f"did you mean '{near[0]}'?" if near else "give its path from this file's folder"
+    raise step.error(("use",), f"there is no mission file '{use[:60]}'", hint)
+
+
+def _refuse_top_keys(used: Mission, user: Mission) -> None:
+    """What is for a whole run cannot be set by a file that is a part of it, unless it says the same."""
+    for key in _ONLY_AT_THE_TOP:
+        said = getattr(used, key)
+        if key in used.model_fields_set and said is not None and said != getattr(user, key):
+            hint = "remove it there, or say the same in both"
+            raise used.error((key,), f"'{key}' of a file that is used cannot differ from that of its user", hint)

@@ -1,0 +1,61 @@
+"""Steps as the YAML that a person would write for them, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from executive.words.forms import Strict
+from executive.words.steps import Step, Steps
+from skills.files.errors import InputError
+from skills.files.yaml_source import parse_yaml
+
+__all__ = ["steps_from_yaml", "steps_to_data", "steps_to_yaml"]
+
+
+class _Document(Strict):
+    """Steps alone."""
+
+    steps: Steps
+
+
+def steps_to_data(steps: Iterable[Step]) -> list[Any]:
+    """The steps as the plain data of a mission file, without what goes without saying."""
+    return [_short(step.model_dump(mode="json", by_alias=True, exclude_defaults=True)) for step in steps]
+
+
+def steps_to_yaml(steps: Iterable[Step]) -> tuple[str, ...]:
+    """The lines of a mission file's `steps`; none where there are no steps."""
+    data = steps_to_data(steps)
+    if not data:
+        return ()
+    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=1_000_000, default_flow_style=None)
+    return tuple(text.splitlines())
+
+
+def steps_from_yaml(lines: Sequence[str]) -> Steps:
+    """The steps of such lines. Raises ValueError: they are none."""
+    try:
+        data = parse_yaml("\n".join(lines), Path("steps")).data
+    except InputError as error:
+        raise ValueError(error.message) from error
+    return _Document.model_validate({"steps": data}, by_alias=True, by_name=False).steps
+
+
+def _short(value: Any) -> Any:
+    """Data without empty keys; an expression stands for itself, and a number of whole seconds has no point."""
+    if isinstance(value, list):
+        return [_short(each) for each in value]
+    if isinstance(value, float) and value.is_integer():
+        return int(value)
+    if not isinstance(value, dict):
+        return value
+    if value.keys() == {"expression"}:
+        return value["expression"]
+    short = {key: _short(each) for key, each in value.items() if each is not None and each != []}
+    if "choices" in value:
+        short["choices"] = {name: _short(steps) or None for name, steps in value["choices"].items()}
+    return short

@@ -1,0 +1,108 @@
+"""Steps in a short notation, in which the tables of sentences say what each is to become.
+
+A command is its text form; a block is a word for what it does, with the steps that it holds in braces:
+
+    If (Take [Nothing] to [kitchen] and do [find] to [beer]) {Take [beer] to [hall] and do [Nothing] to [Nothing]}
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable
+
+from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
+from executive.words.steps import Ask, Check, Choose, Do, Dock, Group, Repeat, Speak, Step, Together, Try, Wait
+
+__all__ = ["as_noted", "noted"]
+
+
+def noted(steps: Iterable[Step]) -> str:
+    """The steps in the notation, with ";" between them."""
+    return "; ".join(map(_step, steps))
+
+
+def as_noted(lines: Iterable[str]) -> str:
+    """What a table says in lines, where "then" may stand between commands, as `noted` writes it."""
+    return re.sub(r"\]\s*then Take", "]; Take", "; ".join(lines))
+
+
+def _step(step: Step) -> str:
+    match step:
+        case Do():
+            return str(step.command)
+        case Choose():
+            return f"If ({_condition(step.condition)}) {_braced(step.then)}{_branch('Otherwise', step.otherwise)}"
+        case Repeat():
+            return f"Repeat{_rounds(step)} {_braced(step.steps)}"
+        case Try():
+            return f"Try {_braced(step.steps)} Otherwise {_braced(step.otherwise)}"
+        case Together():
+            return f"Together {_braced(step.steps)}"
+        case Group():
+            return f"Group {_braced(step.steps)}{_branch('Finally', step.always)}"
+        case Wait():
+            return f"Wait{_awaited(step)}"
+        case Check():
+            return f"Check ({_condition(step.condition)})"
+        case Dock():
+            return "Dock" if step.level is None else f"Dock to {step.level:g}"
+        case Speak():
+            return f"Say {_quoted(step.speak)}"
+        case Ask():
+            choices = "; ".join(f"{_quoted(choice)} {_braced(steps)}" for choice, steps in (step.choices or {}).items())
+            return f"Ask {_quoted(step.ask)} {{{choices}}}"
+    raise AssertionError(f"no sentence becomes {step!r}")
+
+
+def _condition(condition: Condition) -> str:
+    match condition:
+        case ValueIs(text=text):
+            return f"value {_quoted(text)}"
+        case Look(command=command):
+            return str(command)
+        case DoorOpen(between=(one, other)):
+            return f"door {_quoted(one)} - {_quoted(other)} open"
+        case ButtonPressed(button=button):
+            return f"button {_quoted(button)} pressed"
+        case AllOf(parts=parts):
+            return f"all({', '.join(map(_condition, parts))})"
+        case AnyOf(parts=parts):
+            return f"any({', '.join(map(_condition, parts))})"
+        case Not(part=part):
+            return f"not({_condition(part)})"
+    raise AssertionError(f"no sentence asks {condition!r}")
+
+
+def _rounds(step: Repeat) -> str:
+    loop = step.loop
+    times = "" if loop.times is None else f" {loop.times} times"
+    every = "" if loop.every_s is None else f" every {_number(loop.every_s)} s"
+    while_ = "" if loop.while_ is None else f" while ({_condition(loop.while_)})"
+    until = "" if loop.until is None else f" until ({_condition(loop.until)})"
+    return f"{times}{every}{while_}{until}"
+
+
+def _awaited(step: Wait) -> str:
+    awaited = step.awaited
+    condition = "" if awaited.condition is None else f" for ({_condition(awaited.condition)})"
+    seconds = "" if awaited.seconds is None else f" {_number(awaited.seconds)} s"
+    clock = "" if awaited.until_clock is None else f" until {_number(awaited.until_clock_s)} s"
+    return f"{condition}{seconds}{clock}"
+
+
+def _braced(steps: Iterable[Step]) -> str:
+    return f"{{{noted(steps)}}}"
+
+
+def _branch(word: str, steps: tuple[Step, ...]) -> str:
+    return f" {word} {_braced(steps)}" if steps else ""
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _number(value: float) -> str:
+    short = f"{value:g}"
+    return short if float(short) == value else repr(float(value))

@@ -1,0 +1,153 @@
+"""Steps written as YAML read back to the same steps."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from executive.words.command import Command, Task, Thing
+from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
+from executive.words.steps import (
+    Ask,
+    Awaited,
+    Charging,
+    Check,
+    Choose,
+    Do,
+    Dock,
+    Group,
+    Handler,
+    Loop,
+    Repeat,
+    Set,
+    Speak,
+    Together,
+    Try,
+    Wait,
+    While,
+    steps_of_commands,
+)
+from executive.words.yaml_steps import steps_from_yaml, steps_to_data, steps_to_yaml
+
+texts = st.text(st.characters(exclude_characters="{}", exclude_categories=["C", "Z"]), min_size=1, max_size=12)
+names = texts
+words = st.sampled_from(["beer", "red wine", "kitchen", "Nothing", "then", "if", "not", "a at b", "it's", "yes", "3"])
+seconds = st.floats(0.1, 86_000.0) | st.integers(1, 5000).map(float)
+expressions = st.sampled_from(["battery < 0.3 and not holding", 'clock >= "14:30"', "1 + 2", '"}" == drink', "true"])
+commands = st.builds(Command, item=st.none() | st.builds(Thing, words), goal=words)
+checks = st.builds(Command, goal=st.none() | words, task=st.just(Task.FIND), object=st.builds(Thing, words))
+
+
+def built(model, **values):
+    """A model of fields by their names; hypothesis would take them by their aliases."""
+    return st.fixed_dictionaries(values).map(lambda given: model(**given))
+
+
+def row(each):
+    return st.tuples(each) | st.tuples(each, each)
+
+
+leaves = st.one_of(
+    built(ValueIs, text=expressions),
+    st.builds(Look.of, checks, st.just(0.0) | seconds),
+    built(DoorOpen, door=st.tuples(names, names), max_age_s=st.just(0.0) | seconds),
+    built(ButtonPressed, button=names),
+)
+conditions = st.recursive(
+    leaves,
+    lambda inner: st.one_of(
+        built(Not, part=inner),
+        built(AllOf, parts=row(inner)),
+        built(AnyOf, parts=row(inner)),
+    ),
+    max_leaves=4,
+)
+awaited = st.one_of(
+    built(Awaited, condition=conditions, every_s=seconds),
+    built(Awaited, seconds=seconds),
+    built(Awaited, until_clock=st.sampled_from(["00:00", "09:05", "14:30"])),
+)
+loops = st.one_of(
+    built(Loop, times=st.integers(1, 99), every_s=st.none() | seconds),
+    built(Loop, until=conditions, times=st.none() | st.integers(1, 99)),
+    built(Loop, while_=conditions),
+)
+small = st.one_of(
+    st.builds(Do.of, commands),
+    built(Wait, awaited=awaited),
+    built(Check, condition=conditions, gives=st.none() | st.fixed_dictionaries({"answer": names})),
+    built(Dock, charging=built(Charging, level=st.none() | st.floats(0.01, 1.0))),
+    built(Speak, speak=texts),
+    built(Set, set=st.dictionaries(names, expressions | st.integers(0, 9) | st.booleans(), min_size=1, max_size=3)),
+)
+
+
+def holding(steps):
+    some = row(steps)
+    branch = st.just(()) | some
+    handler = built(Handler, condition=conditions, steps=some, times=st.integers(1, 9))
+    return st.one_of(
+        built(Choose, condition=conditions, then=some, otherwise=branch),
+        built(Repeat, loop=loops, steps=some),
+        built(Try, steps=some, otherwise=some),
+        built(Together, steps=st.tuples(steps, steps), done_when=st.just("any")),
+        built(
+            Group,
+            steps=some,
+            name=st.none() | names,
+            always=branch,
+            while_=st.none() | built(While, holds=conditions),
+            when=st.none() | row(handler),
+        ),
+        built(Ask, ask=texts, choices=st.dictionaries(words, branch, min_size=1, max_size=2), limit_s=seconds),
+        built(Ask, ask=texts, match=st.just("place"), default=st.none() | words),
+    )
+
+
+missions = row(st.recursive(small, holding, max_leaves=6))
+
+
+@settings(max_examples=300, deadline=None)
+@given(missions)
+def test_yaml_reads_back_to_the_same_steps(steps):
+    assert steps_from_yaml(steps_to_yaml(steps)) == steps
+
+
+def test_it_is_what_a_person_would_write():
+    look = Look.of(Command(goal="kitchen", task=Task.FIND, object=Thing("beer")))
+    fetch = steps_of_commands(
+        [
+            Command(goal="kitchen", task=Task.GRASP, object=Thing("beer"), verb="fetch"),
+            Command(item=Thing("beer"), goal="start"),
+        ]
+    )
+    steps = (
+        Choose(condition=look, then=fetch, otherwise=(Speak(speak="there is none"),)),
+        Wait(awaited=Awaited(condition=ValueIs(text="battery > 0.5"))),
+        Repeat(loop=Loop(times=2, every_s=600.0), steps=(Ask(ask="Tea?", choices={"yes": (Dock(),), "no": ()}),)),
+    )
+    assert list(steps_to_yaml(steps)) == [
+        "- if: {object: beer, at: kitchen}",
+        "  then:",
+        "  - {to: kitchen, do: grasp, object: beer}",
+        "  - {take: beer, to: start}",
+        "  else:",
+        "  - {speak: there is none}",
+        "- wait: {for: battery > 0.5}",
+        "- repeat: {times: 2, every: 600}",
+        "  steps:",
+        "  - ask: Tea?",
+        "    choices:",
+        "      'yes':",
+        "      - dock: {}",
+        "      'no': null",
+    ]
+
+
+def test_data_are_plain():
+    assert steps_to_data([Dock(), Set(set={"n": 1})]) == [{"dock": {}}, {"set": {"n": 1}}]
+
+
+@pytest.mark.parametrize("lines", [["- {to: hall"], ["- 3"], ["to: hall"], ["- {if: holding}"], ["- {to_: hall}"]])
+def test_what_holds_no_steps_is_refused(lines):
+    with pytest.raises(ValueError, match=r".+"):
+        steps_from_yaml(lines)

@@ -20,7 +20,7 @@ from executive.app.goal_conditions import Share
 from executive.app.page_view import PageView, log_map
 from executive.app.prepared import Prepared
 from executive.app.report import RefereeReport, RobotReport, RunReport
-from executive.app.report_file import EndedTree, with_found_out, write_report
+from executive.app.report_file import EndedTree, with_findings, write_report
 from executive.app.signals import cancelled_by_signals
 from executive.mission.request import Request
 from executive.record.announce import announce
@@ -98,7 +98,7 @@ def run_request(
     events = mission_events(log.path)
     artifacts.recall(events)
     finished, ended = _judged(prepared, backend, result, log)
-    report = with_found_out(replace(finished.report, work=counts), prepared.knowledge, result, artifacts, events)
+    report = with_findings(replace(finished.report, work=counts), prepared.knowledge, result, artifacts, events)
     draw_answer(artifacts, out)
     recording = backend.leave(artifacts, out)
     write_report(prepared, report, ended, artifacts, events)

@@ -1,4 +1,4 @@
-"""`report.html` in a run's folder: what was asked for, what came of it, and what was found out, with pictures."""
+"""Writes `report.html` into a run's folder: request, verdicts, steps, answers, and pictures."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ __all__ = [
     "part_of",
     "save_report",
     "step_rows",
-    "with_found_out",
+    "with_findings",
     "write_report",
 ]
 
@@ -127,7 +127,7 @@ class ReportPage:
 
 @dataclass(frozen=True)
 class EndedTree:
-    """A robot's tree as it ended, and what is said of that."""
+    """A robot's tree in its last state, and the report on its mission."""
 
     tree: CompiledTree
     view: NodeView
@@ -135,11 +135,11 @@ class EndedTree:
 
     @property
     def picture(self) -> str:
-        """What ran of the tree, as SVG."""
+        """The executed nodes of the tree as SVG."""
         return to_svg(fold_to(executed_tree(self.view), DRAWN_NODES), title=self.tree.mission_name)
 
     def steps(self, events: Sequence[Event]) -> tuple[StepRow, ...]:
-        """The steps of its mission, with their times by a log."""
+        """The steps of the mission, with their times from the events of a log."""
         mission = _below(self.view, self.tree.mission.path_id) or self.view
         return tuple(step_rows(mission, frozenset(part.path_id for part in self.tree.parts), _spans(events)))
 
@@ -151,15 +151,15 @@ def write_report(
     artifacts: Artifacts,
     events: Sequence[Event],
 ) -> Path:
-    """Write the report of a run and the picture of each tree into its folder; the report's path.
+    """Writes the report of a run and the picture of each tree into its folder; returns the report's path.
 
     `ended` are the robots' trees, `events` are those of the run's log, `artifacts` has the run's pictures.
     """
     out, several = prepared.request.out, prepared.several
     names = tuple(prepared.robots)
-    for each in ended:
-        (out / f"{file_name(TREE, each.tree.robot_name, names)}.svg").write_text(each.picture, encoding="utf-8")
     parts = [part_of(each, names, artifacts, events) for each in ended]
+    for each, part in zip(ended, parts, strict=True):
+        (out / f"{file_name(TREE, each.tree.robot_name, names)}.svg").write_text(part.tree_svg, encoding="utf-8")
     page = ReportPage(
         title=", ".join(names) if several else prepared.mission.name,
         request=_request(prepared),
@@ -179,7 +179,7 @@ def write_report(
 def part_of(
     ended: EndedTree, robots: Sequence[str], artifacts: Artifacts, events: Sequence[Event], *, title: str | None = None
 ) -> ReportPart:
-    """What one of several robots did, for the report; under its name and kind unless there is a title."""
+    """The part of a report on one robot. Its title is the robot's name and kind by default."""
     name, report = ended.tree.robot_name, ended.report
     return ReportPart(
         title=title or f"{name} ({report.kind})",
@@ -192,7 +192,7 @@ def part_of(
 
 
 def save_report(out: Path, page: ReportPage) -> Path:
-    """Write a report's page into a folder; its path."""
+    """Writes the page of a report into a folder; returns its path."""
     path = out / REPORT
     path.write_text(render("run.html", page=page), encoding="utf-8")
     return path
@@ -201,9 +201,9 @@ def save_report(out: Path, page: ReportPage) -> Path:
 def step_rows(
     node: NodeView, parts: frozenset[str], spans: Mapping[str, tuple[float, float]], depth: int = 0
 ) -> Iterator[StepRow]:
-    """The steps of a mission: its parts, and above several of them what they belong to, one row each.
+    """The steps of a mission, one row each: its parts, and above several parts the node that they belong to.
 
-    Decorators make one row with what they decorate: the status is theirs, the name that of the node within.
+    A decorator and its child make one row, with the decorator's status and the child's name.
     """
     outer, within = node, [node]
     while (only := _decorated(within[-1], parts)) is not None:
@@ -219,9 +219,9 @@ def step_rows(
 
 
 def _decorated(node: NodeView, parts: frozenset[str]) -> NodeView | None:
-    """What a node is there for: its only child, or of one that is no sequence the only child with parts of the mission.
+    """The node that a decorator decorates: its only child, or its only child with parts of the mission.
 
-    None for a part itself, and where there are several.
+    None for a part itself, and for a node with several such children.
     """
     below = () if node.path_id in parts else _steps(node)
     if len(below) > 1 and node.kind != "sequence":
@@ -249,7 +249,7 @@ def _row(outer: NodeView, within: Sequence[NodeView], spans: Mapping[str, tuple[
 
 
 def _spans(events: Sequence[Event]) -> dict[str, tuple[float, float]]:
-    """When each node began first and changed last (s), by path id."""
+    """Times (s) of the first and the last transition of each node, by path id."""
     spans: dict[str, tuple[float, float]] = {}
     for event in events:
         if event.topic == TRANSITIONS:
@@ -270,7 +270,7 @@ def _request(prepared: Prepared) -> str:
 
 
 def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
-    """The facts of a run; without a robot's name those of all robots."""
+    """The facts of a run; an empty name stands for several robots."""
     facts = (
         ("world", f"{report.world}, seed {report.seed}"),
         ("duration", f"{report.sim_time_s:.1f} s simulated in {report.wall_time_s:.1f} s"),
@@ -282,7 +282,7 @@ def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
 
 
 def map_of(artifacts: Artifacts, events: Sequence[Event], *, several: bool) -> Picture | None:
-    """The world from above where the run was recorded, else the robot's own map; None where there is neither."""
+    """The world from above if the run was recorded, else the robot's own map; None if there is neither."""
     caption = _MAPS if several else _MAP
     if (drawn := _drawn(artifacts, "map")) is not None:
         return caption, drawn
@@ -294,7 +294,7 @@ def map_of(artifacts: Artifacts, events: Sequence[Event], *, several: bool) -> P
 
 
 def _pictures(artifacts: Artifacts, robot: str, robots: Sequence[str]) -> Iterator[Picture]:
-    """The pictures of a robot in a recorded run; of another, what was detected first."""
+    """The pictures of a robot in a recorded run, or the picture of its first detection."""
     detection = artifacts.of(robot).detection
     for name, caption in _CAPTIONS.items():
         if (drawn := _drawn(artifacts, file_name(name, robot, robots))) is not None:
@@ -307,10 +307,10 @@ def _drawn(artifacts: Artifacts, name: str) -> bytes | None:
     return to_jpeg(read_picture(artifacts.drawn[name])) if name in artifacts.drawn else None
 
 
-def with_found_out(
+def with_findings(
     report: RunReport, knowledge: Knowledge, result: RunResult, artifacts: Artifacts, events: Sequence[Event]
 ) -> RunReport:
-    """The report with what all missions of the run found out and said, in order, and what they saw."""
+    """The report with the answers and the speech of all missions in order, and the objects that they saw."""
     results = [each for robot in result.robots for each in (*robot.preempting, robot)]
     parts = [part for tree in result.trees.values() for part in tree.parts]
     findings = sorted((one for each in results for one in each.findings), key=lambda one: one.t_s)
@@ -324,7 +324,7 @@ def with_found_out(
 
 
 def _answer(finding: Finding, parts: Sequence[StepPart], artifacts: Artifacts) -> ReportedAnswer:
-    """A finding with the place of the command to which its node belongs, and its picture."""
+    """A finding with its picture and the place of its command."""
     path_id = finding.path_id
     commands = (part.command for part in parts if f"{path_id}/".startswith(f"{part.path_id}/"))
     return ReportedAnswer(
@@ -338,7 +338,7 @@ def _answer(finding: Finding, parts: Sequence[StepPart], artifacts: Artifacts) -
 
 
 def _object(seen: ObjectObservation, knowledge: Knowledge) -> ReportedObject:
-    """An object that was seen, with the room that it is in."""
+    """An object that was seen, with its room."""
     x_m, y_m, _ = seen.position_W
     rooms = (name for name, room in knowledge.places.items() if inside(room.polygon, (x_m, y_m)))
     place = knowledge.room(seen.surface) if seen.surface in knowledge.surfaces else next(rooms, None)

@@ -1,4 +1,4 @@
-"""Tells the page what a run does between its log entries: how far it is, and what its control says."""
+"""Sends the page what a run does not log: its progress, and the state of its control."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ _LOOK_AGAIN_S: Final = 0.5
 
 
 class ProgressWatch(RunVisitor):
-    """Tells a few times a second what is done just now, and lets the page keep up."""
+    """Sends the progress a few times a second, and lets the page keep up."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
-        self._told_s = 0.0
+        self._sent_s = 0.0
 
     def tick(self, progress: Progress) -> None:
-        """Tell it when it is time again; wait a moment for what was logged to be sent."""
+        """Sends the progress if it is time again; waits a moment until the page has all messages."""
         now = time.perf_counter()
-        if now - self._told_s >= PROGRESS_PERIOD_S:
-            self._told_s = now
-            self._feed.tell("progress", progress_word(progress))
+        if now - self._sent_s >= PROGRESS_PERIOD_S:
+            self._sent_s = now
+            self._feed.tell("progress", progress_json(progress))
         self._feed.wait_sent(SEND_LIMIT_S)
 
 
-def progress_word(progress: Progress) -> Mapping[str, Any]:
-    """For each robot what runs: its deepest running node, the sentence, and how far it is (0 to 1) where known."""
+def progress_json(progress: Progress) -> Mapping[str, Any]:
+    """For each robot its deepest running node, with message and progress (0 to 1)."""
     robots = {name: _doing(states) for name, states in progress.states.items()}
     word = {"now_s": round(progress.now_s, 3), "ticks": progress.ticks, "overruns": progress.overruns}
     return {**word, "robots": robots}
@@ -50,7 +50,7 @@ def _doing(states: Snapshot) -> Mapping[str, Any]:
 
 
 class ControlWatch:
-    """Tells each new state of a control, from a thread of its own, until the run has ended or `close`."""
+    """Sends each new state of a control, in a thread of its own, until the run ends or `close`."""
 
     def __init__(self, control: Control, feed: Feed) -> None:
         self._control, self._feed = control, feed
@@ -59,7 +59,7 @@ class ControlWatch:
         self._thread.start()
 
     def close(self) -> None:
-        """Tell no more; idempotent."""
+        """Stops sending; idempotent."""
         self._closing.set()
         self._thread.join(2 * _LOOK_AGAIN_S)
 

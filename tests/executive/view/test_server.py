@@ -17,7 +17,7 @@ from executive.tree.snapshot import NodeState
 from executive.view.actions import RefusedError, control_actions, control_json, text_of
 from executive.view.feed import Feed
 from executive.view.server import PageContent, PageServer
-from executive.view.watch import ControlWatch, progress_word
+from executive.view.watch import ControlWatch, progress_json
 from skills.api import Question
 from tests.hostile_values import DATA
 
@@ -182,7 +182,7 @@ def test_the_page_gets_the_mode_and_the_questions_of_each_robot(clock, compiled,
 
 def test_the_page_gets_the_progress_of_each_robot():
     running = {"a/go": NodeState(Status.RUNNING, None, "half way", progress=0.5), "a": NodeState(Status.SUCCESS)}
-    word = progress_word(Progress(2.0, 40, 0, {"Alice": running, "Bob": {"b": NodeState()}}))
+    word = progress_json(Progress(2.0, 40, 0, {"Alice": running, "Bob": {"b": NodeState()}}))
     assert word["robots"] == {
         "Alice": {"node": "a/go", "message": "half way", "progress": 0.5},
         "Bob": {"node": None, "message": "", "progress": None},

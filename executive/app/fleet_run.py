@@ -17,7 +17,7 @@ from executive.app.fleet import (
     missions_json,
     missions_message,
 )
-from executive.app.mission_run import opened_log, run_watched
+from executive.app.mission_run import open_log, run_watched
 from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.report import VERDICTS
@@ -56,7 +56,7 @@ def run_fleet(
     """
     backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
     limit_s = TIME_LIMIT_S * max(1, len(dispatch.missions)) if time_limit_s is None else time_limit_s
-    with opened_log(out / "log.mcap", backend, first, page, apart=True) as log:
+    with open_log(out / "log.mcap", backend, first, page, apart=True) as log:
         dispatch.log = log
         with ended_by_signals(dispatch.stop):
             result = run_watched(

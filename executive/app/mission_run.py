@@ -44,7 +44,7 @@ from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path
 from skills.robot import Pose2D, Robot
 
-__all__ = ["Finished", "entry_for", "opened_log", "return_memory", "robot_report", "run_request", "run_watched"]
+__all__ = ["Finished", "entry_for", "open_log", "return_memory", "robot_report", "run_request", "run_watched"]
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def run_request(
     entries = [entry_for(each, backend, durable) for each in prepared.all]
     spare = _spare(prepared, backend)
     path, artifacts = out / ("log.mcap" if durable is None else durable.log), Artifacts()
-    with opened_log(path, backend, prepared, page, apart=prepared.several) as log:
+    with open_log(path, backend, prepared, page, apart=prepared.several) as log:
         world, seed = prepared.world.name, prepared.request.seed
         kinds = {name: robot.kind for name, robot in prepared.robots.items()} if prepared.several else {}
         for each in prepared.all:
@@ -108,7 +108,7 @@ def run_request(
 
 
 @contextmanager
-def opened_log(
+def open_log(
     path: Path, backend: Backend, first: Prepared | None, page: PageView | None, *, apart: bool
 ) -> Iterator[EventLog]:
     """The log of a run, which a page serves from its beginning, and which begins with the map that `first` knows."""

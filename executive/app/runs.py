@@ -36,8 +36,8 @@ __all__ = [
     "Screen",
     "Waiting",
     "broken_off",
-    "noted",
-    "queued",
+    "note_run",
+    "queued_missions",
     "resumable_line",
     "run_in_turn",
 ]
@@ -115,7 +115,7 @@ def run_in_turn(missions: Iterable[StoredMission], runner: Runner, *, until_canc
     return ended
 
 
-def queued(missions: MissionStore) -> Iterator[StoredMission]:
+def queued_missions(missions: MissionStore) -> Iterator[StoredMission]:
     """The missions that are queued, each as it comes to its turn.
 
     Raises InputError: one was broken off before, and waits to be taken up.
@@ -213,15 +213,15 @@ class MissionRuns:
         else:
             if begun:
                 self._screen.tell(f"Mission {mission.id} ({name}) had not begun; it begins now.")
-            prepared, durable = self._begun(mission, prepared)
-        report = self._shown(mission, prepared, durable)
+            prepared, durable = self._begin(mission, prepared)
+        report = self._show(mission, prepared, durable)
         past = None if taken is None else taken.told
         if past is not None:
             self._screen.tell("\n  ".join(["What became of its past:", *past]))
         self._screen.name_files(prepared.request.out)
         return Ended(mission.id, report.outcome, report.achieved, report.message, report, past)
 
-    def _begun(self, mission: StoredMission, prepared: Prepared | None) -> tuple[Prepared, Durable]:
+    def _begin(self, mission: StoredMission, prepared: Prepared | None) -> tuple[Prepared, Durable]:
         """A mission from its beginning. Raises InputError: its file, its world or the plant's state cannot be used."""
         if prepared is None:
             asked = as_it_was(mission, self._missions.path)
@@ -241,13 +241,13 @@ class MissionRuns:
         plant = plant_file(self._missions)
         return last if plant.with_name(f"{plant.name}.a").exists() else None
 
-    def _shown(self, mission: StoredMission, prepared: Prepared, durable: Durable) -> RunReport:
+    def _show(self, mission: StoredMission, prepared: Prepared, durable: Durable) -> RunReport:
         """Run a mission, shown; its report, which is noted in the store."""
         control = self._control = self._screen.control(prepared)
         if self._cancelled is not None:
             control.cancel(self._cancelled)
         try:
-            with noted(self._missions, mission) as ended:
+            with note_run(self._missions, mission) as ended:
                 start = partial(self._run_prepared, prepared, durable=durable)
                 report = self._screen.show(prepared, control, start).report
                 ended(report)
@@ -257,7 +257,7 @@ class MissionRuns:
 
 
 @contextmanager
-def noted(missions: MissionStore, mission: StoredMission) -> Iterator[Callable[[RunReport], None]]:
+def note_run(missions: MissionStore, mission: StoredMission) -> Iterator[Callable[[RunReport], None]]:
     """Note in the store that a mission is under way, and, when told the report, how it ended.
 
     A run that could not begin leaves things as they were; of one that is killed, or breaks off since the disk is full,
@@ -373,10 +373,10 @@ class QueueServer:
             if each.starts >= MOST_STARTS
         ]
         again = [each for each in broken if each.starts < MOST_STARTS]
-        coming = self._coming(again, serving_since, end=end, until_idle=until_idle)
+        coming = self._next_missions(again, serving_since, end=end, until_idle=until_idle)
         return [*aside, *run_in_turn(coming, self._runner, until_cancelled=False)]
 
-    def _coming(
+    def _next_missions(
         self, again: Sequence[StoredMission], serving_since: datetime, *, end: datetime | None, until_idle: bool
     ) -> Iterator[StoredMission]:
         """The missions that go on `again`, and then those that are queued, or that triggers queue."""

@@ -14,8 +14,15 @@ import typer
 
 from executive.cli.number_options import quantity_option
 from executive.cli.options import ANYWAY, AS_JSON, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, refusals, show_table
-from executive.cli.terminal import terminal_answerer
+from executive.cli.output import (
+    NOT_ACHIEVED,
+    console_for,
+    plain_lines,
+    print_json,
+    refusals,
+    show_table,
+    terminal_answerer,
+)
 from executive.mission.request import Request
 from skills.files.errors import InputError
 from skills.quantities import Count

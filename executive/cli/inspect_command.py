@@ -16,8 +16,7 @@ from rich.console import Console
 from rich.text import Text
 
 from executive.cli.number_options import quantity_option
-from executive.cli.output import console_for, refusals, show_table
-from executive.cli.terminal import terminal_answerer
+from executive.cli.output import console_for, refusals, show_table, terminal_answerer, write_text
 from executive.mission.request import Request
 from executive.record.history import History, read_history
 from executive.record.schemas import ERRORS
@@ -125,16 +124,9 @@ def replay(
         if html is not None:
             from executive.view.html import log_page
 
-            _write(html, log_page(history.events, recording))
+            write_text(html, log_page(history.events, recording))
             return
         _serve(history, recording, port, view_for)
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=path) from error
 
 
 def _serve(history: History, recording: Path | None, port: int, view_for_s: float | None) -> None:
@@ -196,7 +188,7 @@ def tree(
         if output is None:
             sys.stdout.write(text)
         else:
-            _write(output, text)
+            write_text(output, text)
 
 
 def _view(text: str | None, say: str | None, world: str | None, at_s: float | None, robot: str | None) -> NodeView:

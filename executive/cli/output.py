@@ -1,4 +1,4 @@
-"""Where the command line writes: people read the console, scripts the last line of standard output."""
+"""What the command line writes: people read the console, scripts the last line of standard output; what it asks."""
 
 from __future__ import annotations
 
@@ -7,15 +7,32 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
 from skills.files.errors import InputError
+from skills.files.texts import LONGEST_ANSWER, LONGEST_TEXT, plain_text
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
+
+    from executive.language.questions import Answerer, ClarifyingQuestion
+
+__all__ = [
+    "BAD_INPUT",
+    "NOT_ACHIEVED",
+    "ask_at_terminal",
+    "console_for",
+    "plain_lines",
+    "print_json",
+    "refusals",
+    "show_table",
+    "terminal_answerer",
+    "write_text",
+]
 
 NOT_ACHIEVED = 1
 BAD_INPUT = 2
@@ -79,3 +96,28 @@ def refusals() -> Iterator[None]:
         )
         typer.echo(f"errand: {refused}", err=True)
         raise typer.Exit(BAD_INPUT) from error
+
+
+def write_text(file: Path, text: str) -> None:
+    """Writes a file that the user names. Raises InputError: it cannot be written."""
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=file) from error
+
+
+def terminal_answerer() -> Answerer | None:
+    """Who answers questions at the terminal; None where nobody sits there, as in scripts."""
+    somebody = sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
+    return ask_at_terminal if somebody else None
+
+
+def ask_at_terminal(question: ClarifyingQuestion) -> str | None:
+    """Put a question to who sits at the terminal; None for an empty line or the end of the input."""
+    numbers = "  ".join(f"[{number}] {name}" for number, name in enumerate(question.candidates, start=1))
+    typer.echo(f"? {question.text}  {numbers}".rstrip(), err=True)
+    try:
+        line = sys.stdin.readline(LONGEST_TEXT)
+        return plain_text(line, what="the answer", longest=LONGEST_ANSWER) or None
+    except (OSError, UnicodeDecodeError):
+        return None

@@ -15,8 +15,7 @@ from executive.app.prepare import prepare
 from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON, QUIET, STORE, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
-from executive.cli.terminal import terminal_answerer
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table, terminal_answerer
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
@@ -130,13 +129,13 @@ def run(
     as_json: AS_JSON = False,
 ) -> None:
     """Run all that is queued, each mission in the world as the one before has left it."""
-    from executive.app.runs import MissionRuns, queued, resumable_line, run_in_turn
+    from executive.app.runs import MissionRuns, queued_missions, resumable_line, run_in_turn
     from executive.cli.screen import ConsoleScreen
 
     console = console_for(as_json)
     with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
         runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
-        ended = run_in_turn(queued(missions), runs)
+        ended = run_in_turn(queued_missions(missions), runs)
         resumable = resumable_line(missions)
     if ended:
         console.print(f"{sum(each.achieved for each in ended)} of {len(ended)} missions achieved")
@@ -266,12 +265,12 @@ def resume(
     """Go on with the mission that was broken off or cancelled, from its last finished step; then with its queue."""
     console = console_for(as_json)
     with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
-        from executive.app.runs import MissionRuns, queued, run_in_turn
+        from executive.app.runs import MissionRuns, queued_missions, run_in_turn
         from executive.cli.screen import ConsoleScreen
 
         chosen = _broken_off(missions, mission)
         runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
-        ended = [runs.run(chosen), *(run_in_turn(queued(missions), runs) if chosen.queued else ())]
+        ended = [runs.run(chosen), *(run_in_turn(queued_missions(missions), runs) if chosen.queued else ())]
     if as_json:
         print_json({**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]})
     if not all(each.achieved for each in ended):

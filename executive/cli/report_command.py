@@ -30,7 +30,7 @@ from executive.app.evaluate.summary import (
     totals_of,
 )
 from executive.cli.options import AS_JSON, request_arguments
-from executive.cli.output import console_for, print_json, refusals, show_table
+from executive.cli.output import console_for, print_json, refusals, show_table, write_text
 from skills.files.errors import InputError
 
 __all__ = ["report", "show_cases", "standings_json"]
@@ -59,7 +59,7 @@ def report(
             name = "" if against is None else str(against)
             repeats = partial(_repeats, logs=about.get("logs"))
             page = EvaluationPage(title, facts, cases, kept.evidence, repeats, other, name)
-            _write(html, to_page(page))
+            write_text(html, to_page(page))
             console.print(f"Written: {html}", markup=False)
         if as_json:
             print_json(_json(about, cases, other))
@@ -97,13 +97,6 @@ def _show(console: Console, cases: Sequence[Case], other: Sequence[Case] | None,
         console.print(
             f"{label_of(found.dimension, found.name)}: {here} against {there}, p {found.p:.3g} ({test})", markup=False
         )
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=path) from error
 
 
 def _json(about: Mapping[str, str], cases: Sequence[Case], other: Sequence[Case] | None) -> dict[str, Any]:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from executive.cli.options import ANYWAY, AS_JSON, QUIET, STORE, VIEW, VIEW_FOR, VIEW_PORT, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, refusals
-from executive.cli.terminal import terminal_answerer
+from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, refusals, terminal_answerer
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.request import Request
 

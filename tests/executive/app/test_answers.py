@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from executive.app.prepare import prepare
 from executive.cli import entry
-from executive.cli.terminal import ask_at_terminal
+from executive.cli.output import ask_at_terminal
 from executive.language.questions import ClarifyingQuestion, Slot
 from executive.mission.request import Request
 from executive.words.mission import QuestionPolicy

@@ -33,7 +33,7 @@ RUN = """
     from scripted_backend import ScriptedBackend
     from executive.cli import screen
     from executive.app import prepare as preparing
-    from executive.app.runs import noted
+    from executive.app.runs import note_run
     from executive.app.mission_run import run_request
     from executive.app.prepare import prepare
     from executive.mission.request import Request
@@ -55,7 +55,7 @@ RUN = """
 
     with MissionStore(out / "missions.sqlite") as store:
         mission = store.add(prepared.request, queued=False)
-        with noted(store, mission) as ended:
+        with note_run(store, mission) as ended:
             console = Console()
             control = screen.control_for(console, quiet=False)
             finished = screen.show_run(start, prepared, console, control=control, quiet=False)

@@ -8,7 +8,7 @@ import typer
 
 from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
-from executive.app.runs import noted
+from executive.app.runs import note_run
 from executive.cli.output import refusals
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
@@ -41,7 +41,7 @@ def filling(monkeypatch):
 
 def run_kept(prepared, store, backend, ending=None):
     mission = store.add(prepared.request, queued=False)
-    with refusals(), noted(store, mission) as ended:
+    with refusals(), note_run(store, mission) as ended:
         finished = run_request(prepared, backend)
         if ending is not None:
             ending()

@@ -152,8 +152,13 @@ def _opens(text: str) -> bool:
 
 
 def _kind(text: str) -> tuple[Cue, str] | None:
-    found = ((kind, match) for kind, each in _kinds() if (match := each.match(text)) is not None)
-    return next(((kind, match[0]) for kind, match in found), None)
+    """The cue that a clause begins with; a whole one ("if not") ends where a clause can begin."""
+    for kind, form in _kinds():
+        match = form.match(text)
+        behind_it = None if match is None or kind not in _WHOLE else _NEXT.match(text, match.end())
+        if match is not None and (behind_it is None or behind_it[1].lower() in _verbs() | _SMALL):
+            return kind, match[0]
+    return None
 
 
 def behind(text: str) -> Behind | None:
@@ -192,14 +197,8 @@ def _verbs() -> frozenset[str]:
 
 @cache
 def _kinds() -> tuple[tuple[Cue, re.Pattern[str]], ...]:
-    verbs = "|".join(sorted(_verbs(), key=len, reverse=True))
-    ends = rf"(?=\s*(?:$|[,;:]|\b(?:then|please|just|{verbs})\b))"
-    closed, table = {Cue.FAILED, Cue.SO, Cue.NOT}, read_table("structures.yaml")["kinds"]
-    return tuple(
-        (kind, CLAUSES.compiled(rf"{text}(?![\w']){ends if kind in closed else ''}"))
-        for kind in Cue
-        for text in table[kind.value]
-    )
+    table = read_table("structures.yaml")["kinds"]
+    return tuple((kind, CLAUSES.compiled(rf"{text}(?![\w'])")) for kind in Cue for text in table[kind.value])
 
 
 @cache
@@ -207,6 +206,9 @@ def _behind() -> tuple[tuple[str, re.Pattern[str]], ...]:
     return CLAUSES.mapping("behind")
 
 
+_WHOLE: Final = frozenset({Cue.FAILED, Cue.SO, Cue.NOT})
+_NEXT: Final = re.compile(r"\s*([^\s,;:]\w*)")
+_SMALL: Final = frozenset({"then", "please", "just"})
 _ONE_VERB: Final = re.compile(r"(?:^|[\s,])(?:go|come|run|say)$", re.IGNORECASE)
 """Behind these "and" and "please" join no other clause: "go and charge"."""
 _ELSE: Final = re.compile(r"(?:or )?(?:else|otherwise)\b", re.IGNORECASE)

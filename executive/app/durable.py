@@ -11,14 +11,12 @@ from typing import Final
 from executive.app.prepare import Setting, prepare
 from executive.app.prepared import Prepared, compiled_request
 from executive.language.questions import Answerer
-from executive.mission.request import Request
 from executive.record.reader import Event, read_events
 from executive.record.schemas import RUN
 from executive.store.journal import StoreJournal
 from executive.store.memory import Recollection
 from executive.store.missions import MissionStore, StoredMission
 from executive.store.resuming import ended_tree, resumed_tree
-from executive.words.slug import slug
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
@@ -111,7 +109,7 @@ def take_up(store: MissionStore, mission: StoredMission, *, ask: Answerer | None
     Raises:
         InputError: what the store knows of it cannot be read, or its tree is no longer the one that was begun.
     """
-    prepared = prepare(as_it_was(mission, store.path), ask=ask)
+    prepared = prepare(mission.request, ask=ask)
     if prepared.request.fingerprint != mission.request.fingerprint:
         raise _other_version(store, mission)
     every = [_with_replacement(store, mission, each) for each in prepared.all]
@@ -175,28 +173,3 @@ def mission_events(log: Path) -> tuple[Event, ...]:
 def _facts(events: Sequence[Event]) -> object:
     """What a log says at its beginning: the commands, the world, the seed."""
     return next((event.data for event in events if event.topic == RUN), None)
-
-
-def as_it_was(mission: StoredMission, store: Path) -> Request:
-    """What was asked for then. A file that has changed since is taken as it was.
-
-    Raises:
-        InputError: the file has changed, and its old text cannot be laid beside it.
-    """
-    file, text = mission.request.file, mission.request.text
-    if file is None or text is None or _text(file) == text:
-        return mission.request
-    file = file.with_name(f".{slug(file.stem)}.mission-{mission.id}{file.suffix[:8]}")
-    try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        what = f"the file of mission {mission.id} has changed, and its old text cannot be laid beside it"
-        raise InputError(f"{what} ({error.strerror})", hint="put the old file back", file=file) from error
-    return replace(mission.request, file=file)
-
-
-def _text(file: Path) -> str | None:
-    try:
-        return file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return None

@@ -11,7 +11,6 @@ import numpy as np
 from py_trees.common import Status
 
 from executive.app.auction import Bid
-from executive.app.durable import as_it_was
 from executive.app.feasibility import check_prepared, route_planner_of
 from executive.app.goal_conditions import Share
 from executive.app.prepare import Setting, prepare_alone
@@ -98,7 +97,6 @@ class RobotNow:
 
 
 def fleet_mission(
-    store: MissionStore,
     stored: StoredMission,
     *,
     world: World,
@@ -108,7 +106,7 @@ def fleet_mission(
 ) -> FleetMission:
     """A mission of the store for these robots. Raises InputError, which names the mission: it is for none of them."""
     try:
-        options = _options(store, stored, world, knowledge, robots)
+        options = _options(stored, world, knowledge, robots)
         return FleetMission(stored, {name: rest_of(each, done) for name, each in options.items()}, done)
     except InputError as error:
         what = f"mission {stored.id} ({stored.request.name}): {error.message}"
@@ -116,7 +114,6 @@ def fleet_mission(
 
 
 def _options(
-    store: MissionStore,
     stored: StoredMission,
     world: World,
     knowledge: Knowledge,
@@ -131,7 +128,7 @@ def _options(
         meant = setting.understood()
         meanings = [part.meaning for part in meant.parts]
         return {name: setting.part(name, meanings) for name in _named(meant.parts, robots)}
-    alone = prepare_alone(as_it_was(stored, store.path))
+    alone = prepare_alone(request)
     if alone.world.seed_rules != world.seed_rules:
         raise InputError("its file brings objects into the world", hint="run it by `errand run`")
     setting = Setting(alone.request, world, _patient(alone.knowledge), robots)

@@ -105,7 +105,6 @@ def simulated_fleet(
     for each in queued:
         try:
             missions[each.id] = fleet_mission(
-                store,
                 replace(each, request=replace(each.request, seed=seed)),
                 world=where,
                 knowledge=knowledge,

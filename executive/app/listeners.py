@@ -16,7 +16,6 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Final
 
-from executive.app.durable import as_it_was
 from executive.app.feasibility import refuse_impossible
 from executive.app.prepare import prepare
 from executive.mission.parameters import values_in_json
@@ -199,7 +198,7 @@ class TriggerCalls:
                 chosen = [each for each in standing.missions() if each.trigger == trigger]
                 if not chosen:
                     raise CallError(HTTPStatus.NOT_FOUND, f"no standing mission waits for '{trigger}'")
-                fired = standing.fire([(each, _request(store, each, body)) for each in chosen], "")
+                fired = standing.fire([(each, _request(each, body)) for each in chosen], "")
         except TooManyError as error:
             raise CallError(HTTPStatus.TOO_MANY_REQUESTS, str(error)) from error
         except InputError as error:
@@ -215,19 +214,17 @@ class TriggerCalls:
         return fired
 
 
-def _request(store: MissionStore, standing: StandingMission, body: bytes) -> Request:
+def _request(standing: StandingMission, body: bytes) -> Request:
     """The request of a standing mission, checked with the values in a body. Raises CallError, InputError."""
-    mission = store.mission(standing.id)
     try:
         values = values_in_json(body)
         if not values:
             return standing.request
-        before = as_it_was(mission, store.path)
-        prepared = prepare(replace(before, given={**before.given, **values}))
+        prepared = prepare(replace(standing.request, given={**standing.request.given, **values}))
         refuse_impossible(prepared)
     except InputError as error:
         raise CallError(HTTPStatus.BAD_REQUEST, str(error)) from error
-    return replace(prepared.request.from_anywhere(), file=standing.request.file)
+    return prepared.request.from_anywhere()
 
 
 _FORM: Final = re.compile(r"[A-Za-z0-9._~+/=-]{8,512}")

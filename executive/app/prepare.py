@@ -150,8 +150,8 @@ class Setting:
         answer = self.answerer(self.request.questions or loaded.questions)
         mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
         world = _with_people(loaded, _with_objects(loaded, self.world, knowledge), knowledge)
-        file = self.request.file
-        text = None if file is None else file.read_text(encoding="utf-8")
+        file, text = self.request.file, self.request.text
+        text = file.read_text(encoding="utf-8") if text is None and file is not None else text
         own = replace(self, request=replace(self.request, text=text), world=world, knowledge=knowledge)
         return own.compiled(mission)
 
@@ -178,7 +178,7 @@ def _opened(request: Request) -> tuple[Request, Mission | None, World, Knowledge
     loaded = None
     if request.file is not None:
         file = mission_file(request.file)
-        request, loaded = replace(request, file=file), load_mission(file, request.given)
+        request, loaded = replace(request, file=file), load_mission(file, request.given, request.text)
     if request.world is not None or loaded is None:
         world = open_world(request.world or request.world_name or DEFAULT_WORLD)
     else:

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from executive.app.durable import Durable, as_it_was, new_run, next_run, plant_file, same_world, take_up
+from executive.app.durable import Durable, new_run, next_run, plant_file, same_world, take_up
 from executive.app.mission_run import Finished, return_memory
 from executive.app.prepare import prepare
 from executive.app.prepared import Prepared
@@ -224,8 +224,7 @@ class MissionRuns:
     def _begin(self, mission: StoredMission, prepared: Prepared | None) -> tuple[Prepared, Durable]:
         """A mission from its beginning. Raises InputError: its file, its world or the plant's state cannot be used."""
         if prepared is None:
-            asked = as_it_was(mission, self._missions.path)
-            prepared = _in_its_folder(mission, prepare(asked, ask=self._ask))
+            prepared = _in_its_folder(mission, prepare(mission.request, ask=self._ask))
             self._screen.tell(f"Mission {mission.id}: {mission.request.name}", title=True)
         before = self._before(mission) if mission.queued else None
         if before is None:

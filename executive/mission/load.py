@@ -15,7 +15,7 @@ from executive.words.mission import Mission, Stop
 from executive.words.steps import Place, Step
 from skills.files.errors import Problems, suggestion
 from skills.files.schema import validate
-from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
+from skills.files.yaml_source import KeyPath, YamlSource, parse_yaml, read_yaml
 
 __all__ = ["for_robot", "import_folders", "load_mission", "locate", "overridden", "routes_in"]
 
@@ -24,13 +24,14 @@ _KEY: Final = "knowledge"
 _ROBOTS: Final = "robots"
 
 
-def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN) -> Mission:
-    """Reads a mission file and puts its parameters in.
+def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN, text: str | None = None) -> Mission:
+    """Reads a mission file, or the `text` that it had, and puts its parameters in.
 
     Raises:
         InputError: with file, line and hint, for broken YAML, unknown keys, wrong values and unknown parameters.
     """
-    document = with_parameters(read_yaml(path), parameters)
+    source = read_yaml(path) if text is None else parse_yaml(text, Path(path))
+    document = with_parameters(source, parameters)
     mission = validate(Mission, document).read_from(document)
     locate(mission, document, ())
     return mission

@@ -48,10 +48,10 @@ class Talk(RunVisitor):
         for name, (_, conversation) in self._each.items():
             conversation.listen(partial(listener, name))
 
-    def begun(self) -> None:
+    def set_missions(self) -> None:
         """The run begins with the missions that were asked for: they can be corrected, and spoken of."""
         for prepared, conversation in self._each.values():
-            conversation.begun(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
+            conversation.set_mission(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
 
     def tick(self, progress: Progress) -> None:
         """See how far the run is."""

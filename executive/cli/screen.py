@@ -106,7 +106,7 @@ def show_run(
         for command in each.mission.commands:
             console.print(f"{to}{command}", markup=False)
     elsewhere, talk = talk is not None, talk or Talk(prepared, control)
-    talk.begun()
+    talk.set_missions()
     speech = HeardSpeech(console, voice, quiet)
     if quiet:
         if not elsewhere:

@@ -1,4 +1,4 @@
-"""What a conversation is made of: how sentences become missions, and replies."""
+"""Parts of a conversation: how sentences become missions, and replies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.steps import Step
 
-__all__ = ["NEVER_MIND", "OVER", "Reply", "ReplyKind", "Speech", "Waiting", "answer", "done", "refused"]
+__all__ = ["NEVER_MIND", "OVER", "Reply", "ReplyKind", "Speech", "Waiting", "answer", "confirmation", "refusal"]
 
 OVER: Final = "the run is over; begin another with 'errand run'"
 NEVER_MIND: Final = "all right, never mind"
@@ -36,18 +36,18 @@ class Speech:
 
 
 class ReplyKind(enum.Enum):
-    """What became of what was said."""
+    """Kind of a reply."""
 
-    DONE = "done"  # it is done, or begun
+    DONE = "done"  # the robot does it
     ANSWER = "answer"  # it was a question to the robot
     QUESTION = "question"  # the robot asks back
-    REFUSED = "refused"  # it cannot be done; the text says why
-    IGNORED = "ignored"  # it was not said to this robot
+    REFUSED = "refused"  # the robot cannot do it; the text says why
+    IGNORED = "ignored"  # the sentence was for another robot
 
 
 @dataclass(frozen=True)
 class Reply:
-    """What the robot says, in one line, and the commands that it begins with or the question that it asks."""
+    """A reply in one line, with the commands that the robot starts or the question that it asks."""
 
     kind: ReplyKind
     text: str
@@ -57,22 +57,22 @@ class Reply:
 
 @dataclass(frozen=True)
 class Waiting:
-    """A question of the robot that waits for its answer until `until_s` (robot's clock)."""
+    """A question of the robot that waits for an answer until `until_s` (robot's clock)."""
 
     question: ClarifyingQuestion
     until_s: float
 
 
 def answer(text: str) -> Reply:
-    """An answer to what was asked."""
+    """A reply that answers a question."""
     return Reply(ReplyKind.ANSWER, text)
 
 
-def done(text: str) -> Reply:
-    """It is done."""
+def confirmation(text: str) -> Reply:
+    """A reply that says what the robot does."""
     return Reply(ReplyKind.DONE, text)
 
 
-def refused(text: str) -> Reply:
-    """It cannot be done."""
+def refusal(text: str) -> Reply:
+    """A reply that says why the robot cannot do it."""
     return Reply(ReplyKind.REFUSED, text)

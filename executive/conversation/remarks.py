@@ -8,7 +8,7 @@ from typing import Final
 
 from py_trees.common import Status
 
-from executive.conversation.parts import OVER, Reply, Speech, answer, done, refused
+from executive.conversation.parts import OVER, Reply, Speech, answer, confirmation, refusal
 from executive.language.followups import Remark
 from executive.language.grounding import known_line
 from executive.run.control import Control, ControlState, Mode, RobotMode
@@ -29,9 +29,9 @@ _HELD: Final = frozenset({Mode.PAUSED, Mode.STOPPED, Mode.LEASE_LOST})
 
 
 class RemarkAnswers:
-    """Stops, holds, goes on, cancels, and tells where the robot is and what it does. `progress` is the latest.
+    """Stops, pauses, resumes or cancels the robot, and says where it is and what it does.
 
-    In a run with several robots, only the one that is spoken to.
+    Of several robots, only the one that is addressed. `progress` is the latest of the run.
     """
 
     def __init__(self, speech: Speech, control: Control) -> None:
@@ -50,40 +50,40 @@ class RemarkAnswers:
             }
         )
 
-    def to(self, remark: Remark) -> Reply:
-        """Do what a remark asks for."""
+    def answer_to(self, remark: Remark) -> Reply:
+        """Carries out a remark; its reply."""
         acts = remark in (Remark.STOP, Remark.WAIT, Remark.GO_ON, Remark.CANCEL)
         if acts and self._control.state.mode is Mode.ENDED:
-            return refused(OVER)
+            return refusal(OVER)
         return self._answers[remark]()
 
     def _stop(self) -> Reply:
         self._control.stop_button(_TOLD_TO_STOP, robot=self._one)
-        return done("I stand still; say 'go on' when I may move again")
+        return confirmation("I stand still; say 'go on' when I may move again")
 
     def _wait(self) -> Reply:
         self._control.pause("told to wait", robot=self._one)
-        return done("I wait; say 'go on' when I may go on")
+        return confirmation("I wait; say 'go on' when I may go on")
 
     def _go_on(self) -> Reply:
         state, one = self._control.state, self._one
         now = RobotMode(state.mode, state.reason) if one is None else state.robots[one]
         if now.mode is Mode.STOPPED and now.reason != _TOLD_TO_STOP:
-            return refused(f"{now.reason}; release it where it was pressed")
+            return refusal(f"{now.reason}; release it where it was pressed")
         held = now.mode in (Mode.STOPPED, Mode.PAUSED)
         self._control.release_stop_button(robot=one)
         self._control.resume(robot=one)
         if one is not None and (still := self._control.state.robots[one]).mode in (Mode.STOPPED, Mode.PAUSED):
-            return refused(f"{still.reason}, as all robots are; say so to all of them")
-        return done("I go on" if held else "I am under way")
+            return refusal(f"{still.reason}, as all robots are; say so to all of them")
+        return confirmation("I go on" if held else "I am under way")
 
     def _cancel(self) -> Reply:
         self._control.cancel("told to cancel", robot=self._one)
-        return done("I give it up and stop")
+        return confirmation("I give it up and stop")
 
     @property
     def _one(self) -> str | None:
-        """The robot, where there are several; None: all that there are."""
+        """The robot's name if there are several; None for the only one."""
         return self._speech.robot_name if len(self._control.state.missions) > 1 else None
 
     def _where(self) -> Reply:
@@ -94,7 +94,7 @@ class RemarkAnswers:
 
 
 def place_in_words(pose: Pose2D | None, knowledge: Knowledge) -> str:
-    """Where a pose (world frame) is: the room, and the surface next to it; None is a robot that is lost."""
+    """The room of a pose (world frame) and the surface next to it. None stands for a robot that is lost."""
     if pose is None:
         return "I do not know where I am; I am looking for my place"
     here = (pose.x_m, pose.y_m)
@@ -110,7 +110,7 @@ def place_in_words(pose: Pose2D | None, knowledge: Knowledge) -> str:
 
 
 def doing_in_words(progress: Progress | None, state: ControlState, robot_name: str) -> str:
-    """What the robot does just now: the mission, its step, and why it stands still when it does."""
+    """The robot's mission, its step, and why it stands still if it does."""
     if state.mode is Mode.ENDED:
         return "I have nothing to do; the mission is over"
     tree = None if progress is None else progress.trees.get(robot_name)
@@ -128,7 +128,7 @@ def doing_in_words(progress: Progress | None, state: ControlState, robot_name: s
 
 
 def _step(states: Snapshot) -> str:
-    """The deepest node that runs, with its sentence."""
+    """The deepest running node, with its message."""
     running = [(path_id, node) for path_id, node in states.items() if node.status is Status.RUNNING]
     if not running:
         return ""
@@ -138,7 +138,7 @@ def _step(states: Snapshot) -> str:
 
 
 def _last_failure(states: Snapshot) -> str:
-    """The last skill that failed, and why."""
+    """The last skill that failed, with its cause and message."""
     failed = [(path_id, node) for path_id, node in states.items() if _has_failed(node)]
     if not failed:
         return ""

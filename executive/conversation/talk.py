@@ -1,4 +1,4 @@
-"""The conversation itself: to whom something is said, what it goes on from, and what is begun by it."""
+"""Conversation with a robot during a run: addressing, follow-ups, questions, and missions."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from executive.conversation.parts import (
     Speech,
     Waiting,
     answer,
-    done,
-    refused,
+    confirmation,
+    refusal,
 )
 from executive.conversation.remarks import RemarkAnswers
 from executive.language.followups import (
@@ -82,9 +82,9 @@ class _When(enum.Enum):
 
 
 class Conversation(RunVisitor):
-    """What is said to one robot during a run. All methods may be called from any thread.
+    """Conversation with one robot during a run. All methods may be called from any thread.
 
-    With `require_wake` only what is said to the robot by its name counts, and answers to its questions.
+    With `require_wake` the robot hears only sentences with its name, and answers to its questions.
     """
 
     def __init__(
@@ -102,11 +102,11 @@ class Conversation(RunVisitor):
         self._listeners: tuple[Callable[[Waiting | None], None], ...] = ()
 
     def listen(self, listener: Callable[[Waiting | None], None]) -> None:
-        """Call `listener` after all that is said with the question that then waits, or None."""
+        """Calls `listener` after each sentence with the open question, or None."""
         self._listeners = (*self._listeners, listener)
 
-    def begun(self, tree: CompiledTree, *, memory: Memory | None = None, now_s: float = 0.0) -> None:
-        """The run begins with a mission: it can be corrected, and spoken of, as any other."""
+    def set_mission(self, tree: CompiledTree, *, memory: Memory | None = None, now_s: float = 0.0) -> None:
+        """Sets the mission with which the run begins. Sentences may refer to it and correct it."""
         with self._lock:
             self._names |= {tree.mission_name}
             steps = tree.steps if any(step.is_block for step in tree.steps) else ()
@@ -120,7 +120,7 @@ class Conversation(RunVisitor):
             self._seen |= {tree.mission_name}
 
     def hear(self, text: str, now_s: float | None = None) -> Reply:
-        """Do what was said and say what became of it. `now_s` is the robot's clock; that of the run unless given.
+        """Carries out a sentence; the reply. `now_s` is the robot's clock, by default that of the run.
 
         Never raises on text.
         """
@@ -138,7 +138,7 @@ class Conversation(RunVisitor):
     # -- to whom -----------------------------------------------------------------------------------------------------
 
     def _addressed(self, text: str, now_s: float) -> tuple[str, Reply | None]:
-        """The text without the wake phrase, and why it is not for this robot."""
+        """The text without the wake phrase, and a reply if it is not for this robot."""
         name = self._speech.robot_name
         short = text[:_MOST_LETTERS]
         if not self._require_wake:
@@ -157,9 +157,9 @@ class Conversation(RunVisitor):
         remark = remark_of(text)
         if remark is Remark.CANCEL and self._waiting(now_s) is not None:
             self._open = None
-            return done(NEVER_MIND)
+            return confirmation(NEVER_MIND)
         if remark is not None:
-            return self._remarks.to(remark)
+            return self._remarks.answer_to(remark)
         for step in (self._answer_mission, self._answer_own, self._follow_up):
             reply = step(text, now_s)
             if reply is not None:
@@ -184,7 +184,7 @@ class Conversation(RunVisitor):
         if waiting is None:
             return None
         if text.strip(" .,!?").lower() in _NONE_OF_THEM:
-            return done(NEVER_MIND)
+            return confirmation(NEVER_MIND)
         whole = with_answer(waiting.sentence, waiting.question, text)
         reply = self._said(whole, now_s)
         if reply.kind is not ReplyKind.REFUSED:
@@ -215,14 +215,14 @@ class Conversation(RunVisitor):
         return self._speech.understand(text, None if last is None else last.memory or self._memory_of(last.commands))
 
     def _memory_of(self, commands: Sequence[Command]) -> Memory | None:
-        """What commands of a file speak of, as if somebody had said them."""
+        """The memory of a file's commands, as if somebody had said them."""
         thing = next((c.object or c.item for c in commands if c.object or c.item), None)
         goal = next((c.goal for c in reversed(commands) if c.goal not in (None, _START)), None)
         said = f"find the {thing}" if thing is not None else f"go to {goal}" if goal is not None else ""
         return self._speech.understand(said, None).memory if said else None
 
     def _request(self, text: str, now_s: float) -> Reply:
-        """A sentence that stands for itself."""
+        """Carries out a request that refers to no earlier one."""
         meant = self._understood(text, now_s)
         if meant.status is not Status.OK:
             return self._not_ok(meant, text, now_s)
@@ -240,10 +240,10 @@ class Conversation(RunVisitor):
     def _not_ok(self, meant: Understanding, text: str, now_s: float) -> Reply:
         if meant.question is not None:
             return self._ask(meant.question, text, now_s)
-        return refused(meant.reason or "I did not understand")
+        return refusal(meant.reason or "I did not understand")
 
     def _follow_up(self, text: str, now_s: float) -> Reply | None:
-        """A sentence that goes on from the one before, while that is remembered."""
+        """Carries out a follow-up to the last request, while that is remembered."""
         last, follow_up = self._remembered(now_s), follow_up_of(text)
         if follow_up is None or last is None or self._understood(text, now_s).steps:
             return None
@@ -256,17 +256,17 @@ class Conversation(RunVisitor):
         if whole.status is Status.OK:
             return self._begin(whole.commands, when, now_s, notes=whole.notes, memory=whole.memory, steps=whole.steps)
         if last.steps:
-            return refused("I cannot change a part of what decides, repeats or waits; say it anew")
+            return refusal("I cannot change a part of what decides, repeats or waits; say it again")
         named = self._named(follow_up, now_s)
         if isinstance(named, Understanding):
             return self._not_ok(named, text, now_s)
         changed = amended(last.commands, named, self._speech.knowledge)
         if changed == last.commands:
-            return refused(f"I do not see what '{follow_up.whole}' changes")
+            return refusal(f"I do not see what '{follow_up.whole}' changes")
         return self._begin(changed, when, now_s)
 
     def _named(self, follow_up: FollowUp, now_s: float) -> Amendment | Understanding:
-        """What a few words name, grounded as in a whole sentence; or why that is unclear."""
+        """What a few words name, grounded as in a whole sentence, or why that is unclear."""
         if follow_up.said.lower() in _COUNTS:
             return Amendment(count=_COUNTS[follow_up.said.lower()])
         said = follow_up.said if re.match(_DETERMINED, follow_up.said, re.IGNORECASE) else f"the {follow_up.said}"
@@ -285,7 +285,7 @@ class Conversation(RunVisitor):
         return next((each for each in both if each.status is Status.QUESTION), both[0])
 
     def _old_name(self, said: str, now_s: float) -> str | None:
-        """The known name that another takes the place of."""
+        """The known name that is replaced."""
         if not said:
             return None
         bare = re.sub(r"^(?:the|a|an|my|some)\s+", "", said, flags=re.IGNORECASE)
@@ -304,17 +304,17 @@ class Conversation(RunVisitor):
         memory: Memory | None = None,
         steps: tuple[Step, ...] = (),
     ) -> Reply:
-        """Have commands done, or steps that hold them, and remember them."""
+        """Starts a mission of commands, or of steps with them, and remembers it."""
         state = self._control.state
         if state.mode is Mode.ENDED:
-            return refused(OVER)
+            return refusal(OVER)
         todo = tuple(commands)
         if when is _When.INSTEAD and not steps:
             todo = without_fetching(todo, self._held(), self._speech.knowledge)
         try:
             tree = self._speech.compile(steps or steps_of_commands(todo), self._names)
         except InputError as error:
-            return refused(str(error))
+            return refusal(str(error))
         give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, self._replace)
         mode = state.robots.get(self._speech.robot_name, state).mode
         still = "; I stand still until you say 'go on'" if mode in (Mode.PAUSED, Mode.STOPPED) else ""
@@ -333,11 +333,11 @@ class Conversation(RunVisitor):
         try:
             act()
         except ValueError as error:
-            return refused(str(error))
+            return refusal(str(error))
         return Reply(ReplyKind.DONE, text, commands)
 
     def _can_be_changed(self, now_s: float) -> bool:
-        """Whether the last request is not done yet: it is under way, waits, or is about to begin."""
+        """Whether the last request is still running, waiting, or about to begin."""
         last, missions = self._remembered(now_s), self._control.state.missions.get(self._speech.robot_name, ())
         return last is not None and (last.mission in missions or last.mission not in self._seen)
 
@@ -346,7 +346,7 @@ class Conversation(RunVisitor):
         return bool({c.object or c.item for c in commands} & {c.object or c.item for c in last} - {None})
 
     def _held(self) -> Thing | None:
-        """The thing in the gripper, as far as the last request tells."""
+        """The object in the gripper, as far as the last request says."""
         status = None if self._progress is None else self._progress.robots.get(self._speech.robot_name)
         missions = self._control.state.missions.get(self._speech.robot_name, ())
         if status is None or not status.holding or self._last is None or self._last.mission not in missions[-1:]:

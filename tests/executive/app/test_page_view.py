@@ -29,7 +29,7 @@ def prepared():
 def page(prepared):
     page = PageView(prepared, lambda line: None)
     page.control.begin({"Alice": prepared.tree})
-    page.talk.begun()
+    page.talk.set_missions()
     yield page
     page.close()
 

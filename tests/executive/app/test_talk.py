@@ -30,7 +30,7 @@ def control(prepared):
 @pytest.fixture
 def talk(prepared, control):
     talk = Talk(prepared, control)
-    talk.begun()
+    talk.set_missions()
     return talk
 
 

@@ -42,7 +42,7 @@ def talk(speech, control):
         meant = speech.understand(sentence, None)
         tree = speech.compile(meant.steps or steps_of_commands(meant.commands), frozenset())
         control.begin({"Alice": tree})
-        conversation.begun(tree, memory=meant.memory)
+        conversation.set_mission(tree, memory=meant.memory)
         return conversation
 
     return begin

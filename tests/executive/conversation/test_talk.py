@@ -261,7 +261,7 @@ def compiling_talk(speech, control):
     conversation = Conversation(replace(speech, compile=compiled), control)
     tree = speech.compile([Do.of(Command(goal="kitchen"))], frozenset())
     control.begin({"Alice": tree})
-    conversation.begun(tree)
+    conversation.set_mission(tree)
     return conversation, asked
 
 
@@ -290,7 +290,7 @@ def test_a_part_of_it_cannot_be_changed(compiling_talk):
     conversation.hear("bring me a coke if there is one in the kitchen", 1.0)
     reply = conversation.hear("no, the beer", 2.0)
     assert reply.kind is ReplyKind.REFUSED
-    assert "say it anew" in reply.text
+    assert "say it again" in reply.text
 
 
 def test_a_corrected_mission_is_run_to_its_end(talk, speech, control, run_tree, compiled, script):
@@ -298,7 +298,7 @@ def test_a_corrected_mission_is_run_to_its_end(talk, speech, control, run_tree, 
     meant = speech.understand("fetch me a coke from the kitchen", None)
     tree = speech.compile(steps_of_commands(meant.commands), frozenset())
     conversation = Conversation(speech, control)
-    conversation.begun(tree, memory=meant.memory)
+    conversation.set_mission(tree, memory=meant.memory)
     said = {2: "where are you", 3: "what are you doing", 4: "no, go to the bathroom"}
     replies = []
 
@@ -319,7 +319,7 @@ def test_an_addition_is_corrected_while_it_waits(talk, speech, control, run_tree
     meant = speech.understand("go to the bedroom", None)
     tree = speech.compile(steps_of_commands(meant.commands), frozenset())
     conversation = Conversation(speech, control)
-    conversation.begun(tree, memory=meant.memory)
+    conversation.set_mission(tree, memory=meant.memory)
     said = {1: "and to the bathroom?", 2: "no, to the kitchen"}
 
     def observe(progress):
@@ -336,7 +336,7 @@ def test_what_is_held_is_put_down_before_another_thing_is_fetched(speech, contro
     meant = speech.understand("fetch me a coke from the kitchen", None)
     tree = speech.compile(steps_of_commands(meant.commands), frozenset())
     conversation = Conversation(speech, control)
-    conversation.begun(tree, memory=meant.memory)
+    conversation.set_mission(tree, memory=meant.memory)
     replies = []
 
     def observe(progress):
@@ -355,7 +355,7 @@ def test_what_is_held_is_not_fetched_again(speech, control, run_tree):
     meant = speech.understand("fetch me a coke from the kitchen", None)
     tree = speech.compile(steps_of_commands(meant.commands), frozenset())
     conversation = Conversation(speech, control)
-    conversation.begun(tree, memory=meant.memory)
+    conversation.set_mission(tree, memory=meant.memory)
     replies = []
 
     def observe(progress):

@@ -14,7 +14,7 @@ from tests.visitors import OnTick
 def test_a_corrected_mission_is_fulfilled_as_corrected(tmp_path):
     prepared, control = prepare(Request("go to the kitchen", out=tmp_path, record=False)), Control(pace=None)
     conversation = conversation_of(prepared, control)
-    conversation.begun(prepared.tree, memory=prepared.meant.memory)
+    conversation.set_mission(prepared.tree, memory=prepared.meant.memory)
     said = [(1.0, "where are you"), (2.0, "no, to the bathroom"), (4.0, "wait"), (6.0, "go on")]
     replies = []
 

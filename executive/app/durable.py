@@ -137,8 +137,8 @@ def _with_replacement(store: MissionStore, mission: StoredMission, prepared: Pre
     if other is None:
         return prepared
     asked = replace(prepared.request, name=other.name, commands=other.commands, robot=name)
-    commanded = Setting(asked, prepared.world, prepared.knowledge, prepared.robots).commanded()
-    own = replace(prepared, request=asked).with_mission(commanded)
+    instead = Setting(asked, prepared.world, prepared.knowledge, prepared.robots).mission_of_commands()
+    own = replace(prepared, request=asked).with_mission(instead)
     if own.request.fingerprint != other.fingerprint:
         raise _other_version(store, mission)
     return replace(prepared, mission=own.mission, tree=own.tree)

@@ -125,7 +125,7 @@ def _options(
         raise InputError(f"it is for the world {request.world_name}, and this run is in {world.name}", hint=hint)
     if request.sentence is not None:
         setting = Setting(request, world, _patient(knowledge), robots)
-        meant = setting.understood()
+        meant = setting.understand()
         meanings = [part.meaning for part in meant.parts]
         return {name: setting.part(name, meanings) for name in _named(meant.parts, robots)}
     alone = prepare_alone(request)
@@ -133,7 +133,7 @@ def _options(
         raise InputError("its file brings objects into the world", hint="run it by `errand run`")
     setting = Setting(alone.request, world, _patient(alone.knowledge), robots)
     missions = {name: alone.mission.model_copy(update={"robot": name}) for name in robots}
-    return {name: setting.for_robot(name).compiled(mission) for name, mission in missions.items()}
+    return {name: setting.for_robot(name).compile(mission) for name, mission in missions.items()}
 
 
 def _named(parts: Sequence[Part], robots: Mapping[str, PlacedRobot]) -> tuple[str, ...]:
@@ -178,7 +178,7 @@ def charging_missions(world: World, knowledge: Knowledge, robots: Mapping[str, P
     line = str(Command(task=Task.CHARGE))
     setting = Setting(Request(commands=(line,), world_name=world.name), world, _patient(knowledge), robots)
     return {
-        name: setting.for_robot(name).compiled(mission_from_lines((line,), world=world.name, robot_name=name))
+        name: setting.for_robot(name).compile(mission_from_lines((line,), world=world.name, robot_name=name))
         for name, robot in robots.items()
         if robot.dock is not None
     }

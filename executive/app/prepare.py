@@ -58,7 +58,7 @@ def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
         raise InputError("a mission file or --say is needed, and not both", hint='try: --say "Hey Alice, ..."')
     if request.given and request.file is None:
         raise InputError("--set gives values to a mission file, and there is none", hint="name the file as well")
-    request, loaded, world, knowledge = _opened(request)
+    request, loaded, world, knowledge = _open(request)
     configs = request.robots or _named_robots(loaded, world, knowledge)
     if not configs:
         return _for_the_only_robot(_standing(request, world, knowledge, ask), loaded)
@@ -74,7 +74,7 @@ def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
 
 def prepare_alone(request: Request) -> Prepared:
     """A request understood for one robot, whichever robots it names; nobody is asked. Raises InputError."""
-    request, loaded, world, knowledge = _opened(replace(request, robots=()))
+    request, loaded, world, knowledge = _open(replace(request, robots=()))
     return _for_the_only_robot(_standing(request, world, knowledge, None), loaded)
 
 
@@ -97,7 +97,7 @@ class Setting:
         world = replace(self.world, start=robot.start, dock=robot.dock)
         return replace(self, world=world, knowledge=knowledge_for(robot, self.robots, self.knowledge))
 
-    def understood(self) -> Addressed:
+    def understand(self) -> Addressed:
         """What the request's sentence asks of each robot. Raises InputError: it is not understood."""
         from executive.language.robots import understand_for_robots_asking  # which a mission file does not need
         from executive.language.understand import Status
@@ -133,9 +133,9 @@ class Setting:
         steps = tuple(step for meant in meanings for step in steps_of(meant))
         notes = tuple(note for meant in meanings for note in meant.notes)
         mission = mission_from_steps(steps, world=self.world.name, robot_name=name)
-        return self.for_robot(name).compiled(mission.noting(notes))
+        return self.for_robot(name).compile(mission.noting(notes))
 
-    def commanded(self) -> Mission:
+    def mission_of_commands(self) -> Mission:
         """The mission of the request's commands in their text form, or of steps in YAML."""
         request = self.request
         try:
@@ -144,7 +144,7 @@ class Setting:
             raise InputError(f"the mission '{request.name}' cannot be read: {error}", hint="give it again") from error
         return mission.model_copy(update={"name": request.name})
 
-    def filed(self, loaded: Mission) -> Prepared:
+    def for_file(self, loaded: Mission) -> Prepared:
         """What a mission file asks of the robot that stands in this world. Raises InputError."""
         knowledge = overridden(loaded, self.knowledge)
         answer = self.answerer(self.request.questions or loaded.questions)
@@ -153,9 +153,9 @@ class Setting:
         file, text = self.request.file, self.request.text
         text = file.read_text(encoding="utf-8") if text is None and file is not None else text
         own = replace(self, request=replace(self.request, text=text), world=world, knowledge=knowledge)
-        return own.compiled(mission)
+        return own.compile(mission)
 
-    def compiled(self, mission: Mission, meant: Understanding | None = None) -> Prepared:
+    def compile(self, mission: Mission, meant: Understanding | None = None) -> Prepared:
         """The request with its mission compiled for this world. Raises InputError: it cannot be."""
         request, world = self.request, self.world
         if request.scenario or request.scenario_files:
@@ -173,7 +173,7 @@ class Setting:
         return Prepared(compiled_request(request, tree), mission, world, self.knowledge, tree, robots, meant)
 
 
-def _opened(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
+def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
     """A request with its file read where it has one, its world, and what is known of that. Raises InputError."""
     loaded = None
     if request.file is not None:
@@ -216,9 +216,9 @@ def _for_the_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
     """What the world's only robot is to do. Raises InputError."""
     request, robot = setting.request, setting.knowledge.robot
     if loaded is not None:
-        return setting.filed(loaded)
+        return setting.for_file(loaded)
     if request.sentence is None:
-        return setting.compiled(setting.commanded())
+        return setting.compile(setting.mission_of_commands())
     wake = robot.require_wake if request.require_wake is None else request.require_wake
     meant = understood(
         request.sentence,
@@ -229,7 +229,7 @@ def _for_the_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
     )
     mission = mission_from_meaning(meant, world=setting.world.name, robot_name=robot.name)
     asked = replace(request, sentence=meant.text, require_wake=wake)
-    return replace(setting, request=asked).compiled(mission, meant)
+    return replace(setting, request=asked).compile(mission, meant)
 
 
 def _for_whom_it_calls(setting: Setting) -> Prepared:
@@ -237,10 +237,10 @@ def _for_whom_it_calls(setting: Setting) -> Prepared:
     request, robots = setting.request, setting.robots
     if request.sentence is None:
         name = robot_called(request.robot, robots) or next(iter(robots))
-        return setting.for_robot(name).compiled(setting.commanded().model_copy(update={"robot": name}))
-    meant = setting.understood()
+        return setting.for_robot(name).compile(setting.mission_of_commands().model_copy(update={"robot": name}))
+    meant = setting.understand()
     setting = replace(setting, request=replace(request, sentence=meant.text))
-    parts = [part for each in meant.parts for part in _expanded(each, setting)]
+    parts = [part for each in meant.parts for part in _part_for_each(each, setting)]
     waits = _waits(meant.parts, robots)
     every = [
         replace(
@@ -254,19 +254,19 @@ def _for_whom_it_calls(setting: Setting) -> Prepared:
     return together(every)
 
 
-def _expanded(part: Part, setting: Setting) -> Iterator[Part]:
+def _part_for_each(part: Part, setting: Setting) -> Iterator[Part]:
     """The part for each robot that it is for. Raises InputError: it is for any of them, and none can do it."""
     from executive.language.robots import Whom
 
     if part.robot is Whom.ALL:
         yield from (replace(part, robot=name) for name in setting.robots)
     elif part.robot is Whom.ANY:
-        yield replace(part, robot=_first_done(setting.robots, lambda name: setting.part(name, [part.meaning]))[0])
+        yield replace(part, robot=_soonest(setting.robots, lambda name: setting.part(name, [part.meaning]))[0])
     else:
         yield part
 
 
-def _first_done(names: Collection[str], prepared_for: Callable[[str], Prepared]) -> tuple[str, Prepared]:
+def _soonest(names: Collection[str], prepared_for: Callable[[str], Prepared]) -> tuple[str, Prepared]:
     """The robot that can do a mission and is done first, by the estimate, and its part. Raises InputError: none can."""
     from executive.app.feasibility import check_prepared  # which loads the check, where more than one may do it
 
@@ -289,10 +289,10 @@ def _for_one_robot(setting: Setting, loaded: Mission) -> Prepared:
     robots = setting.robots
     names = tuple(robots) if loaded.robot is None else (_robot_in(loaded, ("robot",), loaded.robot, robots),)
 
-    def filed(name: str) -> Prepared:
-        return setting.for_robot(name).filed(for_robot(loaded, name))
+    def for_file(name: str) -> Prepared:
+        return setting.for_robot(name).for_file(for_robot(loaded, name))
 
-    return filed(names[0]) if len(names) == 1 else _first_done(names, filed)[1]
+    return for_file(names[0]) if len(names) == 1 else _soonest(names, for_file)[1]
 
 
 def _in_parts(setting: Setting, loaded: Mission, parts: Mapping[str, MissionPart]) -> Prepared:
@@ -315,7 +315,7 @@ def _in_parts(setting: Setting, loaded: Mission, parts: Mapping[str, MissionPart
     for name in (name for name in robots if name in written):
         with problems:
             own = for_robot(loaded, name, written[name])
-            made.append(replace(setting.for_robot(name).filed(own), after=waits[name]))
+            made.append(replace(setting.for_robot(name).for_file(own), after=waits[name]))
     problems.raise_any()
     return together(made)
 

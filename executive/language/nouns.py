@@ -1,9 +1,7 @@
 """What kind of thing a noun stands for, judged by the nearness of its meaning to examples of each kind.
 
 The examples stand in nouns.yaml by kind. A noun that is no example is judged by linear discriminant analysis on word
-vectors: each kind is a Gaussian about the mean of its examples, and all share one covariance, which is shrunk towards
-a multiple of the identity since there are few examples for so many dimensions (Friedman, "Regularized Discriminant
-Analysis", JASA 1989; Ledoit and Wolf, "A well-conditioned estimator for large-dimensional covariance matrices", 2004).
+vectors; `errand_train.nouns` learns its weights.
 """
 
 from __future__ import annotations
@@ -26,7 +24,6 @@ FloatArray = npt.NDArray[np.float64]
 VectorOf = Callable[[str], FloatArray | None]
 
 WEIGHTS_FILE: Final = "noun_weights.npz"
-_SHRINKAGE: Final = 0.2
 _MODIFIER_WEIGHT: Final = 0.3
 _MARGIN: Final = 2.0
 
@@ -65,18 +62,9 @@ class NounKinds:
 
     @classmethod
     def load(cls, vector_of: VectorOf) -> NounKinds:
-        """Judges by the weights in noun_weights.npz, which `python -m executive.language.learn_nouns` writes."""
+        """Judges by the weights in noun_weights.npz, which `python -m errand_train.nouns` writes."""
         with resources.files(__package__).joinpath(WEIGHTS_FILE).open("rb") as file, np.load(file) as stored:
             return cls(noun_examples(), vector_of, stored["weights"])
-
-    @classmethod
-    def learn(cls, examples: Mapping[str, NounKind], vector_of: VectorOf) -> NounKinds:
-        """Learn from examples; `vector_of` gives the unit vector of a word, or None."""
-        single = ((vector_of(noun), kind) for noun, kind in examples.items() if " " not in noun)
-        known = [(vector, kind) for vector, kind in single if vector is not None]
-        vectors = np.array([vector for vector, _ in known])
-        labels = np.array([list(NounKind).index(kind) for _, kind in known])
-        return cls(examples, vector_of, _discriminant(vectors, labels))
 
     def kind(self, words: Sequence[str], *, lemma: str) -> NounKind | None:
         """The kind of a noun, the last of `words`, with what stands before it; None when unknown.
@@ -103,14 +91,3 @@ class NounKinds:
         doubt = np.array([_MARGIN * kind.within_reach for kind in NounKind])
         scores: FloatArray = np.append(vector, 1.0) @ self.weights + doubt
         return scores
-
-
-def _discriminant(vectors: FloatArray, labels: npt.NDArray[np.int_]) -> FloatArray:
-    """The weights of a linear discriminant with shrunk covariance, all kinds being equally likely beforehand."""
-    means = np.array([vectors[labels == label].mean(axis=0) for label in range(len(NounKind))])
-    spread = vectors - means[labels]
-    covariance = spread.T @ spread / len(vectors)
-    size = len(covariance)
-    ball = np.trace(covariance) / size * np.eye(size)
-    slopes = np.linalg.solve((1 - _SHRINKAGE) * covariance + _SHRINKAGE * ball, means.T)
-    return np.vstack([slopes, -0.5 * np.sum(means.T * slopes, axis=0)])

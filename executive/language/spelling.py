@@ -19,7 +19,6 @@ import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from types import MappingProxyType
 from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
@@ -202,56 +201,42 @@ def _rule_at(word: str, at: int) -> tuple[int, str]:
 
 def _drop_cost(sound: str) -> float:
     """What it costs to leave a sound out, from 0 to 1."""
-    return _WEAK.get(sound, _VOWEL_DROP if sound in _VOWELS else _CONSONANT_DROP)
+    return _sounds().weak.get(sound, _VOWEL_DROP if sound in _sounds().vowels else _CONSONANT_DROP)
 
 
 def _change_cost(a: str, b: str) -> float:
     """What it costs to say one sound for another, from 0 to 1."""
     if a == b:
         return 0.0
-    if a in _VOWELS and b in _VOWELS:
-        (x, y), (other_x, other_y) = _VOWELS[a], _VOWELS[b]
+    vowels = _sounds().vowels
+    if a in vowels and b in vowels:
+        (x, y), (other_x, other_y) = vowels[a], vowels[b]
         return min(0.15 + 0.6 * float(((x - other_x) ** 2 + (y - other_y) ** 2) ** 0.5), 0.8)
-    return _ALIKE.get(frozenset((a, b)), 1.0)
+    return _sounds().alike.get(frozenset((a, b)), 1.0)
 
 
 _MAX_LETTERS: Final = 200
 _VOWEL_DROP: Final = 0.5
 _CONSONANT_DROP: Final = 0.8
-_WEAK: Final = MappingProxyType({"@": 0.35, "r": 0.4, "h": 0.4, "w": 0.5, "y": 0.4})
-"""What is lost easily."""
 
-_VOWELS: Final = MappingProxyType(
-    {
-        "i": (0.0, 1.0),
-        "e": (0.0, 0.55),
-        "a": (0.15, 0.1),
-        "V": (0.6, 0.35),
-        "o": (0.9, 0.35),
-        "u": (1.0, 1.0),
-        "@": (0.5, 0.55),
-        "A": (0.35, 0.25),
-        "W": (0.6, 0.2),
-        "Y": (0.7, 0.6),
-    }
-)
-"""Where a vowel is spoken: how far back and how high, from 0 to 1."""
 
-_ALIKE: Final = MappingProxyType(
-    {
-        frozenset(pair): cost
-        for pairs, cost in (
-            (("nN", "sz"), 0.2),
-            (("pb", "td", "kg", "fv", "CJ"), 0.3),
-            (("mn", "Tf", "yi", "mN"), 0.35),
-            (("sS", "SC", "Ts", "Tt", "Td", "zS", "Tv"), 0.4),
-            (("lr", "wv", "wr", "Ct", "Jd", "bv", "wl", "JS", "Cs", "Jz"), 0.5),
-            (("fp", "pt", "tk", "bd", "dg", "pk", "bg"), 0.6),
-        )
-        for pair in pairs
-    }
-)
-"""Consonants that are taken for each other."""
+@dataclass(frozen=True)
+class _Sounds:
+    """What sounds cost: `weak` are lost easily; `vowels` are spoken so far back and so high, from 0 to 1; `alike` are
+    the costs of pairs of consonants that are taken for each other."""
+
+    weak: Mapping[str, float]
+    vowels: Mapping[str, tuple[float, float]]
+    alike: Mapping[frozenset[str], float]
+
+
+@cache
+def _sounds() -> _Sounds:
+    table = read_table("sounds.yaml")
+    weak = {sound: float(cost) for sound, cost in table["weak"].items()}
+    vowels = {sound: (float(back), float(high)) for sound, (back, high) in table["vowels"].items()}
+    alike = {frozenset(pair): float(cost) for cost, pairs in table["alike"].items() for pair in pairs}
+    return _Sounds(weak, vowels, alike)
 
 
 @runtime_checkable

@@ -34,7 +34,7 @@ __all__ = [
     "VIEW_FOR",
     "VIEW_PORT",
     "StartCommand",
-    "joined",
+    "join_start",
     "request_arguments",
     "start_pose",
     "takes_request",
@@ -61,19 +61,19 @@ class StartCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """As click's, after the numbers are joined."""
-        return super().parse_args(ctx, joined(args))
+        return super().parse_args(ctx, join_start(args))
 
 
-def joined(arguments: Sequence[str]) -> list[str]:
-    """The arguments with three numbers after `--start` as one, so that a word may stand there as well."""
-    told, rest = list[str](), list(arguments)
+def join_start(arguments: Sequence[str]) -> list[str]:
+    """Joins three numbers after `--start` into one argument, so that a word may stand there as well."""
+    words, rest = list[str](), list(arguments)
     while rest:
         word = rest.pop(0)
         if word == _START and rest and _NUMERIC.fullmatch(rest[0]):
             numbers = [*takewhile(lambda each: not each.startswith("--"), rest[:3])]
             word, rest = f"{_START}={' '.join(numbers)}", rest[len(numbers) :]
-        told.append(word)
-    return told
+        words.append(word)
+    return words
 
 
 @dataclasses.dataclass(frozen=True)

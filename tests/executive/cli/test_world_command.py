@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from executive.cli import entry
-from executive.cli.options import joined
+from executive.cli.options import join_start
 
 MAP = """image: room.pgm
 resolution: 0.05
@@ -99,5 +99,5 @@ def test_a_value_that_the_file_does_not_take_is_refused(setting, why):
 
 
 def test_three_numbers_after_start_are_one_value():
-    assert joined(["run", "--start", "1", "-2", "0.5", "m.yaml"]) == ["run", "--start=1 -2 0.5", "m.yaml"]
-    assert joined(["run", "--start", "unknown", "m.yaml"]) == ["run", "--start", "unknown", "m.yaml"]
+    assert join_start(["run", "--start", "1", "-2", "0.5", "m.yaml"]) == ["run", "--start=1 -2 0.5", "m.yaml"]
+    assert join_start(["run", "--start", "unknown", "m.yaml"]) == ["run", "--start", "unknown", "m.yaml"]

@@ -16,13 +16,14 @@ from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
 from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.context import Endings, RunContext
-from executive.tree.behaviours.decisions import Decide, WaitFor, buttons_of
+from executive.tree.behaviours.decisions import Decide, buttons_of
 from executive.tree.behaviours.explained import Explained, message_of
 from executive.tree.behaviours.policies import Skip
 from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import node_view
+from executive.tree.nodes.wait import WaitFor
 from executive.tree.snapshot import Change, NodeState, Observed, Snapshot
 from executive.words.goal import GoalKind
 from skills.api import Cause

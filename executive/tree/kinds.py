@@ -1,53 +1,40 @@
-"""All kinds of nodes by name, as the behaviours register them, and the one function that builds a tree of specs."""
+"""All kinds of nodes by name and the plans of all blocks, as their modules register them; how a tree is built."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
+from pkgutil import iter_modules
 from types import MappingProxyType
 from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
 
-from executive.tree.behaviours import (
-    answer,
-    ask,
-    blocks,
-    composites,
-    decisions,
-    decorators,
-    leaves,
-    policies,
-    recovery,
-    skill_leaf,
-)
+from executive.tree import nodes
+from executive.tree.behaviours import answer, composites, decisions, decorators, leaves, policies, recovery, skill_leaf
 from executive.tree.behaviours.context import RunContext
+from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.compiling.flow import Assembler, BlockPlans
+from executive.tree.compiling.part import Assembled
 from executive.tree.node import NodeKind, NodeSpec
-from executive.tree.nodes import aside, fallen, interrupts
-from executive.tree.nodes import clearing as rounds
+from executive.words.steps import Step
 
-__all__ = ["KINDS", "Changes", "build", "writes"]
+__all__ = ["KINDS", "Changes", "block_plan", "build", "writes"]
 
 Changes = Mapping[str, Callable[[Any], object]]
 """By path id, what is done to a node once it is built."""
 
-_HOMES: Final = (
-    answer,
-    aside,
-    ask,
-    blocks,
-    composites,
-    decisions,
-    decorators,
-    fallen,
-    interrupts,
-    leaves,
-    policies,
-    recovery,
-    rounds,
-    skill_leaf,
-)
-KINDS: Final[Mapping[str, NodeKind]] = {name: k for home in _HOMES for name, k in home.KINDS.items()}
+_PAGES: Final = tuple(import_module(f"{nodes.__name__}.{page.name}") for page in iter_modules(nodes.__path__))
+"""Each page of `executive.tree.nodes`: what it defines of `KINDS` and `PLANS` is registered by being there."""
+_HOMES: Final = (answer, composites, decisions, decorators, leaves, policies, recovery, skill_leaf, *_PAGES)
+KINDS: Final[Mapping[str, NodeKind]] = {n: kind for home in _HOMES for n, kind in getattr(home, "KINDS", {}).items()}
+PLANS: Final[BlockPlans] = {model: plan for page in _PAGES for model, plan in getattr(page, "PLANS", {}).items()}
 _NO_CHANGES: Final[Changes] = MappingProxyType({})
+
+
+def block_plan(assembler: Assembler, block: Step, builder: PlanBuilder) -> Assembled:
+    """The one subtree of a block, and what its parts are to bring about. Raises InputError."""
+    return PLANS[type(block)](assembler, block, builder)
 
 
 def build(spec: NodeSpec, context: RunContext, changes: Changes = _NO_CHANGES) -> Behaviour:

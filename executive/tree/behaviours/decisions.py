@@ -14,17 +14,13 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
-from executive.tree.behaviours.answer import ANSWER_TOPIC
-from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.conditions import Condition, Verdict, Waiting
 from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.decorators import ExplainedDecorator
-from executive.tree.behaviours.explained import ExplainedLeaf, ExplainedNode, cause_of, message_of
+from executive.tree.behaviours.explained import ExplainedNode, cause_of, message_of
 from executive.tree.node import NodeKind, NodeSpec
 from executive.words.condition import READINGS
-from executive.words.expression import Expression, ExpressionError, Template, Value
+from executive.words.expression import Expression, ExpressionError, Value
 from skills.api import Cause, Failed
-from skills.robot import Clock
 
 DAY_S: Final = 86_400.0
 Keys = Mapping[str, str]
@@ -360,129 +356,6 @@ class Decide(ExplainedNode, Composite):
         self.stop(Status.FAILURE)
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
-class Check(ExplainedDecorator):
-    """Makes the decision of its child an answer of the mission: it is published under `ANSWER_TOPIC`.
-
-    As the child; `key` is where the child leaves its answer.
-    """
-
-    question: str
-    key: str
-    context: RunContext
-
-    def update(self) -> Status:
-        """The child's status, and the answer when it is there."""
-        status = self.pass_on()
-        if status == Status.SUCCESS:
-            answer = self.context.board.get(self.key)
-            note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
-            self.context.publish(ANSWER_TOPIC, note)
-        return status
-
-
-@dataclass(kw_only=True, eq=False, repr=False)
-class WaitFor(ExplainedDecorator):
-    """Waits until its child, a decision, is true; it is asked anew `every_s` after it was false.
-
-    Child RUNNING: RUNNING. Answer true: SUCCESS. Answer false: RUNNING. Child FAILURE: FAILURE with its cause.
-    """
-
-    key: str
-    words: str
-    every_s: float
-    board: Board
-    clock: Clock
-
-    def initialise(self) -> None:
-        """Ask at once; presses of buttons count from now on."""
-        self._due_s = self.clock.now()
-        if isinstance(self.decorated, Decide):
-            self.decorated.view.forget_presses()
-
-    def tick(self) -> Iterator[Behaviour]:
-        """Ask, when it is time."""
-        if self.status == Status.RUNNING and self.clock.now() < self._due_s - 1e-9:
-            yield self
-            return
-        yield from super().tick()
-
-    def update(self) -> Status:
-        """Whether it holds."""
-        status = self.pass_on()
-        if status != Status.SUCCESS:
-            return status
-        if self.board.get(self.key):
-            return status
-        self._due_s = self.clock.now() + self.every_s
-        self.message = f"waits until {self.words}"
-        return Status.RUNNING
-
-
-@dataclass(kw_only=True, eq=False, repr=False)
-class WaitUntilClock(ExplainedLeaf):
-    """RUNNING until a time of day (s after midnight), then SUCCESS; at once when it was up to twelve hours ago."""
-
-    time_s: float
-    words: str
-    context: RunContext
-
-    def initialise(self) -> None:
-        """See how far it is until then."""
-        self.clear_explanation()
-        now_s = self.context.clock.now()
-        ahead_s = (self.time_s - self.context.day_began_s - now_s) % DAY_S
-        self._end_s = now_s + ahead_s if ahead_s <= DAY_S / 2 else now_s
-
-    def update(self) -> Status:
-        """Wait until the time has come."""
-        done = self.context.clock.now() >= self._end_s - 1e-9
-        self.message = f"it is {self.words}" if done else f"waits until {self.words}"
-        return Status.SUCCESS if done else Status.RUNNING
-
-
-@dataclass(kw_only=True, eq=False, repr=False)
-class SetValues(ExplainedLeaf):
-    """Works values out in order, each under its blackboard key; a text with braces is filled.
-
-    SUCCESS when all have a value; FAILURE with PRECONDITION at the first that has none.
-    """
-
-    values: Mapping[str, Expression | Template]
-    keys: Keys
-    kinds: Mapping[str, type]
-    context: RunContext
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.view = View(self.context)
-
-    def update(self) -> Status:
-        """Work them out."""
-        self.clear_explanation()
-        told = []
-        for key, each in self.values.items():
-            try:
-                known = self.view.values(self.keys)
-                value = each.filled(known) if isinstance(each, Template) else each.value(known)
-            except ExpressionError as error:
-                self.cause, self.message = Cause.PRECONDITION, f"{each.text}: {error.message}"
-                return Status.FAILURE
-            self.context.board.put(key, float(value) if self.kinds[key] is float else value)
-            told.append(f"{key.rsplit('/', 1)[-1]} = {value}")
-        self.message = ", ".join(told)
-        return Status.SUCCESS
-
-
-def _kinds(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    kinds: Mapping[str, Any] = options["kinds"]
-    return kinds
-
-
 KINDS: Final[Mapping[str, NodeKind]] = {
     "decide": NodeKind(Decide, ("children", "context"), writes=lambda options: {options["key"]: bool}),
-    "check": NodeKind(Check, ("child", "context")),
-    "wait for": NodeKind(WaitFor, ("child", "board", "clock")),
-    "wait until": NodeKind(WaitUntilClock, ("context",)),
-    "set": NodeKind(SetValues, ("context",), writes=_kinds),
 }

@@ -7,15 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
-from executive.tree.behaviours.decisions import (
-    AllHold,
-    AnswerIs,
-    AnyHolds,
-    Decision,
-    DoesNotHold,
-    Pressed,
-    ValueHolds,
-)
+from executive.tree.behaviours.decisions import AllHold, AnswerIs, AnyHolds, Decision, DoesNotHold, Pressed, ValueHolds
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.compiling.doors import door_plan
 from executive.tree.compiling.steps import find_plan

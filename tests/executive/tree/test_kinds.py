@@ -13,7 +13,7 @@ LIMIT = NodeSpec("timeout", "alice/limit", "in time", {"limit_s": 5.0}, (PAUSE,)
 
 
 def test_no_kind_is_registered_twice():
-    assert sum(len(home.KINDS) for home in kinds._HOMES) == len(kinds.KINDS)
+    assert sum(len(getattr(home, "KINDS", ())) for home in kinds._HOMES) == len(kinds.KINDS)
 
 
 def test_a_spec_becomes_its_node_on_the_runs_clock(context, clock):

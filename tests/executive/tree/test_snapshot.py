@@ -5,7 +5,7 @@ from py_trees.common import Status
 
 from executive.tree.behaviours.composites import MemorySequence
 from executive.tree.snapshot import Change, NodeState, Observed
-from tests.executive.tree.behaviours.scripted import Leaf
+from tests.executive.tree.scripted import Leaf
 
 GOING = NodeState(Status.RUNNING, None, "going, 2.5 m to go")
 

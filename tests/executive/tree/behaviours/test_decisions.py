@@ -1,8 +1,6 @@
 """What a mission decides by: values, looks, buttons and their combinations; decide, check, wait and set."""
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from py_trees.common import Status
@@ -13,26 +11,22 @@ from executive.tree.behaviours.decisions import (
     AllHold,
     AnswerIs,
     AnyHolds,
-    Check,
     Decide,
     DoesNotHold,
     MustHold,
     MustNotBegin,
     Pressed,
-    SetValues,
     ValueHolds,
     View,
-    WaitFor,
-    WaitUntilClock,
 )
 from executive.tree.behaviours.suspension import suspend
+from executive.tree.nodes.check import Check
+from executive.tree.nodes.values import SetValues
+from executive.tree.nodes.wait import WaitFor, WaitUntilClock
 from executive.words.expression import Expression, Template
 from skills.api import Cause, Failed
+from tests.executive.tree.scripted import Leaf, letters, tick
 
-_spec = importlib.util.spec_from_file_location("scripted_leaf", Path(__file__).with_name("scripted.py"))
-scripted = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(scripted)
-Leaf, tick, letters = scripted.Leaf, scripted.tick, scripted.letters
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
 KEY, FIRST, SECOND = "alice/decided", "alice/look-1/answer", "alice/look-2/answer"
 

@@ -1,21 +1,33 @@
-"""A question to the people around, or to the operator, whose answer the mission goes by."""
+"""Saying a text, and asking a question whose answer the mission goes by: the plans and the node."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, Final
 
 from py_trees.common import Status
 
 from executive.tree.behaviours.answer import ANSWER_TOPIC
+from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decisions import Keys, View
 from executive.tree.behaviours.explained import ExplainedLeaf
+from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.compiling.decisions import (
+    Named,
+    keys_of,
+)
+from executive.tree.compiling.flow import Assembler, BlockPlans, branch_of, check_template, give_key, set_plan
+from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.node import NodeKind
-from executive.words.expression import LARGEST, ExpressionError, Template, Value
+from executive.words import steps as model
+from executive.words.expression import LARGEST, ExpressionError, Kind, Template, Value, kind_of
+from executive.words.slug import slug
 from skills.api import Asked, Cause, Failed, Question
+from skills.files.errors import InputError, suggestion
 
 SPEECH_TOPIC: Final = "speech"
 _FILLERS: Final = re.compile(
@@ -142,4 +154,81 @@ def _writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
     return {options["key"]: options["gives"]}
 
 
+def _speak_plan(assembler: Assembler, block: model.Speak, builder: PlanBuilder) -> Assembled:
+    if not block.text.names:
+        return Assembled((builder.skill("speak", {"text": block.text.filled({})}),))
+    check_template(block.text, builder, assembler)
+    key = builder.key("text")
+    names = {**assembler.flow.names, "": Named(key, str)}
+    fill = set_plan(builder, {key: block.text}, names, "fill", "put the values in")
+    return Assembled((builder.sequence("speak", fill, builder.skill("speak", {"text": FromBoard(key)})),))
+
+
+def _ask_plan(assembler: Assembler, block: model.Ask, builder: PlanBuilder) -> Assembled:
+    check_template(block.text, builder, assembler)
+    kind = float if block.match == "number" else str
+    key = give_key(assembler, block.answer_name, builder.key("answer"), kind, builder)
+    choices = block.choices or {}
+    names = {choice.lower(): choice for choice in choices} or _spoken(block.match, builder)
+    default = _default(block, names, builder)
+    leaf = builder.node(
+        "question",
+        f"ask: {block.text.text}",
+        part="question",
+        text=block.text,
+        keys=MappingProxyType(dict(keys_of(block.text, assembler.flow.names))),
+        options=tuple(choices),
+        names=MappingProxyType(names),
+        gives=kind,
+        limit_s=block.limit_s,
+        default=default,
+        key=key,
+    )
+    if not any(choices.values()):
+        return Assembled((leaf,))
+    flow, afters, branches, nodes = assembler.flow, [], {}, [leaf]
+    parts: tuple[StepPart, ...] = ()
+    for choice, steps in choices.items():
+        branch, after = branch_of(assembler, steps, builder.at(f"answer-{slug(choice)}"), f"if {choice}", flow)
+        afters.append(after)
+        parts += branch.parts
+        if branch.nodes:
+            branches[choice] = len(nodes)
+            nodes += branch.nodes
+    flow.join(afters)
+    node = builder.node("choose", "by the answer", *nodes, branches=MappingProxyType(branches), key=key)
+    return Assembled((node,), parts)
+
+
+def _spoken(match: str | None, builder: PlanBuilder) -> dict[str, str]:
+    """What people may say for the names of the world, in lower case, and what it means."""
+    knowledge = builder.knowledge
+    groups: Mapping[str, tuple[Sequence[str], Callable[[str], str | None]]] = {
+        "place": (knowledge.place_names(), knowledge.place),
+        "person": (tuple(knowledge.people), knowledge.person),
+        "object": (knowledge.thing_names(), knowledge.thing),
+    }
+    if match is None or match not in groups:
+        return {}
+    known, meaning = groups[match]
+    spoken = {word.lower(): meaning(word) for word in knowledge.spellings(known)}
+    return {word: name for word, name in spoken.items() if name is not None}
+
+
+def _default(block: model.Ask, names: Mapping[str, str], builder: PlanBuilder) -> Value | None:
+    """The default as the answer's own type. Raises InputError: it is no answer."""
+    default = block.default
+    if default is None or block.choices:
+        return default
+    if block.match == "number":
+        if kind_of(default) is not Kind.NUMBER:
+            raise InputError.at(builder.source, f"the default {default!r} is no number", hint="give a number")
+        return float(default)
+    if names and str(default).lower() not in names:
+        known = sorted(set(names.values()))
+        raise InputError.at(builder.source, f"the default '{default}' is unknown", hint=suggestion(str(default), known))
+    return names.get(str(default).lower(), str(default))
+
+
 KINDS: Final[Mapping[str, NodeKind]] = {"question": NodeKind(AskPeople, ("context",), writes=_writes)}
+PLANS: Final[BlockPlans] = {model.Speak: _speak_plan, model.Ask: _ask_plan}

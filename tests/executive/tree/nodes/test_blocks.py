@@ -1,24 +1,23 @@
 """Choose, repeat, try, together and always: every outcome of their children, cancel and suspension at each of them."""
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from py_trees.common import Status
 
-from executive.tree.behaviours.blocks import Always, Choose, Repeat, Together, Try
 from executive.tree.behaviours.composites import MemorySequence
 from executive.tree.behaviours.context import Endings
 from executive.tree.behaviours.decorators import Guard, Retry, Timeout
 from executive.tree.behaviours.policies import Skip
 from executive.tree.behaviours.suspension import suspend
+from executive.tree.nodes.alternative import Try
+from executive.tree.nodes.choice import Choose
+from executive.tree.nodes.group import Always
+from executive.tree.nodes.repeat import Repeat
+from executive.tree.nodes.together import Together
 from skills.api import Cause, Failed
+from tests.executive.tree.scripted import Leaf, letters, tick
 
-_spec = importlib.util.spec_from_file_location("scripted_leaf", Path(__file__).with_name("scripted.py"))
-scripted = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(scripted)
-Leaf, tick, letters = scripted.Leaf, scripted.tick, scripted.letters
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
 KEY, COUNT = "alice/decided", "alice/rounds"
 

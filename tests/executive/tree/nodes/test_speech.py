@@ -7,8 +7,8 @@ from py_trees.common import Status
 
 from executive.run.control import Control
 from executive.tree.behaviours.answer import ANSWER_TOPIC
-from executive.tree.behaviours.ask import SPEECH_TOPIC, AskPeople
 from executive.tree.behaviours.suspension import suspend
+from executive.tree.nodes.speech import SPEECH_TOPIC, AskPeople
 from executive.words.expression import Template
 from skills.api import Cause
 

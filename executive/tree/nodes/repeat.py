@@ -1,0 +1,217 @@
+"""Rounds of the same steps: the plan and its node."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.mission.gripper import either
+from executive.tree.behaviours.board import Board
+from executive.tree.behaviours.composites import MemoryComposite
+from executive.tree.behaviours.decisions import Decide
+from executive.tree.behaviours.explained import cause_of, message_of
+from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.compiling.flow import Assembler, BlockPlans, decided, row
+from executive.tree.compiling.part import Assembled, StepPart
+from executive.tree.node import NodeKind
+from executive.words import steps as model
+from executive.words.condition import READINGS, Condition, ValueIs, parts_of
+from skills.api import Cause
+from skills.files.errors import InputError, count_text
+from skills.robot import Clock
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Repeat(MemoryComposite):
+    """Rounds of its last child; before it, where there is one, stands the decision (`key` is where its answer is).
+
+    A round begins in the tick after the one before ended, and not before `every_s` have passed since that one began.
+    Body RUNNING: RUNNING. Body FAILURE: FAILURE with its cause. `mode` "until": SUCCESS when the decision is true after
+    a round. "while": SUCCESS when it is false before one. After `times` rounds: SUCCESS without a decision, else
+    FAILURE with POSTCONDITION. Decision FAILURE: FAILURE with its cause. `count` is the blackboard key of how many
+    rounds have begun.
+    """
+
+    mode: Literal["until", "while", "times"]
+    words: str
+    count: str
+    key: str = ""
+    times: int | None = None
+    every_s: float = 0.0
+    board: Board
+    clock: Clock
+    taken_up: bool = field(default=False, init=False)
+    """Set before the first tick of a mission that goes on after a restart, in the middle of a round."""
+    _phase: Literal["start", "before", "body", "after"] = field(default="start", init=False)
+    _due_s: float = field(default=0.0, init=False)
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Begin a round, decide, or tick the body."""
+        if self.status != Status.RUNNING:
+            self._restart()
+        if self._phase == "start":
+            if self.clock.now() < self._due_s - 1e-9:
+                self._goes_on(f"{self._told()}; the next in {self._due_s - self.clock.now():.0f} s")
+                yield self
+                return
+            self._begin_round()
+        ended = False
+        while not ended and self._phase != "start":
+            child = self.current_child = self.children[-1 if self._phase == "body" else 0]
+            yield from child.tick()
+            ended = self._judged(child)
+        yield self
+
+    def _restart(self) -> None:
+        taken_up, self.taken_up = self.taken_up and self.count in self.board, False
+        if taken_up:
+            self._index = 0
+            self.clear_explanation()
+            self._enter_round()
+            return
+        super()._restart()
+        self.board.put(self.count, 0)
+        self._phase, self._due_s = "start", self.clock.now()
+        if len(self.children) == 2 and isinstance(self.children[0], Decide):
+            self.children[0].view.forget_presses()
+
+    @property
+    def rounds(self) -> int:
+        """How many rounds have begun."""
+        return int(self.board.get(self.count))
+
+    def _begin_round(self) -> None:
+        for child in self.children:
+            child.stop(Status.INVALID)
+        self.board.put(self.count, self.rounds + 1)
+        self._enter_round()
+
+    def _enter_round(self) -> None:
+        self._phase = "before" if self.mode == "while" else "body"
+        self._due_s = self.clock.now() + self.every_s
+
+    def _judged(self, child: Behaviour) -> bool:
+        """What the child's status means; False when another child is ticked in the same tick."""
+        if child.status == Status.RUNNING:
+            self._goes_on(message_of(child))
+        elif child.status != Status.SUCCESS:
+            self._end(
+                cause_of(child),
+                f"{message_of(child)} (in round {self.rounds})" if self.rounds > 1 else message_of(child),
+            )
+        elif self._phase == "body":
+            if self.mode == "until":
+                self._phase = "after"
+                return False
+            self._round_done()
+        elif bool(self.board.get(self.key)) is (self.mode == "until"):
+            self._end(None, self._told())
+        elif self._phase == "before" and (self.times is None or self.rounds <= self.times):
+            self._phase = "body"
+            return False
+        else:
+            self._round_done()
+        return True
+
+    def _round_done(self) -> None:
+        if self.times is None or self.rounds < self.times or (self.mode == "while" and self.rounds == self.times):
+            self._phase = "start"
+            self._goes_on(self._told())
+        elif self.mode == "times":
+            self._end(None, self._told())
+        else:
+            still = "still" if self.mode == "while" else "not"
+            self._end(Cause.POSTCONDITION, f"it is {still} so after {self.times} rounds that {self.words}")
+
+    def _told(self) -> str:
+        done = self.rounds - (1 if self._phase == "before" else 0)
+        last = message_of(self.children[-1]) if self.children[-1].status == Status.SUCCESS else ""
+        counted = count_text(done, "round")
+        return f"{counted}, the last: {last}" if last else counted
+
+    def _goes_on(self, message: str) -> None:
+        self.status, self.cause, self.message = Status.RUNNING, None, message
+
+    def _end(self, cause: Cause | None, message: str) -> None:
+        self.cause, self.message = cause, message
+        self.stop(Status.SUCCESS if cause is None else Status.FAILURE)
+
+
+def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> Assembled:
+    rounds = block.loop
+    condition = rounds.until or rounds.while_
+    mode = "times" if condition is None else "until" if rounds.until is not None else "while"
+    _refuse_endless(block, condition, builder)
+    changing = _given(block.steps)
+    for name in changing & set(assembler.flow.names):
+        assembler.flow.names[name] = replace(assembler.flow.names[name], quantity=None)
+    before, nodes, key = assembler.flow.copy(), [], ""
+    parts: tuple[StepPart, ...] = ()
+    if mode == "while" and condition is not None:
+        decide, key, parts = decided(assembler, condition, builder.at("while"))
+        nodes = [decide]
+    body = row(assembler, block.steps, builder.at("round"), "round")
+    flow = assembler.flow
+    if flow.held != before.held and rounds.times != 1:
+        flow.names = dict(before.names)
+        flow.held, flow.opening = either(before.held, flow.held), False
+        body = row(assembler, block.steps, builder.at("round"), "round")
+    if mode == "until" and condition is not None:
+        decide, key, parts = decided(assembler, condition, builder.at("until"))
+        nodes = [decide]
+    if mode == "while":
+        assembler.flow.join([before, assembler.flow.copy()])
+    elif assembler.flow.held != before.held:
+        assembler.flow.held = either(before.held, assembler.flow.held)
+    words = "" if condition is None else str(condition)
+    often = f"{mode} {words}" if condition is not None else f"{rounds.times} times" if rounds.times else "for ever"
+    every = f", every {rounds.every_s:g} s" if rounds.every_s else ""
+    node = builder.node(
+        "repeat",
+        f"{often}{every}",
+        *nodes,
+        *body.nodes,
+        mode=mode,
+        words=words,
+        count=builder.key("rounds"),
+        key=key,
+        times=rounds.times,
+        every_s=rounds.every_s or 0.0,
+    )
+    return Assembled((node,), (*parts, *body.parts))
+
+
+def _refuse_endless(block: model.Repeat, condition: Condition | None, builder: PlanBuilder) -> None:
+    """Refuse rounds that go on for ever: nothing that the condition reads can change. Raises InputError."""
+    if condition is None or block.loop.times is not None or block.timeout_s is not None:
+        return
+    read: set[str] = set()
+    for part in parts_of(condition):
+        if not isinstance(part, ValueIs):
+            return
+        read |= part.expression.names
+    if not read & (set(READINGS) | _given(block.steps)):
+        hint = "give 'times' or 'timeout', or 'set' in a round what it reads"
+        raise InputError.at(builder.source, f"nothing in a round changes whether {condition}", hint=hint)
+
+
+def _given(steps: Iterable[model.Step]) -> set[str]:
+    """The names that steps may give a value."""
+    found: set[str] = set()
+    for step in (below for each in steps for below in each.walk()):
+        match step:
+            case model.Set(set=values):
+                found |= set(values)
+            case model.Do() | model.Say() | model.CallSkill() | model.Check() | model.Ask():
+                found |= set((step.gives or {}).values())
+    return found
+
+
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "repeat": NodeKind(Repeat, ("children", "board", "clock"), writes=lambda options: {options["count"]: int}),
+}
+PLANS: Final[BlockPlans] = {model.Repeat: _plan}

@@ -1,0 +1,110 @@
+"""Steps side by side: the plan and its node."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.mission.gripper import either
+from executive.tree.behaviours.composites import MemoryComposite
+from executive.tree.behaviours.explained import cause_of, message_of
+from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.compiling.flow import Assembler, BlockPlans, branch_of
+from executive.tree.compiling.part import Assembled
+from executive.tree.node import NodeKind, NodeSpec
+from executive.words import steps as model
+from skills.api import Cause, Part
+from skills.files.errors import InputError
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Together(MemoryComposite):
+    """All children side by side: each is ticked until it is done.
+
+    SUCCESS when `needed` of them succeeded, FAILURE with the first failure's cause when as many cannot succeed any
+    more; then the others are stopped. Else RUNNING.
+    """
+
+    needed: int
+    _failed: list[Behaviour] = field(default_factory=list, init=False)
+    _done: list[Behaviour] = field(default_factory=list, init=False)
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Tick all that are not done."""
+        if self.status != Status.RUNNING:
+            self._restart()
+            self._failed, self._done = [], []
+        for child in self.children:
+            if child in self._done or child in self._failed:
+                continue
+            yield from child.tick()
+            if child.status == Status.SUCCESS:
+                self._done.append(child)
+            elif child.status != Status.RUNNING:
+                self._failed.append(child)
+            if len(self._done) == self.needed or len(self.children) - len(self._failed) < self.needed:
+                break
+        self._judge()
+        yield self
+
+    def _judge(self) -> None:
+        if len(self._done) == self.needed:
+            self._finish(None, "; ".join(map(message_of, self._done)), Status.SUCCESS)
+        elif len(self.children) - len(self._failed) < self.needed:
+            self._finish(cause_of(self._failed[0]), "; ".join(map(message_of, self._failed)), Status.FAILURE)
+        else:
+            running = [child for child in self.children if child.status == Status.RUNNING]
+            self.status, self.cause = Status.RUNNING, None
+            self.message = "; ".join(map(message_of, running))
+
+    def _finish(self, cause: Cause | None, message: str, status: Status) -> None:
+        for child in self.children:
+            if child.status == Status.RUNNING:
+                child.stop(Status.INVALID)
+        self.cause, self.message = cause, message
+        self.stop(status)
+
+
+def _plan(assembler: Assembler, block: model.Together, builder: PlanBuilder) -> Assembled:
+    flow, made, afters = assembler.flow, [], []
+    for number, step in enumerate(block.steps, start=1):
+        branch, after = branch_of(assembler, (step,), builder.at(f"branch-{number}"), f"branch {number}", flow)
+        made.append(branch)
+        afters.append(after)
+    _refuse_collisions([each.nodes[0] for each in made], builder)
+    everything = block.needed == len(block.steps)
+    if everything:
+        before = dict(flow.names)
+        for after in afters:
+            flow.names.update({name: named for name, named in after.names.items() if before.get(name) != named})
+    moved = [after.held for after in afters if after.held != flow.held]
+    if moved:
+        flow.held, flow.opening = (moved[0] if everything else either(flow.held, *moved)), False
+    name = "side by side" if everything else f"side by side, until {block.needed} of {len(block.steps)} are done"
+    node = builder.node("together", name, *(each.nodes[0] for each in made), needed=block.needed)
+    return Assembled((node,), tuple(part for each in made for part in each.parts))
+
+
+def _refuse_collisions(branches: Sequence[NodeSpec], builder: PlanBuilder) -> None:
+    """Refuse branches that use the same part of the robot. Raises InputError."""
+    users: dict[Part, int] = {}
+    for number, branch in enumerate(branches, start=1):
+        for part in sorted(_used_parts(branch), key=lambda each: each.value):
+            if users.setdefault(part, number) != number:
+                what = f"steps {users[part]} and {number} both use the {part.value}"
+                hint = "do them one after the other"
+                raise InputError.at(branch.source or builder.source, f"{what}, and cannot go together", hint=hint)
+
+
+def _used_parts(branch: NodeSpec) -> frozenset[Part]:
+    """The parts of the robot that skills below a node use."""
+    skills = (node.options["skill"] for node in branch.walk() if node.kind == "skill")
+    return frozenset(part for skill in skills for part in skill.uses)
+
+
+KINDS: Final[Mapping[str, NodeKind]] = {"together": NodeKind(Together, ("children",))}
+PLANS: Final[BlockPlans] = {model.Together: _plan}

@@ -160,9 +160,9 @@ def with_commands(prepared: Prepared, commands: Sequence[Command]) -> Prepared:
     steps: tuple[Step, ...] = steps_of_commands(commands)
     match prepared.mission.steps:
         case (Say() as said,):
-            steps = (said.meaning(tuple(commands)),)
+            steps = (said.with_commands(tuple(commands)),)
         case (Do() as only,):
-            steps = tuple(map(only.meaning, commands))
+            steps = tuple(map(only.with_command, commands))
     mission = prepared.mission.model_copy(update={"steps": steps})
     return prepared.with_mission(mission)
 

@@ -133,7 +133,7 @@ class Setting:
         steps = tuple(step for meant in meanings for step in steps_of(meant))
         notes = tuple(note for meant in meanings for note in meant.notes)
         mission = mission_from_steps(steps, world=self.world.name, robot_name=name)
-        return self.for_robot(name).compile(mission.noting(notes))
+        return self.for_robot(name).compile(mission.with_notes(notes))
 
     def mission_of_commands(self) -> Mission:
         """The mission of the request's commands in their text form, or of steps in YAML."""

@@ -32,7 +32,7 @@ def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN, text: str | 
     """
     source = read_yaml(path) if text is None else parse_yaml(text, Path(path))
     document = with_parameters(source, parameters)
-    mission = validate(Mission, document).read_from(document)
+    mission = validate(Mission, document).with_document(document)
     locate(mission, document, ())
     return mission
 
@@ -57,7 +57,7 @@ def for_robot(mission: Mission, robot: str, part: str | None = None) -> Mission:
     own = None if part is None or mission.parts is None else mission.parts[part]
     laid_over = {} if own is None else {key: getattr(own, key) for key in own.model_fields_set - {"after"}}
     alone = mission.model_copy(update={**laid_over, "robot": robot, "robots": None, "parts": None})
-    return alone if own is None or part is None else alone.part_of(part)
+    return alone if own is None or part is None else alone.with_part(part)
 
 
 def import_folders(mission: Mission) -> tuple[Path, ...]:

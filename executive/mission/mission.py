@@ -54,7 +54,7 @@ def understood(
 
 def mission_from_meaning(meant: Understanding, *, world: str, robot_name: str) -> Mission:
     """The mission of a sentence that was understood."""
-    return mission_from_steps(steps_of(meant), world=world, robot_name=robot_name).noting(meant.notes)
+    return mission_from_steps(steps_of(meant), world=world, robot_name=robot_name).with_notes(meant.notes)
 
 
 def steps_of(meant: Understanding) -> tuple[Step, ...]:

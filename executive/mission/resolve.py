@@ -131,7 +131,7 @@ class _Resolver:
                 alias = name.removesuffix("_")
                 resolved[name] = self._part(scope, file.error, getattr(file, name), (alias,))
         problems.raise_any()
-        return file.model_copy(update=resolved).noting(self._notes())
+        return file.model_copy(update=resolved).with_notes(self._notes())
 
     def _steps(self, scope: _Scope, steps: Steps) -> Steps:
         """Steps in a row. Raises InputError: all that is wrong with them."""
@@ -142,7 +142,7 @@ class _Resolver:
         self.depth += 1
         for step in steps:
             with problems:
-                made.append(self._step(scope, step.under(scope.file.each)))
+                made.append(self._step(scope, step.with_policy(scope.file.each)))
         self.depth -= 1
         problems.raise_any()
         return tuple(made)
@@ -155,13 +155,13 @@ class _Resolver:
             raise step.error(path, what, hint)
         match step:
             case UseMission():
-                return step.meaning(self._used(scope, step))
+                return step.with_mission(self._used(scope, step))
             case CallSkill():
                 return step
             case Say():
                 return self._said(step)
             case Do():
-                return step.meaning(self._command(step.error, _texts(step)))
+                return step.with_command(self._command(step.error, _texts(step)))
             case ForEach():
                 return _group(step, self._rounds(scope, step), f"for each {step.loop.name}")
             case Set():
@@ -276,7 +276,7 @@ class _Resolver:
     def _said(self, step: Say) -> Step:
         """The step of a sentence: its commands, or a group of what it decides or repeats."""
         meant = self._meaning(step.error, ("say",), step.say)
-        return _group(step, meant.steps, step.say) if meant.steps else step.meaning(meant.commands)
+        return _group(step, meant.steps, step.say) if meant.steps else step.with_commands(meant.commands)
 
     def _meaning(self, error: _Error, path: KeyPath, sentence: str) -> Understanding:
         """What a sentence means; one that stands there again means the same. Raises InputError: not understood."""
@@ -310,7 +310,7 @@ class _Resolver:
             document = round_source(place.source, (*place.path, "steps"), step.steps, name, value)
             steps = validate(_Round, document).steps
             locate(steps, document, ("steps",))
-            made.append(_group(Group.model_construct().at(place), self._steps(scope, steps), str(value)))
+            made.append(_group(Group.model_construct().with_place(place), self._steps(scope, steps), str(value)))
         return tuple(made)
 
     def _round_values(self, step: ForEach) -> Sequence[Value]:
@@ -382,7 +382,7 @@ class _Resolver:
 def _group(step: Step, steps: Steps, name: str) -> Group:
     """Steps in a row in the place of a step, under its policy. Any text may be their name."""
     policy = {key: getattr(step, key) for key in Policy.model_fields}
-    return Group.model_construct(steps=steps, name=name, **policy).at(step.place)
+    return Group.model_construct(steps=steps, name=name, **policy).with_place(step.place)
 
 
 def _refuse_large(file: Mission, name: str, value: Value) -> None:

@@ -221,33 +221,33 @@ class Mission(_Whole):
         return tuple(command for step in self.walk() for command in step.commands)
 
     @property
-    def around(self) -> tuple[Step, ...]:
+    def framing_steps(self) -> tuple[Step, ...]:
         """The steps that interrupt its own, and those that are done in the end."""
         return (*(step for each in self.when or () for step in each.steps), *self.always)
 
     @property
-    def is_watched(self) -> bool:
+    def is_framed(self) -> bool:
         """Whether something is watched while its steps run, or done in the end."""
         return bool(self.always) or self.while_ is not None or self.when is not None
 
     def walk(self) -> Iterator[Step]:
         """All steps in order; a step that holds others comes before them."""
-        for step in (*self.steps, *self.around):
+        for step in (*self.steps, *self.framing_steps):
             yield from step.walk()
 
-    def noting(self, notes: tuple[str, ...]) -> Self:
+    def with_notes(self, notes: tuple[str, ...]) -> Self:
         """The same mission with such notes."""
         copy = self.model_copy()
         copy._notes = notes
         return copy
 
-    def read_from(self, document: YamlSource) -> Self:
+    def with_document(self, document: YamlSource) -> Self:
         """The same mission, which knows where it was read."""
         copy = self.model_copy()
         copy._document = document
         return copy
 
-    def part_of(self, name: str) -> Self:
+    def with_part(self, name: str) -> Self:
         """The same mission, which is the part of this name of a file for several robots."""
         copy = self.model_copy()
         copy._part = ("parts", name)

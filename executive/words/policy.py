@@ -110,7 +110,7 @@ class Policy(Strict):
         stops = self.on_failure in (None, OnFailure.STOP, OnFailure.RETRY)
         return stops and not guarded and not self.further_attempts and numbers == (None, None, None)
 
-    def under(self, below: Policy | None) -> Self:
+    def with_policy(self, below: Policy | None) -> Self:
         """The same with what it leaves open taken from `below`."""
         values: dict[str, Any] = {} if below is None else {key: getattr(below, key) for key in Policy.model_fields}
         return self.model_copy(

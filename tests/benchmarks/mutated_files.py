@@ -38,7 +38,7 @@ from plant.models.imported import read_imported
 from plant.worlds.world import WORLDS_FOLDER, load_world
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
-from tests.executive.mission.file.mutations import mutated_files, some_bytes
+from tests.executive.mission.mutations import mutated_files, some_bytes
 from tests.hostile_values import FILES
 
 ROOT = Path(__file__).parents[2]
@@ -158,7 +158,7 @@ def kinds(folder: Path) -> dict[str, Kind]:
     (home / "walls.obj").write_text(MESH)
     for name, content in {"m.pgm": pictures()["pgm"], "m.yaml": MAP.encode(), "tool.sdf": MODEL.encode()}.items():
         (folder / name).write_bytes(content)
-    good = [*sorted((ROOT / "missions").glob("*.yaml")), ROOT / "tests/executive/mission/file/every_block.yaml"]
+    good = [*sorted((ROOT / "missions").glob("*.yaml")), ROOT / "tests/executive/mission/every_block.yaml"]
     for each in good:
         shutil.copy(each, folder)
 

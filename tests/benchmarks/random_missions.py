@@ -133,7 +133,7 @@ class MissionMaker:
         steps = self.steps(0)
         policy = self.policy(whole=True) if rng.random() < 0.2 else Policy()
         values = {"n": rng.choice([0, 1, 2.5]), "word": "tea", "flag": False}
-        return Mission(name=name, robot="Alice", steps=steps, variables=values, **watched).under(policy)
+        return Mission(name=name, robot="Alice", steps=steps, variables=values, **watched).with_policy(policy)
 
     def steps(self, depth: int, *, still: bool = False) -> tuple[Step, ...]:
         """Some steps in a row; those that are `still` use no part of the robot."""
@@ -147,15 +147,15 @@ class MissionMaker:
         policy = self.policy(still=still) if rng.random() < 0.35 else Policy()
         if self.left > 0 and depth < 6 and rng.random() < 0.6:
             made = rng.choice([self.choose, self.repeat, self.try_, self.together, self.framed, self.asking, self.used])
-            return made(depth + 1, still).under(policy)
-        return self.small(still).under(policy)
+            return made(depth + 1, still).with_policy(policy)
+        return self.small(still).with_policy(policy)
 
     def small(self, still: bool) -> Step:
         """A step that holds no others."""
         rng = self.rng
         kind = rng.randrange(10) if not still else rng.randrange(4)
         if kind > 7:
-            return Say(say="get it and bring it").meaning(tuple(map(parse_command, rng.choice(PAIRS))))
+            return Say(say="get it and bring it").with_commands(tuple(map(parse_command, rng.choice(PAIRS))))
         if kind == 0:
             return self.set()
         if kind == 1:
@@ -298,7 +298,7 @@ class MissionMaker:
         steps = self.steps(depth, still=still)
         watched = self.watched(depth, still=still) if self.rng.random() < 0.4 else {}
         used = Mission(name="used", robot="Alice", steps=steps, variables=values, **watched)
-        return UseMission(use="used.yaml").meaning(used)
+        return UseMission(use="used.yaml").with_mission(used)
 
     def policy(self, *, whole: bool = False, still: bool = False) -> Policy:
         """A policy; that of a whole mission skips nothing."""

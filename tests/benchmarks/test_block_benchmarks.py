@@ -52,7 +52,7 @@ STEPS, NODES = 1000, 1000
 
 
 def block(made, policy=None):
-    return made.under(policy)
+    return made.with_policy(policy)
 
 
 def go(text):

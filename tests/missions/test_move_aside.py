@@ -55,7 +55,9 @@ def shelf(tmp_path, monkeypatch):
 
 def test_the_beer_before_it_is_moved_aside_and_the_coke_is_taken(shelf):
     steps = (Do.of(parse_command(f"Take [Nothing] to [{TAKEN}] and do [grasp] to [coke]")),)
-    mission = Mission(name="shelf", world=str(shelf.folder), robot="Alice", steps=steps).under(Policy(move_aside=1))
+    mission = Mission(name="shelf", world=str(shelf.folder), robot="Alice", steps=steps).with_policy(
+        Policy(move_aside=1)
+    )
     tree = compile_mission(mission, knowledge=knowledge_of(shelf), registry=built_in_skills())
     plant, said = simulation.Simulation(shelf, seed=SEED, visuals=False), list[str]()
     with LockStepWorker(plant.clock) as worker:

@@ -412,5 +412,5 @@ def structured(
 
 def _depth(step: Step) -> int:
     """How deeply blocks stand within blocks; what is done at the end does not count."""
-    inner = max(map(_depth, step.within), default=0)
+    inner = max(map(_depth, step.inner_steps), default=0)
     return inner + isinstance(step, Choose | Repeat | Try | Together | Ask)

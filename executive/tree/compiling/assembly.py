@@ -114,7 +114,7 @@ class _Assembler:
             first = (self._declare(mission, builder),)
         before = self.flow.copy()
         steps = self.level(mission.steps, base)
-        if mission.is_watched:
+        if mission.is_framed:
             row = replace(steps, nodes=(builder.node("sequence", "steps", *steps.nodes, part="all"),))
             steps = framed(self, row, mission, builder.at("whole"), before)
         self.values_base, self.flow.declared = outer

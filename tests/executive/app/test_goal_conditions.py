@@ -98,7 +98,7 @@ def conditions_by(knowledge, registry, run_tree):
 
 
 def step(text, policy=SKIPPED):
-    return Do.of(parse_command(text)).under(policy)
+    return Do.of(parse_command(text)).with_policy(policy)
 
 
 def test_a_step_that_was_skipped_has_no_condition(conditions_by, script):
@@ -113,7 +113,7 @@ def test_a_step_that_could_have_been_skipped_but_was_done_has_its_condition(cond
 def test_steps_of_a_used_mission_that_was_skipped_have_no_conditions(conditions_by, script):
     script.seen_on = ()
     used = Mission(name="inner", robot="Alice", steps=(step(GO, Policy()), step(GET, Policy())))
-    outer = UseMission(use="inner.yaml").meaning(used).under(SKIPPED)
+    outer = UseMission(use="inner.yaml").with_mission(used).with_policy(SKIPPED)
     assert [condition.kind for condition in conditions_by(outer, step(GO))] == [GoalKind.WENT]
 
 

@@ -34,7 +34,7 @@ AT_END, AT_STEP = When.END_OF_MISSION, When.END_OF_STEP
 
 
 def step(text, **policy):
-    return Do.of(parse_command(text)).under(Policy(**policy))
+    return Do.of(parse_command(text)).with_policy(Policy(**policy))
 
 
 def go(place, **policy):
@@ -175,7 +175,7 @@ def test_a_failed_attempt_does_not_count(asked, script):
 
     script.ends["stow"] = stow
     group = Group(steps=(go("hall"), CallSkill(skill="stow")))
-    tried = group.under(Policy(retries=6))
+    tried = group.with_policy(Policy(retries=6))
     assert asked(tried) == [("hall", AT_STEP)]
 
 

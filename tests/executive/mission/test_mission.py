@@ -211,8 +211,8 @@ def test_what_a_sentence_asks_for_comes_back_from_its_lines(parser, knowledge, s
 
 def test_of_a_file_only_the_commands_are_lines():
     place = Place(YamlSource(Path("mission.yaml"), None, {}, first_line=3), ())
-    step = Do.of(Command(goal="hall")).at(place)
-    assert lines_of((Repeat(loop=Loop(times=2), steps=(step,)).at(place),)) == (str(step.commands[0]),)
+    step = Do.of(Command(goal="hall")).with_place(place)
+    assert lines_of((Repeat(loop=Loop(times=2), steps=(step,)).with_place(place),)) == (str(step.commands[0]),)
 
 
 MISSIONS = [

@@ -17,7 +17,7 @@ def skill(name):
 
 
 def group(*steps, always, policy=None):
-    return Group(steps=tuple(steps), always=tuple(always)).under(policy)
+    return Group(steps=tuple(steps), always=tuple(always)).with_policy(policy)
 
 
 @pytest.fixture

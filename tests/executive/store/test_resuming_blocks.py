@@ -87,7 +87,7 @@ def works(done):
 
 
 def block(made, policy=None):
-    return made.under(policy)
+    return made.with_policy(policy)
 
 
 def do(*names):

@@ -53,7 +53,7 @@ def check(knowledge, registry, tmp_path):
         for line, one in enumerate(steps, start=1):
             place = Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=line), ())
             step = Do.of(parse_command(one)) if isinstance(one, str) else one
-            made.append(step.at(place) if isinstance(step, Do | CallSkill) else step)
+            made.append(step.with_place(place) if isinstance(step, Do | CallSkill) else step)
         mission = Mission(name="m", robot="Alice", steps=tuple(made))
         tree = compile_mission(mission, knowledge=knowledge, registry=registry)
         return check_tree(
@@ -316,5 +316,5 @@ def test_a_wait_for_a_time_of_day_is_a_range_with_that_time_as_its_reason(check)
 
 def test_a_time_limit_bounds_the_range(check):
     limit = Policy(timeout_s=600.0)
-    waited = check(Wait(awaited=Awaited(until_clock="18:00")).under(limit)).estimate
+    waited = check(Wait(awaited=Awaited(until_clock="18:00")).with_policy(limit)).estimate
     assert (waited.most_s, waited.reasons[0]) == (600.0, "600 s at most")

@@ -37,7 +37,7 @@ BRING = "Take [coke] to [kitchen] and do [Nothing] to [Nothing]"
 
 
 def block(made, policy=None):
-    return made.under(policy)
+    return made.with_policy(policy)
 
 
 def go(text):

@@ -269,7 +269,7 @@ def test_what_cannot_be_done_is_refused_with_a_reason(compiled, text, words):
 
 def test_refusals_name_the_line(knowledge, registry, tmp_path):
     command = parse_command("Take [Nothing] to [moon] and do [Nothing] to [Nothing]")
-    step = Do.of(command).at(Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=7), ()))
+    step = Do.of(command).with_place(Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=7), ()))
     with pytest.raises(InputError, match=r"m\.yaml:7: the place 'moon'"):
         compile_mission(Mission(name="m", robot="Alice", steps=(step,)), knowledge=knowledge, registry=registry)
 
@@ -278,7 +278,7 @@ def test_nodes_keep_their_line(knowledge, registry, tmp_path):
     place = Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=4), ())
     command = parse_command("Take [Nothing] to [kitchen] and do [grasp] to [coke]")
     tree = compile_mission(
-        Mission(name="m", robot="Alice", steps=(Do.of(command).at(place),)),
+        Mission(name="m", robot="Alice", steps=(Do.of(command).with_place(place),)),
         knowledge=knowledge,
         registry=registry,
     )

@@ -33,7 +33,7 @@ HOLDING = ValueIs(text="holding")
 
 
 def block(made, policy=None):
-    return made.under(policy)
+    return made.with_policy(policy)
 
 
 def do(name):

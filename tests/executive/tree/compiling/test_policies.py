@@ -24,7 +24,9 @@ NONE = Policy()
 def compile_steps(knowledge, registry):
     def compile_it(*steps, policy=NONE):
         return compile_mission(
-            Mission(name="round", robot="Alice", steps=steps).under(policy), knowledge=knowledge, registry=registry
+            Mission(name="round", robot="Alice", steps=steps).with_policy(policy),
+            knowledge=knowledge,
+            registry=registry,
         )
 
     return compile_it
@@ -37,7 +39,7 @@ def play(compile_steps, run_tree):
 
 
 def step(command, **policy):
-    return Do.of(command).under(Policy(**policy))
+    return Do.of(command).with_policy(Policy(**policy))
 
 
 @pytest.fixture

@@ -38,7 +38,7 @@ def load(tmp_path):
 
 def test_a_steps_policy_is_its_own_and_else_that_of_each(load):
     file = load(GOOD.replace("What now?", '"What now?"'))
-    first, second, third = (step.under(file.each) for step in file.steps)
+    first, second, third = (step.with_policy(file.each) for step in file.steps)
     assert first.guards == Guards(battery=0.3, localised=True, time_s=300.0, stale=StaleData.FAIL)
     assert (first.timeout_s, first.further_attempts, first.on_failure) == (20.0, 1, OnFailure.SKIP)
     assert second.question == OperatorQuestion(text="What now?", limit_s=9.0, default="skip")
@@ -55,7 +55,7 @@ def test_on_failure_retry_is_one_retry_unless_said(load):
 def test_moving_aside_is_allowed_for_a_step_or_for_each(load):
     text = "name: x\neach: {move_aside: 1}\nsteps:\n  - {to: hall}\n  - {to: hall, move_aside: 0}\n"
     file = load(text)
-    assert [step.under(file.each).move_aside for step in file.steps] == [1, 0]
+    assert [step.with_policy(file.each).move_aside for step in file.steps] == [1, 0]
 
 
 @pytest.mark.parametrize(

@@ -185,7 +185,7 @@ def test_wait(block, text, expected):
     ],
 )
 def test_small_blocks(block, text, expected):
-    assert block(text).at(None) == expected
+    assert block(text).with_place(None) == expected
 
 
 def test_values_are_expressions(block):
@@ -232,7 +232,7 @@ def test_what_a_mission_does_in_the_end_and_watches(load):
     )
     assert mission.variables == {"n": 2, "name": "tea", "hot": True}
     assert [type(step) for step in mission.always] == [Dock]
-    assert [type(step) for step in mission.around] == [Dock, Dock]
+    assert [type(step) for step in mission.framing_steps] == [Dock, Dock]
 
 
 # Refusals: the line in the file below, a part of the message, and of the hint.

@@ -1,0 +1,324 @@
+"""Steps that hold no others: commands, skills, used missions, and those that wait, check, charge, speak or set."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Final, Self
+
+from pydantic import (
+    BeforeValidator,
+    Field,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    StrictBool,
+    model_serializer,
+    model_validator,
+)
+
+from executive.words.command import Command, Task, command_of_parts, parts_of_command
+from executive.words.condition import Condition
+from executive.words.expression import Expression, Template, literal
+from executive.words.forms import Strict
+from executive.words.step import Fault, Scalar, Step, unreadable
+from skills.files.schema import Name, Text
+from skills.quantities import Duration, QuantityError, Share, clock_text
+
+__all__ = [
+    "COMMAND_KEYS",
+    "Answering",
+    "Awaited",
+    "CallSkill",
+    "Charging",
+    "Check",
+    "Do",
+    "Dock",
+    "Say",
+    "Set",
+    "Speak",
+    "UseMission",
+    "Wait",
+    "steps_of_commands",
+]
+
+COMMAND_KEYS: Final = ("take", "to", "do", "object")
+
+
+def _named_goal(value: object) -> object:
+    """A goal is named; a pose belongs to the skill that takes one. Raises QuantityError."""
+    if isinstance(value, list | dict):
+        hint = "for a pose write 'skill: navigate' with 'with: {x: 1.0, y: 2.0, yaw: 1.57}', in metres and radians"
+        raise QuantityError("should be the name of a place or person", hint)
+    return value
+
+
+Goal = Annotated[Text, BeforeValidator(_named_goal)]
+_ELSEWHERE: Final = "Whether an object that is not in its place is also searched for elsewhere; by default, yes."
+_GIVES: Final = (
+    "Names for the skill's output ports, or for the answer; later steps read them with {from: NAME} and in expressions."
+)
+
+
+class Say(Step):
+    """A sentence."""
+
+    say: Text = Field(description="What to do, in English.")
+    elsewhere: StrictBool | None = Field(default=None, description=_ELSEWHERE)
+    gives: dict[str, Name] | None = Field(default=None, description=_GIVES)
+    _meaning: tuple[Command, ...] = PrivateAttr(default=())
+
+    @property
+    def commands(self) -> tuple[Command, ...]:
+        """What the sentence means, once that is understood."""
+        return self._meaning
+
+    def with_commands(self, commands: tuple[Command, ...]) -> Say:
+        """The same sentence, which means these commands."""
+        copy = self.model_copy()
+        copy._meaning = commands
+        return copy
+
+
+class Do(Step):
+    """A command, by its parts."""
+
+    take: Text | None = Field(default=None, description="What is carried; a number may stand before it.")
+    to: Goal | None = Field(default=None, description='The place or person, or "start", or "Robin at hall".')
+    do: Task | None = Field(default=None, description="What to do there to the object.")
+    object: Text | None = Field(default=None, description="The object of the task, or who is looked for.")
+    elsewhere: StrictBool | None = Field(default=None, description=_ELSEWHERE)
+    gives: dict[str, Name] | None = Field(default=None, description=_GIVES)
+
+    @model_validator(mode="after")
+    def _is_a_command(self) -> Self:
+        if self.do is not Task.CHARGE and (self.do is None) != (self.object is None):
+            raise ValueError("'do' and 'object' go together")
+        if self.gives is not None and self.do is None:
+            raise ValueError("'gives' goes with 'skill', 'ask', 'check', 'say' or 'do'")
+        return self
+
+    @classmethod
+    def of(cls, command: Command) -> Do:
+        """The step of a command, whose verb it remembers."""
+        step = cls.model_validate(parts_of_command(command))
+        step.__dict__["command"] = command
+        return step
+
+    def with_command(self, command: Command) -> Do:
+        """The same step with another command."""
+        parts: Mapping[str, Any] = {**dict.fromkeys(COMMAND_KEYS), **parts_of_command(command), "do": command.task}
+        copy = self.model_copy(update=parts)
+        copy.__dict__["command"] = command
+        return copy
+
+    @functools.cached_property
+    def command(self) -> Command:
+        """The command. Raises ValueError: a part is no name."""
+        do = None if self.do is None else self.do.value
+        return command_of_parts({"take": self.take, "to": self.to, "do": do, "object": self.object})
+
+    @property
+    def commands(self) -> tuple[Command, ...]:
+        """The one command."""
+        return (self.command,)
+
+
+def steps_of_commands(commands: Sequence[Command]) -> tuple[Do, ...]:
+    """A step for each command."""
+    return tuple(map(Do.of, commands))
+
+
+class CallSkill(Step):
+    """A skill with its ports."""
+
+    skill: Name = Field(description="The name of a registered skill.")
+    values: Annotated[
+        dict[str, Any] | None,
+        Field(alias="with", description="The skill's input ports, or the parameters of the used file."),
+    ] = None
+    gives: dict[str, Name] | None = Field(default=None, description=_GIVES)
+
+    @property
+    def words(self) -> str:
+        """The skill's name."""
+        return self.skill
+
+
+class UseMission(Step):
+    """Another mission file, which is done as a step."""
+
+    use: Name = Field(description="Another mission file, as seen from this file's folder.")
+    values: Annotated[
+        dict[str, Any] | None,
+        Field(alias="with", description="The skill's input ports, or the parameters of the used file."),
+    ] = None
+    _mission: Any = PrivateAttr(default=None)
+
+    @property
+    def mission(self) -> Any:
+        """The `Mission` of the file, once that is read."""
+        return self._mission
+
+    def with_mission(self, mission: Any) -> UseMission:
+        """The same step with its mission."""
+        copy = self.model_copy()
+        copy._mission = mission
+        return copy
+
+    @property
+    def inner_steps(self) -> tuple[Step, ...]:
+        """The mission's steps."""
+        return () if self._mission is None else (*self._mission.steps, *self._mission.framing_steps)
+
+    @property
+    def words(self) -> str:
+        """The mission's name."""
+        return self.use if self._mission is None else str(self._mission.name)
+
+
+Clock = Annotated[str, BeforeValidator(clock_text)]
+"""A time of day."""
+
+
+class Awaited(Strict):
+    """What is waited for: one of a condition, a time and a time of day."""
+
+    condition: Annotated[Condition | None, Field(alias="for", description="Wait until this holds.")] = None
+    seconds: Duration | None = Field(default=None, description='So long: seconds, or "10 min".')
+    until_clock: Clock | None = Field(default=None, description='Until this time of day, as in "14:30".')
+    every_s: Annotated[
+        Duration, Field(alias="every", description="How often a condition that takes a look is looked at.")
+    ] = 15.0
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        if sum(each is not None for each in (self.condition, self.seconds, self.until_clock)) != 1:
+            raise ValueError("give one of 'for', 'seconds' and 'until_clock'")
+        return self
+
+    @property
+    def until_clock_s(self) -> float:
+        """The time of day, in seconds after midnight; 0 where none is awaited."""
+        hours, minutes = map(int, (self.until_clock or "00:00").split(":"))
+        return 3600.0 * hours + 60.0 * minutes
+
+
+class Wait(Step):
+    """`wait`: for a condition, some time, or until a time of day."""
+
+    key: ClassVar[str] = "wait"
+    awaited: Annotated[
+        Awaited, Field(alias="wait", description="Wait for a condition, some time, or until a time of day.")
+    ]
+
+    @property
+    def words(self) -> str:
+        """The condition in words, where it waits for one."""
+        condition = self.awaited.condition
+        return self.key if condition is None else f"wait until {condition}"
+
+
+class Answering(Step):
+    """A step whose answer later steps may read under a name."""
+
+    gives: dict[str, Name] | None = Field(default=None, description=_GIVES)
+
+    @property
+    def answer_name(self) -> str | None:
+        """The name of its answer."""
+        return (self.gives or {}).get("answer")
+
+    @property
+    def faults(self) -> Iterator[Fault]:
+        """What it does not give."""
+        for wrong in (port for port in self.gives or () if port != "answer"):
+            yield ("gives", wrong), f"it gives no '{wrong}'", "write {answer: NAME}"
+
+
+class Check(Answering):
+    """`check`: answers whether a condition holds; the answer is part of the mission's result."""
+
+    key: ClassVar[str] = "check"
+    condition: Annotated[
+        Condition, Field(alias="check", description="Answer whether a condition holds, as part of the result.")
+    ]
+
+    @property
+    def words(self) -> str:
+        """The condition in words."""
+        return f"check whether {self.condition}"
+
+
+class Charging(Strict):
+    """How far to charge at the dock."""
+
+    level: Share | None = Field(
+        default=None, description="The charge, from 0 to 1; by default as the knowledge file says."
+    )
+
+
+class Dock(Step):
+    """`dock`: go to the dock and charge."""
+
+    key: ClassVar[str] = "dock"
+    charging: Annotated[
+        Charging,
+        BeforeValidator(lambda value: {} if value is None else value, json_schema_input_type=Charging | None),
+        Field(alias="dock", description="Go to the dock and charge."),
+    ] = Charging()
+
+    @model_serializer(mode="wrap")
+    def _with_its_key(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {"dock": {}, **handler(self)}
+
+    @property
+    def level(self) -> float | None:
+        """The charge, from 0 to 1; None: as the knowledge file says."""
+        return self.charging.level
+
+
+class Speak(Step):
+    """`speak`: says a text to the people around."""
+
+    key: ClassVar[str] = "speak"
+    speak: Text = Field(description="What to say to the people around; {NAME} puts in a value.")
+
+    @property
+    def text(self) -> Template:
+        """The text with its values. Raises ExpressionError."""
+        return Template(self.speak)
+
+    @property
+    def words(self) -> str:
+        """The text in quotes."""
+        return f'speak "{self.speak}"'
+
+    @property
+    def faults(self) -> Iterator[Fault]:
+        """A text that cannot be read."""
+        yield from unreadable(("speak",), lambda: self.text)
+
+
+class Set(Step):
+    """`set`: values by name, worked out in order."""
+
+    key: ClassVar[str] = "set"
+    set: dict[Name, Scalar] = Field(description="Values by name: numbers, truths or expressions.")
+
+    @property
+    def values(self) -> Mapping[str, Expression]:
+        """The expression of each value. Raises ExpressionError."""
+        return {name: _expression(value) for name, value in self.set.items()}
+
+    @property
+    def faults(self) -> Iterator[Fault]:
+        """Names without a value, and values that cannot be read."""
+        for name, value in self.set.items():
+            if value is None:
+                yield ("set", name), f"'{name}' gets no value", "give a number, a truth or an expression"
+            yield from unreadable(("set", name), functools.partial(_expression, value))
+
+
+def _expression(value: Scalar) -> Expression:
+    """A value as an expression. Raises ExpressionError."""
+    return Expression(value) if isinstance(value, str) else literal(0 if value is None else value)

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from executive.app import simulated
 from executive.app.mission_run import Finished
 from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry
@@ -48,7 +47,7 @@ def no_plant(monkeypatch):
         prepared.request.out.mkdir(parents=True, exist_ok=True)
         return Finished(ended["report"], node_view(prepared.tree.root))
 
-    monkeypatch.setattr(simulated, "run_simulated", run_simulated)
+    monkeypatch.setattr("executive.app.runs.run_simulated", run_simulated)
     return ended
 
 

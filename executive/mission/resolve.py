@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -14,7 +14,8 @@ from executive.language.questions import Answerer, answer_by
 from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
 from executive.mission.load import load_mission, locate
 from executive.mission.parameters import round_source
-from executive.words.command import START, TIME_UNITS_S, Command, Task, Thing, command_of_parts
+from executive.mission.world_names import in_world_names, unknown_names
+from executive.words.command import START, Command, Task, command_of_parts
 from executive.words.condition import (
     RANGES,
     AllOf,
@@ -242,10 +243,10 @@ class _Resolver:
         except ValueError as fault:
             raise error(path, str(fault), "write names in plain words") from fault
         problems = Problems()
-        for key, what, hint in _unknown_names(command, self.knowledge):
+        for key, what, hint in unknown_names(command, self.knowledge):
             problems.add(error((*path, key), what, hint))
         problems.raise_any()
-        return _known(command, self.knowledge)
+        return in_world_names(command, self.knowledge)
 
     def _person(self, error: _Error, name: str, path: KeyPath) -> str:
         """The person who is meant, perhaps anybody."""
@@ -405,46 +406,6 @@ def _refuse_decided(error: _Error, expression: str | Expression, path: KeyPath) 
 def _texts(step: Do) -> dict[str, str | None]:
     do = None if step.do is None else step.do.value
     return {"take": step.take, "to": step.to, "do": do, "object": step.object}
-
-
-def _unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
-    """The names that a world does not have: the key, a sentence and a hint for each."""
-
-    def unknown(kind: str, name: str, known: Sequence[str]) -> tuple[str, str]:
-        return f"unknown {kind} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
-
-    waits = command.task is Task.WAIT and command.object is not None and command.object.name in TIME_UNITS_S
-    for key, thing in (("take", command.item), ("object", None if waits else command.object)):
-        person = command.task is Task.FIND and thing is not None and knowledge.somebody(thing.name) is not None
-        if thing is not None and knowledge.thing(thing.name) is None and not person:
-            yield key, *unknown("object", thing.name, knowledge.thing_names())
-    goals = (*knowledge.place_names(), *knowledge.people, START)
-    if command.goal is not None and _goal(command.goal, knowledge) is None:
-        yield "to", *unknown("place or person", command.goal, goals)
-    if command.goal_at is not None and knowledge.place(command.goal_at) is None:
-        yield "to", *unknown("place", command.goal_at, knowledge.place_names())
-
-
-def _known(command: Command, knowledge: Knowledge) -> Command:
-    """The command in the world's own names."""
-
-    def named(thing: Thing | None) -> Thing | None:
-        known = thing and (knowledge.thing(thing.name) or knowledge.somebody(thing.name))
-        return thing and Thing(known or thing.name, thing.attributes)
-
-    return Command(
-        item=named(command.item),
-        goal=command.goal and _goal(command.goal, knowledge),
-        goal_at=command.goal_at and knowledge.place(command.goal_at),
-        task=command.task,
-        object=named(command.object),
-        item_count=command.item_count,
-        object_count=command.object_count,
-    )
-
-
-def _goal(name: str, knowledge: Knowledge) -> str | None:
-    return START if name == START else knowledge.place(name) or knowledge.person(name)
 
 
 def _room(place: str, knowledge: Knowledge) -> str | None:

@@ -59,12 +59,15 @@ class RunShared:
 
 
 class RunRobot:
-    """One robot, with or without a mission. `context` is what may be done with it, under the lease that it has."""
+    """One robot, with or without a mission. `context` is what may be done with it, under the lease that it has; `pose`
+    is where it believed to be when it last sensed (None: it did not know).
+    """
 
     def __init__(self, entry: RunEntry, shared: RunShared) -> None:
         """Raises what the robot's verbs raise."""
         self.name: Final = entry.robot.name
         limits, self._traffic = shared.settings, shared.traffic
+        self.pose: Pose2D | None = None
         self._guarded = GuardedRobot(
             entry.robot, shared.watchdog, limit_s=limits.verb_limit_s, image_limit_s=limits.image_limit_s
         )
@@ -98,10 +101,13 @@ class RunRobot:
             traffic=shared.traffic.view_of(name),
         )
 
-    def status(self) -> RobotStatus:
-        """Where the robot is, whether it holds something, and its battery's charge. Raises what its verbs raise."""
-        robot = self.context.robot
-        return RobotStatus(self.context.known_pose(), robot.gripper().holding, robot.battery().charge)
+    def status(self, *, now: bool = False) -> RobotStatus:
+        """Where the robot is (as it last sensed, or `now`), whether it holds something, and its battery's charge.
+
+        Raises what its verbs raise.
+        """
+        robot, pose = self.context.robot, self.context.known_pose() if now else self.pose
+        return RobotStatus(pose, robot.gripper().holding, robot.battery().charge)
 
     def sense(self) -> None:
         """Bring the estimators up to date, and tell the others where the robot believes to be."""
@@ -113,7 +119,8 @@ class RunRobot:
         context.localiser.update(context.robot)
         estimate = context.localiser.estimate()
         context.costmap.update(context.robot, estimate)
-        self._traffic.heard(self.name, context.known_pose())
+        self.pose = context.known_pose()
+        self._traffic.heard(self.name, self.pose)
 
     def claim(self) -> RunContext:
         """Claim the lease, which nobody holds; what may be used under it. Raises LeaseError."""

@@ -214,8 +214,9 @@ class _Run:
         self._publish_events(requests.events)
         if requests.cancel is not None:
             self._stop(Ending(Outcome.CANCELLED, Cause.CANCELLED, requests.cancel or "cancelled"), requests.insists)
-        for session in (each for each in live if each.result is None):
-            self._for(session, partial(self._obey, session, requests))
+        if requests.of_robots:
+            for session in (each for each in live if each.result is None):
+                self._for(session, partial(self._obey, session, requests))
         under_way = [session for session in live if session.result is None]
         if not under_way:
             return requests
@@ -303,20 +304,21 @@ class _Run:
     def _note_ends(self, live: Sequence[Session]) -> None:
         """See how the robots are, and close the missions that have ended."""
         for session in live:
-            if not session.finished:
-                self._for(session, partial(self._look, session))
-        for session in live:
-            if session.finished:
-                result = session.close()
-                session.context.traffic.release()
-                if session.gone is None:
-                    self._for(session, partial(self._look, session))
-                if session.gone is None:
-                    self._idle.append(session)
-                self._note_end(result, session.main_tree, session.gone)
+            if not session.finished and self._look(session):
+                continue
+            result = session.close()
+            session.context.traffic.release()
+            if session.gone is None and self._look(session, now=True):
+                self._idle.append(session)
+            self._note_end(result, session.main_tree, session.gone)
 
-    def _look(self, session: Session) -> None:
-        self._seen[session.name] = session.status()
+    def _look(self, session: Session, *, now: bool = False) -> bool:
+        """See how a robot is; whether it still answers."""
+        status = self._for(session, partial(session.status, now=now))
+        if status is None:
+            return False
+        self._seen[session.name] = status
+        return True
 
     def _note_end(self, result: RobotResult, tree: CompiledTree, gone: str | None) -> None:
         name = result.robot_name

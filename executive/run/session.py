@@ -85,7 +85,7 @@ class Session(RunRobot):
     def sense(self) -> None:
         """Bring the estimators up to date, and log pose and state twice a second."""
         super().sense()
-        self._asked_at = self._asked_at or self.context.known_pose()
+        self._asked_at = self._asked_at or self.pose
         self.report()
 
     def may_move(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,6 +16,7 @@ __all__ = ["SILENT_S", "TrafficTable"]
 SILENT_S = 2.0
 """Who was not heard of for so long (s of the run's clock) has no claim and no path any more."""
 _ABOUT_M = 0.2
+_NOTHING: Final[FloatArray] = np.empty((0, 3))
 _TOLD_EVERY_M = 0.25
 
 
@@ -27,18 +28,28 @@ class _Robot:
     """
 
     discs: FloatArray
-    pose: FloatArray | None = None
+    believed: Pose2D | None = None
     stamp_s: float = -np.inf
     path: FloatArray | None = None
     turn: int | None = None
     told: Mapping[str, Any] | None = None
     idle: bool = False
+    _pose: tuple[Pose2D, FloatArray] | None = None
     _covered: tuple[FloatArray, FloatArray, FloatArray] | None = None
+
+    @property
+    def pose(self) -> FloatArray | None:
+        """Where it believes to be (x, y, yaw in the world), the same array until that changes."""
+        if self.believed is None:
+            return None
+        if self._pose is None or self._pose[0] is not self.believed:
+            self._pose = self.believed, np.array([self.believed.x_m, self.believed.y_m, self.believed.yaw_rad])
+        return self._pose[1]
 
     def covered_W(self) -> FloatArray:
         """What it covers where it believes to be: discs (N, 3) of x, y and radius (m, world), a little wider."""
         if self.pose is None:
-            return np.empty((0, 3))
+            return _NOTHING
         if self._covered is None or self._covered[0] is not self.pose or self._covered[1] is not self.discs:
             c, s = np.cos(self.pose[2]), np.sin(self.pose[2])
             centres = self.pose[:2] + self.discs[:, :2] @ np.array([[c, s], [-s, c]])
@@ -66,8 +77,7 @@ class TrafficTable:
         """A robot still answers, and believes to be at a pose of the world; None: it does not know."""
         robot = self._robots[name]
         robot.stamp_s = self._now()
-        if pose is not None:
-            robot.pose = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
+        robot.believed = pose or robot.believed
 
     def rest(self, name: str, *, idle: bool) -> None:
         """A robot has nothing to do and clears paths that others reserve, or has work again."""
@@ -131,7 +141,7 @@ class TrafficTable:
         What a robot sees there is one of them.
         """
         others = [robot for other, robot in self._robots.items() if other != name and not self._silent(robot)]
-        return np.vstack([np.empty((0, 3)), *(robot.covered_W() for robot in others)])
+        return np.vstack([_NOTHING, *(robot.covered_W() for robot in others)]) if others else _NOTHING
 
     def goes_before(self, one: str, other: str) -> bool:
         """Whether one has the right of way: it claimed first, and still answers."""

@@ -18,11 +18,11 @@ from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.context import Endings, RunContext
 from executive.tree.behaviours.decisions import Decide, buttons_of
 from executive.tree.behaviours.explained import Explained, message_of
-from executive.tree.behaviours.policies import Skip
 from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import node_view
+from executive.tree.nodes.policies import Skip
 from executive.tree.nodes.wait import WaitFor
 from executive.tree.snapshot import Change, NodeState, Observed, Snapshot
 from executive.words.goal import GoalKind

@@ -11,12 +11,13 @@ from typing import Any, Final
 from py_trees.behaviour import Behaviour
 
 from executive.tree import nodes
-from executive.tree.behaviours import answer, composites, decisions, decorators, leaves, policies, recovery, skill_leaf
+from executive.tree.behaviours import answer, composites, decisions, decorators, leaves, recovery, skill_leaf
 from executive.tree.behaviours.context import RunContext
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.compiling.flow import Assembler, BlockPlans
 from executive.tree.compiling.part import Assembled
 from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.nodes import policies
 from executive.words.steps import Step
 
 __all__ = ["KINDS", "Changes", "block_plan", "build", "writes"]

@@ -12,9 +12,9 @@ from typing import Final
 
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import BatteryAtLeast, Condition, KnowsPlace, NotAfter
-from executive.tree.behaviours.policies import FINAL_CAUSES, RETRY, SKIP, STOP
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.policies import FINAL_CAUSES, RETRY, SKIP, STOP
 from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
 from skills.api import Cause
 

@@ -11,11 +11,11 @@ from py_trees.common import Status
 from executive.mission.gripper import either
 from executive.tree.behaviours.composites import MemoryComposite
 from executive.tree.behaviours.explained import cause_of, message_of
-from executive.tree.behaviours.policies import FINAL_CAUSES
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.compiling.flow import Assembler, BlockPlans, branch_of
 from executive.tree.compiling.part import Assembled
 from executive.tree.node import NodeKind
+from executive.tree.nodes.policies import FINAL_CAUSES
 from executive.words import steps as model
 
 

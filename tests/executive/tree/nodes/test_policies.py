@@ -7,7 +7,7 @@ from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
 from executive.tree.behaviours.explained import Explained
-from executive.tree.behaviours.policies import AskOperator, GoBack, Skip, Summary
+from executive.tree.nodes.policies import AskOperator, GoBack, Skip, Summary
 from skills.api import Cause
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID

@@ -17,7 +17,6 @@ from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.compiling.flow import Assembler, BlockPlans
 from executive.tree.compiling.part import Assembled
 from executive.tree.node import NodeKind, NodeSpec
-from executive.tree.nodes import policies
 from executive.words.steps import Step
 
 __all__ = ["KINDS", "Changes", "block_plan", "build", "writes"]
@@ -27,7 +26,7 @@ Changes = Mapping[str, Callable[[Any], object]]
 
 _PAGES: Final = tuple(import_module(f"{nodes.__name__}.{page.name}") for page in iter_modules(nodes.__path__))
 """Each page of `executive.tree.nodes`: what it defines of `KINDS` and `PLANS` is registered by being there."""
-_HOMES: Final = (answer, composites, decisions, decorators, leaves, policies, recovery, skill_leaf, *_PAGES)
+_HOMES: Final = (answer, composites, decisions, decorators, leaves, recovery, skill_leaf, *_PAGES)
 KINDS: Final[Mapping[str, NodeKind]] = {n: kind for home in _HOMES for n, kind in getattr(home, "KINDS", {}).items()}
 PLANS: Final[BlockPlans] = {model: plan for page in _PAGES for model, plan in getattr(page, "PLANS", {}).items()}
 _NO_CHANGES: Final[Changes] = MappingProxyType({})

@@ -11,7 +11,6 @@ from executive.tree.behaviours.board import Constant
 from executive.tree.compiling.builder import PICK_UPS, PlanBuilder, Registry, start_key
 from executive.tree.compiling.flow import PYTHON_TYPES, Flow, answering, block_name, give, set_plan
 from executive.tree.compiling.part import Assembled, StepPart
-from executive.tree.compiling.policies import PolicyFrame, needs_way_back, under_policy
 from executive.tree.compiling.search import surfaces_elsewhere
 from executive.tree.compiling.skill_steps import skill_plan
 from executive.tree.compiling.steps import step_plan
@@ -21,6 +20,7 @@ from executive.tree.kinds import block_plan
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.clearing import clear_plan, is_clearing, refuse_everything
 from executive.tree.nodes.group import framed
+from executive.tree.nodes.policies import PolicyFrame, needs_way_back, under_policy
 from executive.words.command import START, Command, Task
 from executive.words.expression import kind_of, literal
 from executive.words.goal import GoalCondition, When

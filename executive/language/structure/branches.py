@@ -22,8 +22,10 @@ from executive.language.structure.row import (
     one_errand,
     same,
     say,
+    seconds_of_cue,
     sentence_of,
     state_behind_both,
+    times_of_cue,
     unclear,
     was_not,
     where_it_is_taken,
@@ -197,6 +199,7 @@ class Branches(Base):
             [replace(body[0], joint=""), *body[1:]], replace(row.state, held=None, goal=None, at=None)
         )
         row.steps[row.begun :] = []
+        otherwise = _done(otherwise, spoken(body))
         self.put(row, Try(steps=tried, otherwise=otherwise), state_behind_both(row.state, state))
         return end
 
@@ -252,15 +255,15 @@ class Branches(Base):
         steps, state = self.sequence([replace(body[0], joint=""), *body[1:]], begun)
         if rounds.loop.times is None and rounds.loop.every_s is None and not _worth_repeating(steps):
             raise RefusalError("I do not see what is to be repeated; say 'wait there until ...'", [spoken(body)])
-        self.put(row, _one_repeat(Repeat(loop=rounds.loop, steps=steps)), state)
+        self.put(row, _one_repeat(Repeat(loop=rounds.loop, steps=_done(steps, spoken(body)))), state)
 
     def _how_often(self, row: Row, clause: Clause, follows: Sequence[Clause]) -> tuple[Rounds, str]:
         """How often what is behind it is to be done, and the rest of the words."""
         state = row.state
         if clause.kind is Cue.EVERY:
-            return self._every(_span(clause.cue), clause.text, state, bool(follows))
+            return self._every(seconds_of_cue(clause.cue), clause.text, state, bool(follows))
         if clause.kind is Cue.TIMES:
-            return Rounds(Loop(times=_times(clause.cue)), state), clause.text
+            return Rounds(Loop(times=times_of_cue(clause.cue)), state), clause.text
         if clause.kind is Cue.UNTIL:
             for cut_at in (len(clause.text), *verb_positions(clause.text)):
                 if time_of(clause.text[:cut_at].strip(" ,")) is not None:
@@ -340,9 +343,9 @@ class Branches(Base):
             self.beside(row, found.text[match.end() :].strip(), scope)
             return
         if found.kind is Cue.EVERY:
-            rounds = self.limited(_span(found.cue), found.text, row.state)
+            rounds = self.limited(seconds_of_cue(found.cue), found.text, row.state)
         elif found.kind is Cue.TIMES:
-            rounds = None if found.text else Rounds(Loop(times=_times(found.cue)), row.state)
+            rounds = None if found.text else Rounds(Loop(times=times_of_cue(found.cue)), row.state)
         else:
             rounds = self._rounds_behind(row, scope, found)
         if rounds is None:
@@ -402,8 +405,16 @@ class Branches(Base):
         both = Supposed(condition, supposed.said, supposed.holds, supposed.fails)
         if found.kind is Cue.UNLESS:
             both = replace(both, holds=supposed.fails, fails=supposed.holds)
+        steps = _done(steps, spoken(scope))
         self.put(row, Choose(condition=condition, then=steps), state_behind_both(state, row.state))
         row.asked = LookedAt(both, looked=False, decided=True)
+
+
+def _done(steps: Steps, said: str) -> Steps:
+    """The steps. Raises RefusalError: there are none ("do nothing twice")."""
+    if not steps:
+        raise RefusalError(f"'{said}' is nothing to do; leave it out", [said])
+    return steps
 
 
 def _worth_repeating(steps: Steps) -> bool:
@@ -428,20 +439,3 @@ def _rounds_by(kind: Cue | None, supposed: Supposed) -> Rounds:
     if kind is Cue.UNTIL:
         return Rounds(Loop(until=supposed.condition), supposed.fails)
     return Rounds(Loop(while_=supposed.condition), supposed.holds)
-
-
-def _span(cue: str) -> float:
-    """The seconds of "every ten minutes"."""
-    words = re.sub(r"^(?:once )?(?:every|each|per) |^once (?=an? )|^once per ", "", cue, flags=re.IGNORECASE)
-    seconds = seconds_of(words if words not in ("hour", "minute") else f"a {words}")
-    if seconds is None:
-        raise RefusalError(f"'{cue}' is no time that I understand", [cue])
-    return seconds
-
-
-def _times(cue: str) -> int:
-    words = re.sub(r"^(?:do|repeat) (?:this |that |the following |it )?|^for ", "", cue, flags=re.IGNORECASE)
-    count = times_of(words)
-    if count is None:
-        raise RefusalError(f"'{cue}' is no number of times that I understand", [cue])
-    return count

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from executive.language.amounts import seconds_of, times_of
 from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, spoken
 from executive.language.lexicon import VerbKind
 from executive.language.questions import RefusalError
@@ -249,3 +250,21 @@ class Base:
         """A new sentence begins: what was said before stands for itself, where it is a request."""
         self.flush(row)
         row.begun = len(row.steps)
+
+
+def seconds_of_cue(cue: str) -> float:
+    """The seconds of "every ten minutes"."""
+    words = re.sub(r"^(?:once )?(?:every|each|per) |^once (?=an? )|^once per ", "", cue, flags=re.IGNORECASE)
+    seconds = seconds_of(words if words not in ("hour", "minute") else f"a {words}")
+    if seconds is None:
+        raise RefusalError(f"'{cue}' is no time that I understand", [cue])
+    return seconds
+
+
+def times_of_cue(cue: str) -> int:
+    """How often "do this three times" is. Raises RefusalError: it is no number of times."""
+    words = re.sub(r"^(?:do|repeat) (?:this |that |the following |it )?|^for ", "", cue, flags=re.IGNORECASE)
+    count = times_of(words)
+    if count is None:
+        raise RefusalError(f"'{cue}' is no number of times that I understand", [cue])
+    return count

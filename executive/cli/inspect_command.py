@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 from rich.console import Console
@@ -17,7 +17,6 @@ from rich.text import Text
 
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, refusals, show_table, terminal_answerer, write_text
-from executive.mission.request import Request
 from executive.record.history import History, read_history
 from executive.record.schemas import ERRORS
 from executive.record.timeline import Entry, timeline
@@ -31,6 +30,9 @@ from executive.view.text import printable, to_text
 from skills.files.errors import InputError
 from skills.files.outside import is_file
 from skills.quantities import Count, Delay, Port, Tries, Wait
+
+if TYPE_CHECKING:
+    from executive.mission.request import Request
 
 RECORDING: Final = "recording.html"
 LOG_SUFFIX: Final = ".mcap"
@@ -216,6 +218,7 @@ def _request(text: str | None, say: str | None, world: str | None) -> Request:
     if text is not None and say is not None:
         raise InputError("a sentence and --say were given", hint="leave one of them out")
     from executive.app.mission_files import shipped_missions
+    from executive.mission.request import Request
 
     if text is not None and (text.endswith((".yaml", ".yml")) or text in shipped_missions() or is_file(Path(text))):
         return Request(file=Path(text), world=world)

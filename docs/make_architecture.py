@@ -10,9 +10,16 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 PATH = Path(__file__).resolve().parent / "architecture.svg"
-WIDTH, HEIGHT = 1160, 660
+WIDTH, HEIGHT = 1300, 740
 INK, PALE = "#1f2933", "#52606d"
-FILLS = {"executive": "#e6f0fa", "skills": "#e9f6ec", "plant": "#fbf1e0", "cli": "#f1ecf8"}
+FILLS = {
+    "executive": "#e6f0fa",
+    "skills": "#e9f6ec",
+    "plant": "#fbf1e0",
+    "cli": "#f1ecf8",
+    "app": "#e3ddf3",
+    "training": "#f3f4f6",
+}
 
 
 @dataclass(frozen=True)
@@ -50,20 +57,23 @@ class Box:
 ROW, LOWER = 70, 182
 UNDERSTAND = Box(40, ROW, 150, 70, "language", ("sentence to commands",))
 MISSION = Box(230, ROW, 150, 70, "mission", ("YAML, checked",))
-COMPILE = Box(420, ROW, 150, 70, "tree/compiling", ("node specs, plain data",))
-TREE = Box(610, ROW, 150, 70, "tree/behaviours", ("guards, recovery", "and skill leaves"))
-RUN = Box(800, ROW, 150, 70, "run", ("time, ticks, leases",))
-KNOW = Box(135, LOWER, 150, 60, "knowledge", ("places, objects, people",))
+COMPILE = Box(420, ROW, 150, 70, "tree: plans", ("node specs, plain data",))
+TREE = Box(610, ROW, 150, 70, "tree: nodes", ("guards, recovery", "and skill leaves"))
+RUN = Box(800, ROW, 150, 70, "run", ("time, ticks, leases;", "visitors watch"))
+WORDS = Box(135, LOWER, 150, 60, "words", ("commands, knowledge,", "steps, goals: data"))
 STORE = Box(325, LOWER, 150, 60, "store", ("queue and resume",))
 RECORD = Box(515, LOWER, 150, 60, "record", ("log.mcap",))
-VIEW = Box(705, LOWER, 245, 60, "view, control", ("text, SVG, page; pause, step, ask",))
+VIEW = Box(705, LOWER, 245, 60, "view, conversation", ("text, SVG, page; pause, step, ask",))
 SKILL = Box(40, 350, 340, 80, "one folder for each skill", ("navigate, detect, approach, grasp, place, hand_over,", "stow, relocalise, ... and skills of other packages"))  # fmt: skip  # noqa: E501
 ESTIMATE = Box(420, 350, 200, 80, "estimate", ("localiser, costmap:", "immutable snapshots"))
 PROTOCOL = Box(660, 350, 290, 80, "robot.py: the Robot protocol", ("know, sense, act, own a lease;", "every motion expires"))  # fmt: skip  # noqa: E501
 SPOT = Box(660, 540, 290, 80, "spot, sensors, locomotion", ("servos; noisy LiDAR, cameras, odometry", "in a Drake Diagram"))  # fmt: skip  # noqa: E501
 WORLDS = Box(420, 540, 200, 80, "worlds, models", ("rooms, furniture, objects,", "people; placed by the seed"))
 REFEREE = Box(40, 540, 340, 80, "referee", ("knows the truth and judges afterwards;", "nobody else may ask it"))
-CLI = Box(1010, ROW, 120, 550, "cli", ("the one place", "that puts all", "three together", "", "parse, check,", "tree, run,", "queue, resume,", "log, replay,", "evaluate"))  # fmt: skip  # noqa: E501
+APP = Box(1010, ROW, 130, 550, "app", ("the application:", "one request,", "prepared for", "its robots;", "one loop of runs;", "dispatch, report,", "evaluate", "", "puts all three", "together"))  # fmt: skip  # noqa: E501
+CLI = Box(1160, ROW, 120, 550, "cli", ("commands,", "options, output", "", "parse, check,", "tree, run,", "queue, resume,", "log, replay,", "evaluate"))  # fmt: skip  # noqa: E501
+TRAINING = Box(20, 660, 1260, 56, "training: errand-train, a distribution of its own", ("data sets, training of the detector and of speech, makers of shipped models and worlds; imports all, and nothing imports it",))  # fmt: skip  # noqa: E501
+TALL = (APP, CLI)
 
 
 def area(kind: str, y: int, height: int, title: str) -> str:
@@ -77,11 +87,11 @@ def area(kind: str, y: int, height: int, title: str) -> str:
 def drawn(box: Box, fill: str = "#ffffff") -> str:
     """A box with its words."""
     middle, lines = box.x + box.w // 2, box.words
-    first = box.y + 26 if box is CLI else box.y + box.h // 2 - 8 * len(lines) + 4
+    first = box.y + 26 if box in TALL else box.y + box.h // 2 - 8 * len(lines) + 4
     bold = 'font-size="15" font-weight="bold" text-anchor="middle"'
     text = f'<text x="{middle}" y="{first}" {bold}>{escape(box.title)}</text>'
     for number, line in enumerate(lines, start=1):
-        at = first + 18 * number + (4 if box is CLI else 0)
+        at = first + 18 * number + (4 if box in TALL else 0)
         text += f'<text x="{middle}" y="{at}" font-size="12" text-anchor="middle" fill="{PALE}">{escape(line)}</text>'
     outline = f'<rect x="{box.x}" y="{box.y}" width="{box.w}" height="{box.h}" rx="8" fill="{fill}" stroke="{PALE}"/>'
     return outline + text
@@ -118,9 +128,12 @@ def svg() -> str:
         area("executive", 20, 240, "executive"),
         area("skills", 305, 145, "skills"),
         area("plant", 495, 145, "plant"),
-        *map(drawn, (UNDERSTAND, MISSION, COMPILE, TREE, RUN, KNOW, STORE, RECORD, VIEW)),
+        *map(drawn, (UNDERSTAND, MISSION, COMPILE, TREE, RUN, WORDS, STORE, RECORD, VIEW)),
         *map(drawn, (SKILL, ESTIMATE, PROTOCOL, SPOT, WORLDS, REFEREE)),
+        drawn(APP, FILLS["app"]),
         drawn(CLI, FILLS["cli"]),
+        drawn(TRAINING, FILLS["training"]),
+        arrow(CLI.left, APP.right),
         *(arrow(a.right, b.left) for a, b in ((UNDERSTAND, MISSION), (MISSION, COMPILE), (COMPILE, TREE))),
         arrow(RUN.left, TREE.right),
         arrow((175, LOWER), (150, ROW + 70)),

@@ -15,10 +15,10 @@ ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
     "executive/words": 3100,
-    "executive/language": 9400,
+    "executive/language": 9300,
     "executive/speech": 1750,
     "executive/mission": 2000,
-    "executive/tree": 8000,
+    "executive/tree": 8100,
     "executive/run": 3350,
     "executive/record": 1050,
     "executive/store": 1900,
@@ -30,7 +30,7 @@ LINES = {
     "skills": 24950,
     "plant": 12600,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 550, 118, 42
+MODULES, ONE_IMPORTER, SAME_NAME = 557, 118, 40
 """All modules; those that one other imports; file names that stand more than once."""
 
 

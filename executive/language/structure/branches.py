@@ -32,6 +32,7 @@ from executive.language.structure.row import (
 )
 from executive.words.command import Task
 from executive.words.condition import ValueIs
+from executive.words.policy import OnFailure
 from executive.words.steps import Awaited, Choose, Do, Group, Loop, Repeat, Steps, Together, Try, Wait
 
 
@@ -199,8 +200,8 @@ class Branches(Base):
             [replace(body[0], joint=""), *body[1:]], replace(row.state, held=None, goal=None, at=None)
         )
         row.steps[row.begun :] = []
-        otherwise = _done(otherwise, spoken(body))
-        self.put(row, Try(steps=tried, otherwise=otherwise), state_behind_both(row.state, state))
+        block = Try(steps=tried, otherwise=otherwise) if otherwise else Group(steps=tried, on_failure=OnFailure.SKIP)
+        self.put(row, block, state_behind_both(row.state, state))
         return end
 
     def _else_of(self, row: Row, last: Choose, supposed: Supposed, body: Sequence[Clause], end: int) -> int:

@@ -40,7 +40,7 @@ def _step(step: Step) -> str:
         case Together():
             return f"Together {_braced(step.steps)}"
         case Group():
-            return f"Group {_braced(step.steps)}{_branch('Finally', step.always)}"
+            return f"Group{_policy(step)} {_braced(step.steps)}{_branch('Finally', step.always)}"
         case Wait():
             return f"Wait{_awaited(step)}"
         case Check():
@@ -106,3 +106,8 @@ def _quoted(text: str) -> str:
 def _number(value: float) -> str:
     short = f"{value:g}"
     return short if float(short) == value else repr(float(value))
+
+
+def _policy(step: Step) -> str:
+    """What becomes of the mission when a step fails, where it says so."""
+    return "" if step.on_failure is None else f" {step.on_failure.value}"

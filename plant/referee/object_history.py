@@ -102,11 +102,6 @@ class ObjectHistory:
         own = [(when_s, p_W) for number, (when_s, p_W) in rests if number > 0 and number not in self._by_others]
         return [p_W for when_s, p_W in own if from_s <= when_s <= until_s]
 
-    def rested_W(self, since_s: float) -> list[FloatArray]:
-        """Where it rested then, or came to rest since."""
-        before = [p_W for when_s, p_W in zip(self.rested_s, self.rests_W, strict=True) if when_s < since_s]
-        return [*before[-1:], *self.rests_W[len(before) :]]
-
     def lifts_since(self, since_s: float) -> list[Lift]:
         """Its lifts since a time."""
         return [lift for lift in self.lifts if lift.time_s >= since_s]

@@ -94,23 +94,23 @@ def evaluate(
             evaluation = drawn_missions(random_missions, worlds or DEFAULT_WORLD, seeds or "1-")
             console.print(f"errand evaluate {evaluation.name}", markup=False)
             found = run(evaluation, results=kept_in, checked=not anyway)
+            _show(evaluation, found, kept_in, console, as_json=as_json)
         elif file is not None and is_evaluation(file):
             if has_own or seeds is not None or worlds is not None:
                 what = "a scenario file says itself what is run"
                 raise InputError(what, hint="write missions, worlds, seeds, faults and stacks into it", file=file)
             evaluation, before = load_evaluation(file), None if anyway else refuse_impossible_runs
             found = run(evaluation, results=kept_in, before=before)
+            _show(evaluation, found, kept_in, console, as_json=as_json)
         else:
             if worlds is not None:
                 raise InputError("--worlds is for --random-missions", hint="name one world by --world")
-            asked = replace(request, file=file)
-            evaluation = _at_seeds(asked, seeds or "1-20", each_fault=each_fault, anyway=anyway)
+            evaluation = _at_seeds(replace(request, file=file), seeds or "1-20", each_fault=each_fault, anyway=anyway)
             with _file_of(results) as kept_in:
                 found = run(evaluation, results=kept_in)
             _show_seeds(found.cases, console, as_json=as_json)
-            _end(found.cases)
-        _show(evaluation, found, kept_in, console, as_json=as_json)
-        _end(found.cases)
+    if not all(case.report.achieved for case in found.cases):
+        raise typer.Exit(NOT_ACHIEVED)
 
 
 @contextmanager
@@ -130,11 +130,6 @@ def _bar(console: Console, total: int) -> Iterator[Callable[[], None]]:
     with Progress(*columns, console=console) as bar:
         task = bar.add_task("runs", total=total)
         yield lambda: bar.advance(task)
-
-
-def _end(cases: Sequence[Case]) -> None:
-    """End with status 1 unless every run has achieved its mission."""
-    raise typer.Exit(0 if all(case.report.achieved for case in cases) else NOT_ACHIEVED)
 
 
 @contextmanager

@@ -182,6 +182,7 @@ def takes_request(
     fields = [each for each in _typed_fields() if (not names or each.name in names) and each.name not in without]
 
     def decorated(function: Callable[..., None]) -> Callable[..., None]:
+        """The command with the options of the fields before its own."""
         signature = inspect.signature(function, eval_str=True)
         _, *own = (each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values())
         parameters = [*(each.parameter(defaults.get(each.name, each.default)) for each in fields), *own]

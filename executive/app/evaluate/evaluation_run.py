@@ -85,6 +85,7 @@ def _with_files(spec: RunSpec, folder: Path) -> Request:
         return request
 
     def copied(name: str, path: Path | None) -> Path | None:
+        """Write the texts of a file and of those beside it into a folder; the file's path there."""
         if path is None:
             return None
         for each, text in spec.files.items():

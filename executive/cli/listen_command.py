@@ -24,7 +24,7 @@ from executive.mission.request import Request
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, TeamReader, refuse_alike, spoken_phrases
 from executive.speech.listener import HeardUtterance, Hearing, Listener, Recording, follow, microphone_blocks
-from executive.speech.recogniser import Vocabulary, of_world, read_vocabulary
+from executive.speech.recogniser import Vocabulary, read_vocabulary, vocabulary_of_world
 from executive.speech.voice import Voice, installed_voice
 from executive.speech.whisper import load_whisper
 from executive.words.knowledge import Knowledge
@@ -101,14 +101,20 @@ def listener_for(
     if robots:
         refuse_alike(robots)
         first, *others = robots
-        names = of_world(knowledge, called=False) if vocabulary is None else read_vocabulary(vocabulary, None)
+        names = (
+            vocabulary_of_world(knowledge, called=False) if vocabulary is None else read_vocabulary(vocabulary, None)
+        )
         called_by = (first, tuple(others)) if require_wake else (None, ())
         words = Vocabulary((*names.names, *robots), *called_by)
         team = TeamReader(load_parser(), knowledge, words, tuple(robots), require_wake)
         return Listener(load_whisper(), load_detector, team, spoken_phrases(words))
     name = robot_name or knowledge.robot.name
     called = name if require_wake else None
-    words = of_world(knowledge, called=require_wake) if vocabulary is None else read_vocabulary(vocabulary, called)
+    words = (
+        vocabulary_of_world(knowledge, called=require_wake)
+        if vocabulary is None
+        else read_vocabulary(vocabulary, called)
+    )
     heard = Vocabulary(words.names, called)
     world = None if open_words else knowledge
     reader = SpeechReader(load_parser(), world, heard, name, require_wake, knowledge.robot.others)

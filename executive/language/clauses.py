@@ -15,7 +15,7 @@ from executive.language.cleaning import smoothed
 from executive.language.items import Item
 from executive.language.lexicon import Patterns, lexicon, read_table
 
-__all__ = ["ACTS", "CLAUSES", "Behind", "Clause", "Cue", "Split", "behind", "cut", "split", "spoken", "verb_positions"]
+__all__ = ["ACTS", "CLAUSES", "Behind", "Clause", "Cue", "cue_behind", "cut", "split", "text_of", "verb_positions"]
 
 CLAUSES: Final = Patterns("structures.yaml", words=AMOUNTS)
 ACTS: Final = Patterns("structures.yaml", "acts", AMOUNTS)
@@ -161,7 +161,7 @@ def _kind(text: str) -> tuple[Cue, str] | None:
     return None
 
 
-def behind(text: str) -> Behind | None:
+def cue_behind(text: str) -> Behind | None:
     """The first thing that stands behind what is to be done in a clause, so that it decides or repeats that."""
     found = [(match.start(), Cue(kind), match) for kind, each in _behind() for match in each.finditer(text, 1)]
     found = [one for one in found if one[1] is not Cue.IF or not CLAUSES.asks_before.search(text[: one[0]])]
@@ -178,7 +178,7 @@ def verb_positions(text: str) -> Iterator[int]:
             yield match.start()
 
 
-def spoken(clauses: Iterable[Clause]) -> str:
+def text_of(clauses: Iterable[Clause]) -> str:
     """The clauses as one text."""
     return " ".join(f"{clause.joint}{clause.cue} {clause.text}".strip() for clause in clauses).strip(" ,;.")
 

@@ -20,7 +20,7 @@ __all__ = [
     "how_many",
     "narrated",
     "needed",
-    "told",
+    "reported_speech",
     "what_is",
     "where_is",
 ]
@@ -158,7 +158,7 @@ _NOT: Final = frozenset({"not", "n't", "nt"})
 _BRING: Final = "bring"
 
 
-def told(row: Row, items: list[Item]) -> Item | None:
+def reported_speech(row: Row, items: list[Item]) -> Item | None:
     """ "I left it in the hall" tells where a thing is; behind a noun it tells only which one is meant."""
     subject = items[-1] if items else None
     if not isinstance(subject, Chunk) or row.tokens[row.at].word not in row.words.told:

@@ -15,7 +15,7 @@ from executive.language.indirect import (
     how_many,
     narrated,
     needed,
-    told,
+    reported_speech,
     what_is,
     where_is,
 )
@@ -63,12 +63,10 @@ class _Reader(Row):
 
     def read(self, lead: Sequence[Item] = ()) -> Iterable[Item]:
         """The items of the row in order, behind `lead`; the first way of reading that fits takes its words."""
+        facts = (reported_speech, narrated, needed, belongs, goes_on)
         steps: tuple[Callable[[list[Item]], Item | None], ...] = (
             self._mark,
-            *(
-                partial(step, self)
-                for step in (where_is, how_many, what_is, do_we_have, told, narrated, needed, belongs, goes_on)
-            ),
+            *(partial(step, self) for step in (where_is, how_many, what_is, do_we_have, *facts)),
             self._verb,
             self._being,
             self._chunk,

@@ -200,7 +200,7 @@ class _Reader:
         if part.otherwise and before and before[-1].part.who != part.who:
             raise RefusalError("what one robot finds cannot decide what another does; say it as two requests")
         changes_hands = bool(before) and before[-1].part.who != part.who
-        memory = handed_on(before[-1].meaning) if changes_hands else memory
+        memory = memory_to_hand_on(before[-1].meaning) if changes_hands else memory
         if changes_hands and re.search(_IT, part.text):
             part = replace(part, text=re.sub(_FROM_THERE, "", part.text))
             clauses = [replace(clause, text=re.sub(_FROM_THERE, "", clause.text)) for clause in clauses]
@@ -318,7 +318,7 @@ def _share(one: Who | None, other: Who) -> bool:
     return one is not None
 
 
-def handed_on(meant: Understanding) -> Memory | None:
+def memory_to_hand_on(meant: Understanding) -> Memory | None:
     """What was spoken of, for another robot: things are where they were put, or looked for."""
     memory, place = meant.memory, _where(meant)
     return memory if memory is None or place is None else replace(memory, where=place, place=place)

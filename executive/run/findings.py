@@ -16,7 +16,7 @@ from executive.tree.behaviours.board import Board
 from executive.words.slug import slug
 from skills.robot import Clock
 
-__all__ = ["Findings", "claim", "finding_keys", "told"]
+__all__ = ["Findings", "claim", "finding_keys", "findings_in_words"]
 
 MOST_CHARS: Final = 300
 _DENIALS: Final = ("no ", "not ", "nobody ", "nothing ")
@@ -97,10 +97,10 @@ def _finding(message: Mapping[str, Any]) -> Finding:
 def claim(message: str, findings: Sequence[Finding], skipped: Sequence[str] = ()) -> str:
     """What a mission that gave answers claims: the answers, then what was skipped, or else its own `message`."""
     after = f"skipped: {'; '.join(skipped)}" if skipped else message
-    return "; ".join(filter(None, (told(findings), after)))
+    return "; ".join(filter(None, (findings_in_words(findings), after)))
 
 
-def told(findings: Sequence[Finding]) -> str:
+def findings_in_words(findings: Sequence[Finding]) -> str:
     """The answers in a row: one in its own words, several briefly, each sentence once; "and N more" for the rest."""
     counts = Counter(finding.sentence for finding in findings)
     if len(counts) == 1 and len(findings) == 1:

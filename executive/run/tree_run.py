@@ -11,7 +11,7 @@ from py_trees.common import Status
 
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.executions import Executions
-from executive.run.findings import Findings, claim, told
+from executive.run.findings import Findings, claim, findings_in_words
 from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
 from executive.tree.behaviours.answer import Answer
@@ -203,7 +203,7 @@ class TreeRun:
         if findings and outcome is Outcome.SUCCESS:
             message = claim("" if self._tells_nothing_more() else message, findings, self._skipped())
         elif findings and outcome is Outcome.FAILURE:
-            message = f"{message} (found out: {told(findings)})"
+            message = f"{message} (found out: {findings_in_words(findings)})"
         return RobotResult(
             robot_name=self.tree.robot_name,
             outcome=outcome,

@@ -15,7 +15,15 @@ from executive.words.knowledge import Knowledge
 from skills.files.errors import InputError
 from skills.files.outside import read_text
 
-__all__ = ["Recogniser", "Recognition", "Transcript", "Vocabulary", "of_world", "read_vocabulary", "speech_module"]
+__all__ = [
+    "Recogniser",
+    "Recognition",
+    "Transcript",
+    "Vocabulary",
+    "read_vocabulary",
+    "speech_module",
+    "vocabulary_of_world",
+]
 
 
 @dataclass(frozen=True)
@@ -101,7 +109,7 @@ def _longest(names: Sequence[str]) -> list[str]:
     return [name for name in names if sum(f" {name.lower()} " in other for other in spaced) == 1]
 
 
-def of_world(knowledge: Knowledge, *, called: bool) -> Vocabulary:
+def vocabulary_of_world(knowledge: Knowledge, *, called: bool) -> Vocabulary:
     """All names of a world; `called` says whether the robot is to be called by its name."""
     groups = (knowledge.surfaces, knowledge.places, knowledge.things, knowledge.people)
     aliases = [alias for group in groups for facts in group.values() for alias in facts.aliases]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from executive.language.amounts import seconds_of, time_of, times_of
-from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cut, spoken, verb_positions
+from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cut, text_of, verb_positions
 from executive.language.questions import RefusalError
 from executive.language.structure.conditions import suppose
 from executive.language.structure.plain import State, Supposed, contrary, verb
@@ -200,8 +200,9 @@ class Branches(Base):
             [replace(body[0], joint=""), *body[1:]], replace(row.state, held=None, goal=None, at=None)
         )
         row.steps[row.begun :] = []
-        block = Try(steps=tried, otherwise=otherwise) if otherwise else Group(steps=tried, on_failure=OnFailure.SKIP)
-        self.put(row, block, state_behind_both(row.state, state))
+        skipped = Group(steps=tried, on_failure=OnFailure.SKIP)
+        attempt = Try(steps=tried, otherwise=otherwise) if otherwise else skipped
+        self.put(row, attempt, state_behind_both(row.state, state))
         return end
 
     def _else_of(self, row: Row, last: Choose, supposed: Supposed, body: Sequence[Clause], end: int) -> int:
@@ -255,8 +256,8 @@ class Branches(Base):
         begun = replace(rounds.state, goal=None, at=None)
         steps, state = self.sequence([replace(body[0], joint=""), *body[1:]], begun)
         if rounds.loop.times is None and rounds.loop.every_s is None and not _worth_repeating(steps):
-            raise RefusalError("I do not see what is to be repeated; say 'wait there until ...'", [spoken(body)])
-        self.put(row, _one_repeat(Repeat(loop=rounds.loop, steps=_done(steps, spoken(body)))), state)
+            raise RefusalError("I do not see what is to be repeated; say 'wait there until ...'", [text_of(body)])
+        self.put(row, _one_repeat(Repeat(loop=rounds.loop, steps=_done(steps, text_of(body)))), state)
 
     def _how_often(self, row: Row, clause: Clause, follows: Sequence[Clause]) -> tuple[Rounds, str]:
         """How often what is behind it is to be done, and the rest of the words."""
@@ -331,7 +332,7 @@ class Branches(Base):
         said = [] if len(body) != 1 else [speech_in(body[0].text, self.reader.knowledge, self.reader.parser)]
         first = said[0] if said else None
         if first is None or first.text is None or first.to is not None or len(reading.commands) != 1:
-            raise RefusalError("while I go somewhere I can only say something", [spoken(body)])
+            raise RefusalError("while I go somewhere I can only say something", [text_of(body)])
         self.put(row, Together(steps=(Do.of(reading.commands[0]), say(first.text))), reading.state)
 
     def modified(self, row: Row, clause: Clause, found: Behind) -> None:
@@ -406,7 +407,7 @@ class Branches(Base):
         both = Supposed(condition, supposed.said, supposed.holds, supposed.fails)
         if found.kind is Cue.UNLESS:
             both = replace(both, holds=supposed.fails, fails=supposed.holds)
-        steps = _done(steps, spoken(scope))
+        steps = _done(steps, text_of(scope))
         self.put(row, Choose(condition=condition, then=steps), state_behind_both(state, row.state))
         row.asked = LookedAt(both, looked=False, decided=True)
 

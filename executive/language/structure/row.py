@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from executive.language.amounts import seconds_of, times_of
-from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, spoken
+from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, text_of
 from executive.language.lexicon import VerbKind
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE
@@ -225,7 +225,7 @@ class Base:
 
     def read_together(self, clauses: Sequence[Clause], state: State) -> PlainReading:
         """What clauses that are plain commands ask for together."""
-        return self.reader.commands_of(spoken([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead)
+        return self.reader.commands_of(text_of([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead)
 
     def add(self, row: Row, reading: PlainReading) -> None:
         """Put what a plain part asks for."""

@@ -9,7 +9,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, behind, cut
+from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cue_behind, cut
 from executive.language.items import Adverb, Chunk
 from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
@@ -108,7 +108,7 @@ class Builder(Branches):
         for act in (self._waits, self._asks, self._says, self._checks):
             if (end := act(row, clauses, at)) is not None:
                 return end
-        found = behind(text)
+        found = cue_behind(text)
         if found is not None and not ACTS.every_room.search(text):
             self.modified(row, clause, found)
             return at + 1
@@ -157,7 +157,7 @@ class Builder(Branches):
         if (everywhere_said := ACTS.says_everywhere.fullmatch(clause.text)) is not None:
             self._in_each(row, replace(clause, joint="", text=everywhere_said[1]))
             return at + 1
-        found = behind(clause.text)
+        found = cue_behind(clause.text)
         if found is not None and not _spoken_of(found, clause.text):
             self.modified(row, clause, found)
             return at + 1
@@ -259,7 +259,7 @@ class Builder(Branches):
         if text is None:
             return None
         state = self.known(row)
-        found = behind(text)
+        found = cue_behind(text)
         try:
             self.reader.commands_of(clauses[at].text, state)
         except RefusalError as refusal:
@@ -301,7 +301,7 @@ class Builder(Branches):
             if (match := ACTS.what_there.fullmatch(follow)) is not None:
                 what = next(filter(None, match.groups()))
                 reading, end = search_for(what, self.known(row), self.reader), at + 2
-            elif ACTS.speaks.match(follow) and behind(follow) is None:
+            elif ACTS.speaks.match(follow) and cue_behind(follow) is None:
                 self._in_each(row, replace(clauses[at + 1], joint=""))
                 return at + 2
         if reading is None:
@@ -392,7 +392,7 @@ def structured(
         RefusalError: it decides, repeats, waits, says or asks something that is not surely understood; the message
             names the words.
     """
-    if plain and not any(one.kind is not None or behind(one.text) is not None for one in clauses):
+    if plain and not any(one.kind is not None or cue_behind(one.text) is not None for one in clauses):
         return None
     if len(clauses) > MOST_CLAUSES:
         raise RefusalError(f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most")

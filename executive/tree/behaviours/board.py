@@ -99,7 +99,7 @@ class BesideBoard(FromBoard):
 
     def read(self, board: Board) -> Pose2D:
         """The shifted pose. Raises KeyError when nothing wrote it yet."""
-        return beside(board.get(self.key), self.forward_m, self.left_m)
+        return pose_beside(board.get(self.key), self.forward_m, self.left_m)
 
 
 @dataclass(frozen=True)
@@ -115,6 +115,6 @@ class SurfaceOfDetection(FromBoard):
         return tuple(surface for surface in self.surfaces if surface.name == seen.surface) or self.surfaces
 
 
-def beside(pose: Pose2D, forward_m: float, left_m: float) -> Pose2D:
+def pose_beside(pose: Pose2D, forward_m: float, left_m: float) -> Pose2D:
     """The pose shifted along its own axes, turned the same way."""
     return compose(pose, Pose2D(forward_m, left_m, 0.0))

@@ -110,7 +110,7 @@ def branch_of(
     return made, after
 
 
-def decided(
+def decision_node(
     assembler: Assembler, condition: Condition, builder: PlanBuilder
 ) -> tuple[NodeSpec, str, tuple[StepPart, ...]]:
     """The node that decides, the key of its answer, and the checks that it makes."""

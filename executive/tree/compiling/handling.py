@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from executive.tree.behaviours.board import BesideBoard, FromBoard, FromBoardOr, beside
+from executive.tree.behaviours.board import BesideBoard, FromBoard, FromBoardOr, pose_beside
 from executive.tree.behaviours.conditions import Holds
 from executive.tree.behaviours.recovery import Recovery
 from executive.tree.compiling.builder import PlanBuilder, after
@@ -58,7 +58,7 @@ def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float,
     rooms = [
         place.polygon for place in builder.knowledge.places.values() if inside(place.polygon, (pose.x_m, pose.y_m))
     ]
-    poses = {offset: beside(pose, *offset) for offset in NEARBY_M}
+    poses = {offset: pose_beside(pose, *offset) for offset in NEARBY_M}
     return {
         offset: other for offset, other in poses.items() if any(inside(room, (other.x_m, other.y_m)) for room in rooms)
     }

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from executive.tree.behaviours.board import FromBoard, SurfaceOfDetection, beside
+from executive.tree.behaviours.board import FromBoard, SurfaceOfDetection, pose_beside
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
@@ -166,7 +166,7 @@ def _looks_from_aside(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, .
     for name in single[:MOST_ASIDE]:
         room = builder.knowledge.places[facts[name].place].polygon
         view = pose_2d(facts[name].viewpoints[0])
-        poses = (beside(view, 0.0, left_m) for left_m in (ASIDE_M, -ASIDE_M))
+        poses = (pose_beside(view, 0.0, left_m) for left_m in (ASIDE_M, -ASIDE_M))
         aside = next((pose for pose in poses if inside(room, (pose.x_m, pose.y_m))), None)
         if aside is not None:
             below = builder.at(f"{name}-aside")

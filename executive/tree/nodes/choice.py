@@ -13,7 +13,7 @@ from py_trees.common import Status
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.composites import MemoryComposite
 from executive.tree.compiling.builder import PlanBuilder
-from executive.tree.compiling.flow import Assembler, BlockPlans, branch_of, decided
+from executive.tree.compiling.flow import Assembler, BlockPlans, branch_of, decision_node
 from executive.tree.compiling.part import Assembled
 from executive.tree.node import NodeKind
 from executive.words import steps as model
@@ -48,7 +48,7 @@ class Choose(MemoryComposite):
 
 
 def _plan(assembler: Assembler, block: model.Choose, builder: PlanBuilder) -> Assembled:
-    decide, key, parts = decided(assembler, block.condition, builder.at("if"))
+    decide, key, parts = decision_node(assembler, block.condition, builder.at("if"))
     flow = assembler.flow
     then, after_then = branch_of(assembler, block.then, builder.at("then"), "then", flow)
     other, after_other = branch_of(assembler, block.otherwise, builder.at("else"), "else", flow)

@@ -15,7 +15,7 @@ from executive.tree.behaviours.composites import MemoryComposite
 from executive.tree.behaviours.decisions import Decide
 from executive.tree.behaviours.explained import cause_of, message_of
 from executive.tree.compiling.builder import PlanBuilder
-from executive.tree.compiling.flow import Assembler, BlockPlans, decided, row
+from executive.tree.compiling.flow import Assembler, BlockPlans, decision_node, row
 from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.node import NodeKind
 from executive.words import steps as model
@@ -152,7 +152,7 @@ def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> As
     before, nodes, key = assembler.flow.copy(), [], ""
     parts: tuple[StepPart, ...] = ()
     if mode == "while" and condition is not None:
-        decide, key, parts = decided(assembler, condition, builder.at("while"))
+        decide, key, parts = decision_node(assembler, condition, builder.at("while"))
         nodes = [decide]
     body = row(assembler, block.steps, builder.at("round"), "round")
     flow = assembler.flow
@@ -161,7 +161,7 @@ def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> As
         flow.held, flow.opening = either(before.held, flow.held), False
         body = row(assembler, block.steps, builder.at("round"), "round")
     if mode == "until" and condition is not None:
-        decide, key, parts = decided(assembler, condition, builder.at("until"))
+        decide, key, parts = decision_node(assembler, condition, builder.at("until"))
         nodes = [decide]
     if mode == "while":
         assembler.flow.join([before, assembler.flow.copy()])

@@ -15,7 +15,7 @@ from executive.tree.behaviours.decisions import DAY_S, Decide
 from executive.tree.behaviours.decorators import ExplainedDecorator
 from executive.tree.behaviours.explained import ExplainedLeaf
 from executive.tree.compiling.builder import PlanBuilder
-from executive.tree.compiling.flow import Assembler, BlockPlans, decided
+from executive.tree.compiling.flow import Assembler, BlockPlans, decision_node
 from executive.tree.compiling.part import Assembled
 from executive.tree.node import NodeKind
 from executive.words import steps as model
@@ -90,7 +90,7 @@ def _plan(assembler: Assembler, block: model.Wait, builder: PlanBuilder) -> Asse
         time_s, words = awaited.until_clock_s, awaited.until_clock
         return Assembled((builder.node("wait until", f"wait until {words}", time_s=time_s, words=words),))
     assert awaited.condition is not None
-    decide, key, parts = decided(assembler, awaited.condition, builder.at("for"))
+    decide, key, parts = decision_node(assembler, awaited.condition, builder.at("for"))
     words, every_s = str(awaited.condition), awaited.every_s if decide.children else 0.0
     name = f"wait until {words}"
     return Assembled((builder.node("wait for", name, decide, key=key, words=words, every_s=every_s),), parts)

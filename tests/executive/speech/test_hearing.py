@@ -4,12 +4,12 @@ import pytest
 
 from executive.language.understand import Status
 from executive.speech.hearing import SpeechReader, spoken_phrases
-from executive.speech.recogniser import Vocabulary, of_world
+from executive.speech.recogniser import Vocabulary, vocabulary_of_world
 
 
 @pytest.fixture(scope="module")
 def reader(flat, parser):
-    return SpeechReader(parser, flat, of_world(flat, called=True), "Alice", require_wake=True)
+    return SpeechReader(parser, flat, vocabulary_of_world(flat, called=True), "Alice", require_wake=True)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def test_a_story_about_the_robot_is_no_call(reader):
 
 
 def test_other_robots_are_told_from_this_one(flat, parser):
-    words = of_world(flat, called=True)
+    words = vocabulary_of_world(flat, called=True)
     reader = SpeechReader(parser, flat, words, "Alice", require_wake=True, other_robots=("Ellis",))
     assert not reader.read("Hey Ellis, go to the kitchen").meaning.addressed
 
@@ -64,7 +64,7 @@ def test_without_a_vocabulary_every_name_fits(parser):
 
 
 def test_the_known_phrases_are_names_calls_and_the_words_of_requests(flat):
-    alikes = spoken_phrases(of_world(flat, called=True))
+    alikes = spoken_phrases(vocabulary_of_world(flat, called=True))
     assert alikes.of("ranch")[0].phrase == "wrench"
     assert "cokes" in [a.phrase for a in alikes.of("coats")]
     assert "would you" in [a.phrase for a in alikes.of("when you")]

@@ -10,7 +10,7 @@ from executive.language.understand import Status
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener, follow, microphone_blocks
-from executive.speech.recogniser import of_world
+from executive.speech.recogniser import vocabulary_of_world
 from executive.speech.sound import RATE_HZ
 from skills.files.errors import InputError
 
@@ -20,7 +20,7 @@ GO = "Hey Alice, go to the kitchen."
 @pytest.fixture
 def listener_to(flat, parser):
     def made(*texts, detector=LoudIsSpeech):
-        words = of_world(flat, called=True)
+        words = vocabulary_of_world(flat, called=True)
         reader = SpeechReader(parser, flat, words, "Alice", require_wake=True)
         return Listener(ScriptedRecogniser(list(texts)), detector, reader, spoken_phrases(words))
 
@@ -124,7 +124,7 @@ BLOCK = RATE_HZ // 10
 @pytest.fixture
 def hearings(flat, parser):
     def made(sound, *texts):
-        words = of_world(flat, called=True)
+        words = vocabulary_of_world(flat, called=True)
         reader = SpeechReader(parser, flat, words, "Alice", require_wake=True)
         listener = Listener(ScriptedRecogniser(list(texts)), LoudIsSpeech, reader, spoken_phrases(words))
         return list(follow((sound[at : at + BLOCK] for at in range(0, len(sound), BLOCK)), listener))

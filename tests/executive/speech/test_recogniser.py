@@ -1,18 +1,18 @@
 import pytest
 
-from executive.speech.recogniser import Vocabulary, of_world, read_vocabulary
+from executive.speech.recogniser import Vocabulary, read_vocabulary, vocabulary_of_world
 from skills.files.errors import InputError
 
 
 def test_a_world_gives_all_its_names_and_the_robots_own_last(flat):
-    words = of_world(flat, called=True)
+    words = vocabulary_of_world(flat, called=True)
     assert {"coke", "cola", "drink", "kitchen counter", "worktop", "lounge", "Robin"} <= set(words.names)
     assert words.names[-1] == words.robot_name == "Alice"
     assert len(set(words.names)) == len(words.names)
 
 
 def test_a_robot_that_need_not_be_called_is_no_part_of_the_prompt(flat):
-    words = of_world(flat, called=False)
+    words = vocabulary_of_world(flat, called=False)
     assert words.robot_name is None
     assert "Alice" not in words.prompt
 

@@ -10,7 +10,7 @@ import executive.speech.recogniser as extra
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener
-from executive.speech.recogniser import of_world
+from executive.speech.recogniser import vocabulary_of_world
 from executive.speech.sound import joined, read_wav
 from executive.speech.whisper import load_whisper
 from skills.files.errors import InputError
@@ -32,7 +32,7 @@ def _no_network(*args, **more):
 
 @pytest.fixture
 def listener(whisper, flat, parser):
-    words = of_world(flat, called=True)
+    words = vocabulary_of_world(flat, called=True)
     reader = SpeechReader(parser, flat, words, "Alice", require_wake=True)
     return Listener(whisper, load_detector, reader, spoken_phrases(words))
 
@@ -62,19 +62,19 @@ def test_what_is_said_to_nobody_is_left_alone(listener, say):
 
 
 def test_the_same_sound_gives_the_same_readings(whisper, say, flat):
-    words, sound = of_world(flat, called=True), joined(read_wav(say("Hey Alice, find the wrench.")))
+    words, sound = vocabulary_of_world(flat, called=True), joined(read_wav(say("Hey Alice, find the wrench.")))
     first, second = (whisper.transcribe(sound, words) for _ in range(2))
     assert first.transcripts == second.transcripts
 
 
 def test_the_words_that_were_said_are_likelier_than_others(whisper, say, flat):
-    recognition = whisper.transcribe(joined(read_wav(say("Find the wrench."))), of_world(flat, called=False))
+    recognition = whisper.transcribe(joined(read_wav(say("Find the wrench."))), vocabulary_of_world(flat, called=False))
     right, wrong = recognition.likelihoods(["Find the wrench.", "Take the beer."])
     assert right > wrong + 5.0
 
 
 def test_silence_holds_no_words_worth_a_command(whisper, flat):
-    readings = whisper.transcribe(silence(2.0), of_world(flat, called=True)).transcripts
+    readings = whisper.transcribe(silence(2.0), vocabulary_of_world(flat, called=True)).transcripts
     assert not any("kitchen" in reading.text for reading in readings)
 
 

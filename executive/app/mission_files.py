@@ -6,10 +6,9 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-import yaml
-
 from skills.files.errors import InputError, did_you_mean
 from skills.files.outside import is_there
+from skills.files.yaml_scalars import yaml_of
 
 if TYPE_CHECKING:
     from skills.teleop.driver import SavedPose
@@ -53,7 +52,7 @@ def pose_text(name: str, pose: SavedPose, *, world: str) -> str:
         joints = {"joints": [round(angle, 4) for angle in pose.joints_rad], "opening": round(pose.opening, 3)}
         steps.append({"skill": "pose_arm", "with": joints})
     file = {"name": name.replace("_", " "), "world": world, "steps": steps}
-    return str(yaml.safe_dump(file, sort_keys=False, default_flow_style=None, width=120))
+    return yaml_of(file)
 
 
 def save_pose(folder: Path, name: str | None, pose: SavedPose, *, world: str) -> Path:

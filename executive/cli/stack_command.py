@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import typer
-import yaml
 
 from executive.cli.options import takes_request
 from executive.cli.output import refusals
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
+from skills.files.yaml_scalars import yaml_of
 from skills.stack import plain
 
 __all__ = ["stack"]
@@ -30,4 +30,4 @@ def show(request: Request) -> None:
     """Print a stack with all its options as YAML, which --stack takes again."""
     with refusals():
         chosen = load_stack(request.stack)
-    typer.echo(yaml.safe_dump(plain(chosen), sort_keys=False), nl=False)
+    typer.echo(yaml_of(plain(chosen), flow_style=False), nl=False)

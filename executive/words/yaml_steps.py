@@ -6,11 +6,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from executive.words.forms import Strict
 from executive.words.steps import Step, Steps
 from skills.files.errors import InputError
+from skills.files.yaml_scalars import yaml_of
 from skills.files.yaml_source import parse_yaml
 
 __all__ = ["steps_from_yaml", "steps_to_data", "steps_to_yaml"]
@@ -32,7 +31,7 @@ def steps_to_yaml(steps: Iterable[Step]) -> tuple[str, ...]:
     data = steps_to_data(steps)
     if not data:
         return ()
-    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=1_000_000, default_flow_style=None)
+    text = yaml_of(data, width=1_000_000)
     return tuple(text.splitlines())
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Final
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field
 
 from plant.models.catalogue import ModelForm
 from skills.files.errors import InputError
 from skills.files.schema import validate
+from skills.files.yaml_scalars import yaml_of
 from skills.files.yaml_source import read_yaml
 from skills.robot import quantities
 
@@ -63,5 +63,5 @@ def read_imported(folder: Path) -> ImportedObject:
 
 def write_imported(folder: Path, made: ImportedObject) -> None:
     """Write what `read_imported` reads."""
-    text = yaml.safe_dump(made.model_dump(mode="json", by_alias=True), sort_keys=False, default_flow_style=None)
+    text = yaml_of(made.model_dump(mode="json", by_alias=True))
     (folder / FACTS_FILE).write_text(f"# Made by `errand object import`, don't edit.\n{text}", encoding="utf-8")

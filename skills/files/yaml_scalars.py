@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import yaml
 
-__all__ = ["as_written", "scalar_of", "truth_words"]
+__all__ = ["as_written", "scalar_of", "truth_words", "yaml_of"]
 
 _TAG: Final = "tag:yaml.org,2002:"
 _BASE_60: Final = re.compile(r"[-+]?\d[\d_]*(?::[0-5]?\d)+(?:\.[\d_]*)?")
@@ -36,6 +36,20 @@ def scalar_of(text: str) -> Any:
     if node is not None and not isinstance(node, yaml.ScalarNode):
         raise ValueError("no plain value")
     return None if node is None else yaml.constructor.SafeConstructor().construct_document(node)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes a text that this module reads as a number ("0E0") in quotes."""
+
+
+_Dumper.add_implicit_resolver(f"{_TAG}float", re.compile(f"^(?:{_EXPONENT.pattern})$"), list("-+.0123456789"))
+
+
+def yaml_of(data: Any, *, width: int = 120, flow_style: bool | None = None) -> str:
+    """The YAML of plain data, which `parse_yaml` reads back to the same data; lists of scalars stand in one line."""
+    return str(
+        yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=width, default_flow_style=flow_style)
+    )
 
 
 def truth_words(node: yaml.Node | None) -> Mapping[Path, str]:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import yaml
 
 from plant.models.builder.mesh import Material, Mesh, mtl_text, obj_text, palette_picture, write_text
 from plant.models.builder.sdf import Model, model_sdf
@@ -17,6 +16,7 @@ from plant.worlds.builder.maps import BANDS_M, FREE, OCCUPIED, UNKNOWN, Bools, G
 from plant.worlds.builder.rooms import Door, Room, body_margin_m, clearance_m, find_rooms, most_open_pose
 from plant.worlds.geometry_files import OWN_PACKAGE
 from plant.worlds.world import WorldError
+from skills.files.yaml_scalars import yaml_of
 from skills.robot import Pose2D
 
 FINEST_M: Final = 0.02
@@ -187,7 +187,7 @@ def _knowledge_text(start: Pose2D, rooms: Sequence[Room], doors: Sequence[Door])
         "doors": [{"between": list(d.between), "at": list(d.at), "width": d.width_m} for d in doors],
     }
     head = "# Made by `errand world`: give the rooms their names, here and under doors. Metres and radians.\n"
-    return head + yaml.safe_dump(facts, sort_keys=False, default_flow_style=None, width=120)
+    return head + yaml_of(facts)
 
 
 def _pose(pose: Pose2D) -> dict[str, float]:

@@ -101,5 +101,5 @@ def test_other_weights_than_those_are_refused(
 
 def test_weights_that_are_not_installed_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lite_backbone, "_PACKAGE", "weights_that_nobody_has")
-    with pytest.raises(TrainingDataError, match=r"weights_that_nobody_has.*install it"):
+    with pytest.raises(TrainingDataError, match=r"weights_that_nobody_has: there is no such package.*make train"):
         LiteBackbone().begin_with_imagenet()

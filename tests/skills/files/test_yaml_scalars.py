@@ -10,8 +10,8 @@ from pydantic import BaseModel, ConfigDict
 
 from skills.files.errors import InputError
 from skills.files.schema import Name, validate
-from skills.files.yaml_scalars import scalar_of
-from skills.files.yaml_source import read_yaml
+from skills.files.yaml_scalars import scalar_of, yaml_of
+from skills.files.yaml_source import parse_yaml, read_yaml
 from skills.quantities import Count, Share
 
 
@@ -89,3 +89,12 @@ def test_words_of_yes_and_no_are_texts_where_they_are_keys(tmp_path: Path) -> No
     file = tmp_path / "thing.yaml"
     file.write_text("choices: {yes: 1, no: 2, on: 3}")
     assert read_yaml(file).data == {"choices": {"yes": 1, "no": 2, "on": 3}}
+
+
+# text    PyYAML alone writes    reads back as
+# 0E0     0E0                    0.0
+# 1e3     1e3                    1000.0
+# 12      '12'                   "12"
+@pytest.mark.parametrize("text", ["0E0", "1e3", "-.5e-7", "12", "no", "14:30", "010", "beer", "a: b", "ä"])
+def test_a_text_that_looks_like_a_number_is_written_so_that_it_reads_back(text: str) -> None:
+    assert parse_yaml(yaml_of({"answer": text}), Path("m.yaml")).data == {"answer": text}

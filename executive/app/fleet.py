@@ -23,11 +23,11 @@ from executive.mission.request import Request
 from executive.run.visitor import RunEntry, TickNote
 from executive.store.given import GivenMission, GivenMissions
 from executive.store.missions import MissionStore, StoredMission
-from executive.tree.behaviours.conditions import KnowsPlace
 from executive.tree.check import Checked
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import RoutePlanner, load_estimates
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.guard import KnowsPlace
 from executive.words.command import Command, Task
 from executive.words.knowledge import BatteryFacts, Knowledge, SurfaceFacts
 from executive.words.steps import Do, Say, Step, steps_of_commands

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from executive.run.executions import is_speech
 from executive.run.outcome import Execution, Outcome, RobotResult
-from executive.tree.behaviours.board import FromBoard
+from executive.tree.board import FromBoard
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.words.expression import Expression, Template
 from executive.words.goal import GoalCondition, GoalKind, When

@@ -33,10 +33,10 @@ from executive.run.outcome import RobotResult, RunResult
 from executive.run.runner import run
 from executive.run.visitor import Assigner, Progress, RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.skill_leaf import ERROR_TOPIC, SkillLeaf
 from executive.tree.compiler import CompiledTree
+from executive.tree.context import RunContext
 from executive.tree.node_view import NodeView, node_view
+from executive.tree.nodes.skill import ERROR_TOPIC, SkillLeaf
 from skills.api import PlanningError, Publish, Worker
 from skills.faults.faulty_robot import FaultyRobot, with_faults
 from skills.faults.words import Fault, parse_fault

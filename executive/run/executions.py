@@ -10,8 +10,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.run.outcome import Execution
-from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviour import Explained
+from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
 from executive.words.slug import slug

@@ -12,7 +12,7 @@ from executive.record.schemas import SPEECH
 from executive.run.outcome import Finding, Said
 from executive.run.visitor import RunVisitor
 from executive.tree.behaviours.answer import ANSWER_TOPIC
-from executive.tree.behaviours.board import Board
+from executive.tree.board import Board
 from executive.words.slug import slug
 from skills.robot import Clock
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from executive.run.watchdog import VerbHung
-from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
+from executive.tree.nodes.skill import ERROR_TOPIC
 from executive.tree.snapshot import Snapshot
 from skills.api import Cause, Publish
 from skills.robot import LeaseError, Pose2D

@@ -11,7 +11,7 @@ from functools import partial
 from executive.run.robot import RunRobot
 from executive.run.traffic import TrafficTable
 from executive.run.watchdog import VerbHung, Watchdog
-from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
+from executive.tree.nodes.skill import ERROR_TOPIC
 from skills.api import Running, SkillContext
 from skills.navigate.giving_way import GivingWay
 from skills.navigate.ports import NavigateInputs

@@ -19,9 +19,9 @@ from executive.run.outcome import RobotStatus
 from executive.run.traffic import TrafficTable
 from executive.run.visitor import RunEntry, RunSettings, Visitors
 from executive.run.watchdog import VerbHung, Watchdog
-from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
+from executive.tree.board import Board
+from executive.tree.context import RunContext
+from executive.tree.nodes.skill import ERROR_TOPIC
 from executive.words.slug import slug
 from skills.api import LayeredView, LocalisationEstimate, ParticleView, Worker
 from skills.navigate.footprint import Footprint

@@ -9,9 +9,9 @@ from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.robot import RunRobot, RunShared
 from executive.run.tree_run import TreeRun
 from executive.run.visitor import RunEntry, TickNote
-from executive.tree.behaviours.board import Board
+from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.builder import start_key
+from executive.tree.plan import start_key
 from executive.tree.snapshot import NodeState, Snapshot
 from executive.words.slug import slug
 from skills.api import Cause

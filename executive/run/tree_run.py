@@ -14,15 +14,15 @@ from executive.run.executions import Executions
 from executive.run.findings import Findings, claim, findings_in_words
 from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
+from executive.tree.behaviour import Explained, message_of
 from executive.tree.behaviours.answer import Answer
-from executive.tree.behaviours.context import Endings, RunContext
-from executive.tree.behaviours.decisions import Decide, buttons_of
-from executive.tree.behaviours.explained import Explained, message_of
-from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
 from executive.tree.compiler import CompiledTree
+from executive.tree.context import Endings, RunContext
 from executive.tree.node_view import node_view
+from executive.tree.nodes.decisions import Decide, buttons_of
 from executive.tree.nodes.policies import Skip
+from executive.tree.nodes.skill import SkillLeaf
 from executive.tree.nodes.wait import WaitFor
 from executive.tree.snapshot import Change, NodeState, Observed, Snapshot
 from executive.words.goal import GoalKind

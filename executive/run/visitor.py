@@ -10,8 +10,8 @@ from py_trees.behaviour import Behaviour
 
 from executive.run.outcome import RobotResult, RobotStatus, RunResult
 from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S
-from executive.tree.behaviours.context import RunContext
 from executive.tree.compiler import CompiledTree
+from executive.tree.context import RunContext
 from executive.tree.snapshot import Change, Snapshot
 from skills.api import Costmap, Detector, Localiser, Worker
 from skills.detection import NO_DETECTOR

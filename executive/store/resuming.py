@@ -20,14 +20,14 @@ from py_trees.common import Status
 from executive.run.executions import execution_keys
 from executive.run.findings import finding_keys
 from executive.store.memory import Memory, Recollection, StepRecord
+from executive.tree.behaviour import Explained
 from executive.tree.behaviours.answer import Answer
-from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decorators import ExplainedDecorator, Guard
-from executive.tree.behaviours.explained import Explained
-from executive.tree.behaviours.skill_leaf import Remembered
 from executive.tree.compiler import CompiledTree
+from executive.tree.context import RunContext
 from executive.tree.kinds import Changes, build, writes
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.skill import Remembered
 from skills.api import Cause, Failed, Running, Skill, SkillContext, Step
 
 BEFORE: Final = "before the restart"

@@ -10,9 +10,9 @@ from typing import Any
 from py_trees.common import Status
 
 from executive.run.worker import LockStepWorker
-from executive.tree.behaviours.board import Board, Constant
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.skill_leaf import SkillLeaf
+from executive.tree.board import Board, Constant
+from executive.tree.context import RunContext
+from executive.tree.nodes.skill import SkillLeaf
 from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
 from skills.faults.faulty_robot import with_faults
 from skills.faults.kinds import STANDARD_FAULTS, FaultKind

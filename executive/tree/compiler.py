@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
 
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.decisions import buttons_of
-from executive.tree.compiling.assembly import StepPart, assemble, step_name
-from executive.tree.compiling.builder import PlanBuilder, Registry, start_key
-from executive.tree.compiling.doors import doorway
+from executive.tree.assembly import StepPart, assemble, step_name
 from executive.tree.compiling.wiring import check_wiring
+from executive.tree.context import RunContext
 from executive.tree.kinds import build
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.decisions import buttons_of
+from executive.tree.nodes.doors import doorway
 from executive.tree.nodes.interrupts import watched
+from executive.tree.plan import PlanBuilder, Registry, start_key
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.mission import Mission

@@ -14,7 +14,7 @@ from typing import Annotated, Final, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from executive.tree.behaviours.board import Constant, FromBoard
+from executive.tree.board import Constant, FromBoard
 from executive.tree.node import NodeSpec
 from skills.files.errors import InputError
 from skills.files.schema import validate

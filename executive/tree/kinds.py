@@ -11,12 +11,12 @@ from typing import Any, Final
 from py_trees.behaviour import Behaviour
 
 from executive.tree import nodes
-from executive.tree.behaviours import answer, composites, decisions, decorators, leaves, recovery, skill_leaf
-from executive.tree.behaviours.context import RunContext
-from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.behaviours import answer, decorators, leaves
 from executive.tree.compiling.flow import Assembler, BlockPlans
 from executive.tree.compiling.part import Assembled
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.plan import PlanBuilder
 from executive.words.steps import Step
 
 __all__ = ["KINDS", "Changes", "block_plan", "build", "writes"]
@@ -26,7 +26,7 @@ Changes = Mapping[str, Callable[[Any], object]]
 
 _PAGES: Final = tuple(import_module(f"{nodes.__name__}.{page.name}") for page in iter_modules(nodes.__path__))
 """Each page of `executive.tree.nodes`: what it defines of `KINDS` and `PLANS` is registered by being there."""
-_HOMES: Final = (answer, composites, decisions, decorators, leaves, recovery, skill_leaf, *_PAGES)
+_HOMES: Final = (answer, decorators, leaves, *_PAGES)
 KINDS: Final[Mapping[str, NodeKind]] = {n: kind for home in _HOMES for n, kind in getattr(home, "KINDS", {}).items()}
 PLANS: Final[BlockPlans] = {model: plan for page in _PAGES for model, plan in getattr(page, "PLANS", {}).items()}
 _NO_CHANGES: Final[Changes] = MappingProxyType({})

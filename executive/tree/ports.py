@@ -7,7 +7,7 @@ import enum
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from executive.tree.behaviours.board import Constant, FromBoard
+from executive.tree.board import Constant, FromBoard
 from executive.tree.node import NodeSpec
 from executive.tree.types import describe_type, field_types
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviour import Explained
 from skills.api import Cause
 
 

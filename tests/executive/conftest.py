@@ -14,9 +14,9 @@ from pydrake.math import RigidTransform
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
-from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.context import RunContext
+from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.context import RunContext
 from executive.tree.snapshot import Change, Observed
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge

@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import Board
+from executive.tree.behaviour import Explained
 from executive.tree.behaviours.decorators import ExplainedDecorator
-from executive.tree.behaviours.explained import Explained
+from executive.tree.board import Board
 from executive.tree.node import NodeKind
 from skills.api import Cause, Failed, ObjectObservation, Publish
 from skills.detect.words import counted, told_apart

@@ -10,11 +10,11 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.decorators import Decorator
 
-from executive.tree.behaviours.conditions import Condition, Waiting
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import ExplainedNode, cause_of, message_of
+from executive.tree.behaviour import ExplainedNode, cause_of, message_of
 from executive.tree.behaviours.suspension import StoppableTime, suspend
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind
+from executive.tree.nodes.guard import Condition, Waiting
 from skills.api import Cause, Failed
 from skills.robot import Clock
 

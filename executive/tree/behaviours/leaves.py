@@ -8,8 +8,8 @@ from typing import Final
 
 from py_trees.common import Status
 
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import ExplainedLeaf
+from executive.tree.behaviour import ExplainedLeaf
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind
 from executive.words.geometry import Point, distance_m, inside
 from skills.api import Cause, Surface

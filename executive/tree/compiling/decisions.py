@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
-from executive.tree.behaviours.decisions import AllHold, AnswerIs, AnyHolds, Decision, DoesNotHold, Pressed, ValueHolds
-from executive.tree.compiling.builder import PlanBuilder
-from executive.tree.compiling.doors import door_plan
-from executive.tree.compiling.steps import find_plan
 from executive.tree.compiling.trips import refuse_several
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.commands import find_plan
+from executive.tree.nodes.decisions import AllHold, AnswerIs, AnyHolds, Decision, DoesNotHold, Pressed, ValueHolds
+from executive.tree.nodes.doors import door_plan
+from executive.tree.plan import PlanBuilder
 from executive.words.condition import (
     RANGES,
     READINGS,

@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import Any, Final, Protocol
 
 from executive.mission.gripper import InGripper, either
-from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.compiling.decisions import (
     Decided,
     Named,
@@ -20,6 +19,7 @@ from executive.tree.compiling.decisions import (
 from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.goals import command_goal, door_goal
 from executive.tree.node import NodeSpec
+from executive.tree.plan import PlanBuilder
 from executive.words.condition import READINGS, Condition, Look
 from executive.words.expression import Expression, Kind, Template, kind_of
 from executive.words.slug import slug

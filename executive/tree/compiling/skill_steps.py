@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from executive.tree.behaviours.board import Binding, Constant, FromBoard
-from executive.tree.compiling.builder import Registry, skill_spec
+from executive.tree.board import Binding, Constant, FromBoard
 from executive.tree.node import NodeSpec
+from executive.tree.plan import Registry, skill_spec
 from executive.tree.port_values import FROM_KEY, PortValueError, gathered, port_value
 from executive.tree.registry import missing
 from executive.tree.types import field_types

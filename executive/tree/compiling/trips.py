@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from executive.tree.compiling.builder import PlanBuilder
-from executive.tree.compiling.steps import carry_plan, grasp_plan
 from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.commands import carry_plan, grasp_plan
+from executive.tree.plan import PlanBuilder
 from executive.words.command import START, Command, Task
 
 __all__ = ["are_trips", "refuse_several", "trips_plan"]

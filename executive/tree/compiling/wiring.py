@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from executive.tree.behaviours.board import Binding, Constant, FromBoard, FromBoardOr
+from executive.tree.board import Binding, Constant, FromBoard, FromBoardOr
 from executive.tree.kinds import writes
 from executive.tree.node import NodeSpec
 from executive.tree.types import assignable, conforms, describe_type, field_types, required

@@ -9,11 +9,11 @@ from typing import Any, Final
 
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import FromBoard
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import ExplainedLeaf
-from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.behaviour import ExplainedLeaf
+from executive.tree.board import FromBoard
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.plan import PlanBuilder
 from executive.words.command import Thing
 from skills.api import FLOOR, Cause, ObjectObservation, Surface
 from skills.geometry import compose

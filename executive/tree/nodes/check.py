@@ -9,19 +9,19 @@ from typing import Final
 from py_trees.common import Status
 
 from executive.tree.behaviours.answer import ANSWER_TOPIC
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.decisions import AnswerIs
 from executive.tree.behaviours.decorators import ExplainedDecorator
-from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.compiling.decisions import (
     decide_plan,
     decision_of,
 )
-from executive.tree.compiling.doors import door_plan
 from executive.tree.compiling.flow import Assembler, BlockPlans, answering, checks_of, give_key
 from executive.tree.compiling.part import Assembled, StepPart
+from executive.tree.context import RunContext
 from executive.tree.goals import door_goal
 from executive.tree.node import NodeKind
+from executive.tree.nodes.decisions import AnswerIs
+from executive.tree.nodes.doors import door_plan
+from executive.tree.plan import PlanBuilder
 from executive.words import steps as model
 from executive.words.condition import DoorOpen, Look
 

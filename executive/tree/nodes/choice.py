@@ -10,12 +10,12 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.composites import MemoryComposite
-from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.board import Board
 from executive.tree.compiling.flow import Assembler, BlockPlans, branch_of, decision_node
 from executive.tree.compiling.part import Assembled
 from executive.tree.node import NodeKind
+from executive.tree.nodes.composites import MemoryComposite
+from executive.tree.plan import PlanBuilder
 from executive.words import steps as model
 from executive.words.expression import Value
 

@@ -11,15 +11,15 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import Board, FromBoardOr
-from executive.tree.behaviours.composites import MemoryComposite
-from executive.tree.behaviours.explained import cause_of, message_of
-from executive.tree.compiling.builder import PlanBuilder
-from executive.tree.compiling.handling import pick_up_plan, tidied
-from executive.tree.compiling.search import detect_plan, look_plans, required_surfaces, where
-from executive.tree.compiling.steps import put_down_plan
+from executive.tree.behaviour import cause_of, message_of
+from executive.tree.board import Board, FromBoardOr
 from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.nodes.commands import put_down_plan
+from executive.tree.nodes.composites import MemoryComposite
+from executive.tree.nodes.pick_up import pick_up_plan, tidied
 from executive.tree.nodes.policies import FINAL_CAUSES
+from executive.tree.nodes.search import detect_plan, look_plans, required_surfaces, where
+from executive.tree.plan import PlanBuilder
 from executive.words.command import START, Command, Task, Thing
 from executive.words.knowledge import EVERYTHING
 from skills.api import Cause, ObjectObservation

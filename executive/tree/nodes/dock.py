@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
-from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.compiling.flow import Assembler, BlockPlans
 from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.goals import command_goal
 from executive.tree.nodes.interrupts import dock_plan
+from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words import steps as model
 from executive.words.command import Command, Task
 from skills.files.errors import InputError

@@ -18,15 +18,15 @@ from typing import Any, Final
 import numpy as np
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import BesideBoard, FromBoard
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import ExplainedLeaf
-from executive.tree.behaviours.recovery import Recovery
-from executive.tree.compiling.builder import PlanBuilder, after
-from executive.tree.compiling.handling import LOOK_AGAIN_S, held_plan, pick_up_plan
-from executive.tree.compiling.search import detect_plan
+from executive.tree.behaviour import ExplainedLeaf
+from executive.tree.board import BesideBoard, FromBoard
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind, NodeSpec
 from executive.tree.nodes.aside import floor_square
+from executive.tree.nodes.pick_up import LOOK_AGAIN_S, held_plan, pick_up_plan
+from executive.tree.nodes.recovery import Recovery
+from executive.tree.nodes.search import detect_plan
+from executive.tree.plan import PlanBuilder, after
 from executive.words.command import Thing
 from executive.words.geometry import distance_m
 from skills.api import FLOOR, Cause, Surface

@@ -9,17 +9,17 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.decisions import MustHold, MustNotBegin
-from executive.tree.behaviours.explained import cause_of, message_of
-from executive.tree.behaviours.recovery import Afterwards
-from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.behaviour import cause_of, message_of
 from executive.tree.compiling.decisions import instant_decision
 from executive.tree.compiling.flow import Assembler, BlockPlans, Flow, row
 from executive.tree.compiling.part import Assembled, StepPart
+from executive.tree.context import RunContext
 from executive.tree.goals import held_goal
 from executive.tree.node import NodeKind
+from executive.tree.nodes.decisions import MustHold, MustNotBegin
 from executive.tree.nodes.interrupts import HANDLING
+from executive.tree.nodes.recovery import Afterwards
+from executive.tree.plan import PlanBuilder
 from executive.words import steps as model
 from executive.words.condition import AllOf, Condition, ValueIs
 from executive.words.mission import Mission

@@ -15,17 +15,17 @@ from typing import Any, ClassVar, Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import FromBoard
-from executive.tree.behaviours.composites import MemoryComposite
-from executive.tree.behaviours.conditions import BatteryForWork, Condition, KnowsPlace, NoStopButton, OwnLease, Waiting
-from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviour import ExplainedLeaf, cause_of, message_of
 from executive.tree.behaviours.decorators import ExplainedDecorator
-from executive.tree.behaviours.explained import ExplainedLeaf, cause_of, message_of
-from executive.tree.behaviours.recovery import Recovery
-from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
-from executive.tree.compiling.builder import PlanBuilder, after, pose_2d
+from executive.tree.board import FromBoard
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.nodes.composites import MemoryComposite
+from executive.tree.nodes.guard import BatteryForWork, Condition, KnowsPlace, NoStopButton, OwnLease, Waiting
+from executive.tree.nodes.recovery import Recovery
+from executive.tree.nodes.skill import SkillLeaf
+from executive.tree.plan import PlanBuilder, after, pose_2d
 from executive.words.knowledge import Pose
 from skills.api import Cause, Failed
 from skills.robot import Pose2D

@@ -13,14 +13,14 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import FromBoard
-from executive.tree.behaviours.composites import MemorySequence
-from executive.tree.behaviours.conditions import BatteryAtLeast, Condition, KnowsPlace, NotAfter
-from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviour import Explained, message_of
 from executive.tree.behaviours.decorators import ExplainedDecorator
-from executive.tree.behaviours.explained import Explained, message_of
-from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.board import FromBoard
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.nodes.composites import MemorySequence
+from executive.tree.nodes.guard import BatteryAtLeast, Condition, KnowsPlace, NotAfter
+from executive.tree.plan import PlanBuilder
 from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
 from skills.api import Asked, Cause, Failed, Question
 

@@ -10,14 +10,14 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.mission.gripper import either
-from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.composites import MemoryComposite
-from executive.tree.behaviours.decisions import Decide
-from executive.tree.behaviours.explained import cause_of, message_of
-from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.behaviour import cause_of, message_of
+from executive.tree.board import Board
 from executive.tree.compiling.flow import Assembler, BlockPlans, decision_node, row
 from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.node import NodeKind
+from executive.tree.nodes.composites import MemoryComposite
+from executive.tree.nodes.decisions import Decide
+from executive.tree.plan import PlanBuilder
 from executive.words import steps as model
 from executive.words.condition import READINGS, Condition, ValueIs, parts_of
 from skills.api import Cause

@@ -10,19 +10,19 @@ from typing import Any, Final
 
 from py_trees.common import Status
 
+from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.behaviours.answer import ANSWER_TOPIC
-from executive.tree.behaviours.board import FromBoard
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.decisions import Keys, View
-from executive.tree.behaviours.explained import ExplainedLeaf
-from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.board import FromBoard
 from executive.tree.compiling.decisions import (
     Named,
     keys_of,
 )
 from executive.tree.compiling.flow import Assembler, BlockPlans, branch_of, check_template, give_key, set_plan
 from executive.tree.compiling.part import Assembled, StepPart
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind
+from executive.tree.nodes.decisions import Keys, View
+from executive.tree.plan import PlanBuilder
 from executive.words import steps as model
 from executive.words.expression import LARGEST, ExpressionError, Kind, Template, Value, kind_of
 from executive.words.slug import slug

@@ -10,12 +10,12 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.mission.gripper import either
-from executive.tree.behaviours.composites import MemoryComposite
-from executive.tree.behaviours.explained import cause_of, message_of
-from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.behaviour import cause_of, message_of
 from executive.tree.compiling.flow import Assembler, BlockPlans, branch_of
 from executive.tree.compiling.part import Assembled
 from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.nodes.composites import MemoryComposite
+from executive.tree.plan import PlanBuilder
 from executive.words import steps as model
 from skills.api import Cause, Part
 from skills.files.errors import InputError

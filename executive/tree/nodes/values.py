@@ -8,14 +8,14 @@ from typing import Any, Final
 
 from py_trees.common import Status
 
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.decisions import Keys, View
-from executive.tree.behaviours.explained import ExplainedLeaf
-from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.compiling.decisions import kind_in
 from executive.tree.compiling.flow import PYTHON_TYPES, Assembler, BlockPlans, give_key, set_plan
 from executive.tree.compiling.part import Assembled
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind
+from executive.tree.nodes.decisions import Keys, View
+from executive.tree.plan import PlanBuilder
 from executive.words import steps as model
 from executive.words.expression import Expression, ExpressionError, Template
 from skills.api import Cause

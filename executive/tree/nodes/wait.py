@@ -9,15 +9,15 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.decisions import DAY_S, Decide
+from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.behaviours.decorators import ExplainedDecorator
-from executive.tree.behaviours.explained import ExplainedLeaf
-from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.board import Board
 from executive.tree.compiling.flow import Assembler, BlockPlans, decision_node
 from executive.tree.compiling.part import Assembled
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind
+from executive.tree.nodes.decisions import DAY_S, Decide
+from executive.tree.plan import PlanBuilder
 from executive.words import steps as model
 from skills.robot import Clock
 

@@ -10,8 +10,8 @@ import pytest
 
 from executive.cli.keys import HELP, SAY_HELP, Keys, Typing, keys_available, keys_pressed, prompt_lines
 from executive.run.control import Control, Mode
-from executive.tree.behaviours.decisions import AnyHolds, DoesNotHold, Pressed
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.decisions import AnyHolds, DoesNotHold, Pressed
 from skills.api import Question
 from skills.testing.clock import VirtualClock
 

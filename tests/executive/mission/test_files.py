@@ -4,7 +4,7 @@ import pytest
 
 from executive.mission.load import load_mission, overridden
 from executive.mission.resolve import MAX_DEPTH, MAX_STEPS, mission_from_file
-from executive.tree.behaviours.board import Constant, FromBoard
+from executive.tree.board import Constant, FromBoard
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 

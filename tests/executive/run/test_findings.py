@@ -8,7 +8,7 @@ from py_trees.common import Status
 
 from executive.run.findings import Findings, claim, finding_keys
 from executive.run.outcome import Finding, Outcome, Said
-from executive.tree.behaviours.board import Board
+from executive.tree.board import Board
 from skills.api import Cause, Failed, Succeeded
 
 CHECKS = (

@@ -3,7 +3,7 @@
 import pytest
 from py_trees.common import Status
 
-from executive.tree.behaviours.composites import MemorySequence
+from executive.tree.nodes.composites import MemorySequence
 from executive.tree.snapshot import Change, NodeState, Observed
 from tests.executive.tree.scripted import Leaf
 

@@ -4,7 +4,7 @@ import pytest
 
 from executive.app.goal_conditions import conditions_of
 from executive.run.outcome import Outcome
-from executive.tree.behaviours.board import Constant
+from executive.tree.board import Constant
 from executive.words.goal import GoalKind
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
 from skills.files.errors import InputError

@@ -4,11 +4,11 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviours.composites import MemorySequence
-from executive.tree.behaviours.conditions import Waiting
-from executive.tree.behaviours.explained import Explained
-from executive.tree.behaviours.skill_leaf import SkillLeaf
+from executive.tree.behaviour import Explained
+from executive.tree.nodes.composites import MemorySequence
+from executive.tree.nodes.guard import Waiting
 from executive.tree.nodes.interrupts import Interrupt, Interrupts, Monitor
+from executive.tree.nodes.skill import SkillLeaf
 from skills.api import Cause, Failed
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID

@@ -6,7 +6,7 @@ import pytest
 from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
-from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviour import Explained
 from executive.tree.nodes.policies import AskOperator, GoBack, Skip, Summary
 from skills.api import Cause
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final
 
-from executive.tree.behaviours.board import Binding, Constant, FromBoard
-from executive.tree.behaviours.recovery import Recovery, Trigger
+from executive.tree.board import Binding, Constant, FromBoard
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.registry import missing
 from executive.words.command import Command, Task, Thing
 from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose

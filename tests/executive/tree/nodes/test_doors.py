@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from executive.tree.compiling.builder import PlanBuilder
-from executive.tree.compiling.doors import door_plan, view_of
+from executive.tree.nodes.doors import door_plan, view_of
+from executive.tree.plan import PlanBuilder
 from executive.words.command import Command
 from executive.words.knowledge import Door, Knowledge
 from skills.back_off.skill import BackOff

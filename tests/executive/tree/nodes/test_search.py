@@ -4,9 +4,9 @@ import py_trees
 import pytest
 from py_trees.common import Status
 
+from executive.tree.behaviour import Explained
 from executive.tree.behaviours.answer import Answer
-from executive.tree.behaviours.composites import MemoryRound, MemorySelector
-from executive.tree.behaviours.explained import Explained
+from executive.tree.nodes.composites import MemoryRound, MemorySelector
 from skills.api import Cause, ObjectObservation, Thing
 
 

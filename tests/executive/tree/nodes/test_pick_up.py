@@ -7,9 +7,9 @@ import pytest
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.run.visitor import RunSettings
-from executive.tree.behaviours.board import FromBoard
+from executive.tree.board import FromBoard
 from executive.tree.compiler import compile_mission
-from executive.tree.compiling.search import surfaces_elsewhere
+from executive.tree.nodes.search import surfaces_elsewhere
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
 from executive.words.knowledge import load_knowledge

@@ -9,10 +9,10 @@ from typing import Any, Final, TypeVar
 
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import Binding
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import ExplainedLeaf
+from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.behaviours.suspension import StoppableTime
+from executive.tree.board import Binding
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind
 from executive.tree.types import conforms, describe_type
 from skills.api import Cause, Failed, Running, Skill, Step, Succeeded

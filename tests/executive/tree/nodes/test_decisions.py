@@ -6,8 +6,9 @@ import pytest
 from py_trees.common import Status
 
 from executive.tree.behaviours.answer import ANSWER_TOPIC
-from executive.tree.behaviours.conditions import Waiting
-from executive.tree.behaviours.decisions import (
+from executive.tree.behaviours.suspension import suspend
+from executive.tree.nodes.check import Check
+from executive.tree.nodes.decisions import (
     AllHold,
     AnswerIs,
     AnyHolds,
@@ -19,8 +20,7 @@ from executive.tree.behaviours.decisions import (
     ValueHolds,
     View,
 )
-from executive.tree.behaviours.suspension import suspend
-from executive.tree.nodes.check import Check
+from executive.tree.nodes.guard import Waiting
 from executive.tree.nodes.values import SetValues
 from executive.tree.nodes.wait import WaitFor, WaitUntilClock
 from executive.words.expression import Expression, Template

@@ -6,7 +6,8 @@ import pytest
 from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
-from executive.tree.behaviours.conditions import (
+from executive.tree.behaviours.decorators import Guard
+from executive.tree.nodes.guard import (
     BatteryAtLeast,
     BatteryForWork,
     Condition,
@@ -17,7 +18,6 @@ from executive.tree.behaviours.conditions import (
     OwnLease,
     Waiting,
 )
-from executive.tree.behaviours.decorators import Guard
 from executive.words.policy import StaleData
 from skills.api import Cause, Failed
 from skills.robot import Lease, Pose2D

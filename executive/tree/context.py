@@ -10,7 +10,7 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from executive.tree.behaviours.board import Board
+from executive.tree.board import Board
 from skills.api import LeavesOthersOut, Part, Skill, SkillContext
 from skills.robot import Pose2D
 

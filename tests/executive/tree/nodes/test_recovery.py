@@ -4,10 +4,10 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.composites import MemorySelector, MemorySequence
-from executive.tree.behaviours.explained import Explained
-from executive.tree.behaviours.recovery import Afterwards, OnlyIfHolding, OnlyIfKnown, Recover, Recovery, Trigger
+from executive.tree.behaviour import Explained
+from executive.tree.board import Board
+from executive.tree.nodes.composites import MemorySelector, MemorySequence
+from executive.tree.nodes.recovery import Afterwards, OnlyIfHolding, OnlyIfKnown, Recover, Recovery, Trigger
 from skills.api import Cause, Thing
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID

@@ -19,12 +19,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from executive.tree.behaviours.board import BesideBoard, FromBoard, FromBoardOr, pose_beside
-from executive.tree.behaviours.conditions import Holds
-from executive.tree.behaviours.recovery import Recovery
-from executive.tree.compiling.builder import PlanBuilder, after
+from executive.tree.board import BesideBoard, FromBoard, FromBoardOr, pose_beside
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import can_move_aside, move_aside_plan
+from executive.tree.nodes.guard import Holds
+from executive.tree.nodes.recovery import Recovery
+from executive.tree.plan import PlanBuilder, after
 from executive.words.command import Thing
 from executive.words.geometry import inside
 from skills.api import Cause, Surface

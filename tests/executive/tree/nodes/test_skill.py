@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 import pytest
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import Constant, FromBoard
-from executive.tree.behaviours.skill_leaf import SkillLeaf
+from executive.tree.board import Constant, FromBoard
+from executive.tree.nodes.skill import SkillLeaf
 from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause, Failed, Part, Running, Skill, Succeeded
 

@@ -3,7 +3,7 @@
 import pytest
 
 from executive.run.outcome import Outcome
-from executive.tree.behaviours.board import FromBoard
+from executive.tree.board import FromBoard
 from executive.tree.compiler import compile_mission
 from executive.tree.estimate import expected
 from executive.tree.goals import surfaces_to_search

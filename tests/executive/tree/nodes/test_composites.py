@@ -5,8 +5,8 @@ import pytest
 from py_trees.behaviours import StatusQueue, TickCounter
 from py_trees.common import Status
 
-from executive.tree.behaviours.composites import MemoryRound, MemorySelector, MemorySequence
-from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviour import Explained
+from executive.tree.nodes.composites import MemoryRound, MemorySelector, MemorySequence
 from skills.api import Cause
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID

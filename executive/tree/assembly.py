@@ -7,20 +7,20 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Final
 
 from executive.mission.gripper import UNNAMED, after_command, is_same
-from executive.tree.behaviours.board import Constant
-from executive.tree.compiling.builder import PICK_UPS, PlanBuilder, Registry, start_key
+from executive.tree.board import Constant
 from executive.tree.compiling.flow import PYTHON_TYPES, Flow, answering, block_name, give, set_plan
 from executive.tree.compiling.part import Assembled, StepPart
-from executive.tree.compiling.search import surfaces_elsewhere
 from executive.tree.compiling.skill_steps import skill_plan
-from executive.tree.compiling.steps import step_plan
 from executive.tree.compiling.trips import are_trips, refuse_several, trips_plan
 from executive.tree.goals import clearing_goals, command_goal, drive_goal, given_goal, lifted_goal, put_goal
 from executive.tree.kinds import block_plan
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.clearing import clear_plan, is_clearing, refuse_everything
+from executive.tree.nodes.commands import step_plan
 from executive.tree.nodes.group import framed
 from executive.tree.nodes.policies import PolicyFrame, needs_way_back, under_policy
+from executive.tree.nodes.search import surfaces_elsewhere
+from executive.tree.plan import PICK_UPS, PlanBuilder, Registry, start_key
 from executive.words.command import START, Command, Task
 from executive.words.expression import kind_of, literal
 from executive.words.goal import GoalCondition, When

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from executive.tree.behaviours.board import FromBoard, SurfaceOfDetection, pose_beside
-from executive.tree.compiling.builder import PlanBuilder, pose_2d
+from executive.tree.board import FromBoard, SurfaceOfDetection, pose_beside
 from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
+from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.command import Thing
 from executive.words.geometry import inside
 from executive.words.knowledge import Knowledge, Pose

@@ -4,10 +4,10 @@ import pytest
 from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
-from executive.tree.behaviours.composites import MemorySequence
-from executive.tree.behaviours.conditions import Holds
+from executive.tree.behaviour import Explained
 from executive.tree.behaviours.decorators import Guard, Retry, Timeout
-from executive.tree.behaviours.explained import Explained
+from executive.tree.nodes.composites import MemorySequence
+from executive.tree.nodes.guard import Holds
 from skills.api import Cause, Failed, Thing
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID

@@ -5,10 +5,10 @@ from typing import Any, ClassVar
 
 import pytest
 
-from executive.tree.behaviours.board import Constant, FromBoard
-from executive.tree.compiling.builder import skill_spec
+from executive.tree.board import Constant, FromBoard
 from executive.tree.compiling.wiring import check_wiring
 from executive.tree.node import NodeSpec
+from executive.tree.plan import skill_spec
 from skills.api import Skill, Succeeded
 from skills.files.errors import InputError
 

@@ -14,10 +14,10 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
-from executive.tree.behaviours.conditions import Condition, Verdict, Waiting
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import ExplainedNode, cause_of, message_of
+from executive.tree.behaviour import ExplainedNode, cause_of, message_of
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.nodes.guard import Condition, Verdict, Waiting
 from executive.words.condition import READINGS
 from executive.words.expression import Expression, ExpressionError, Value
 from skills.api import Cause, Failed

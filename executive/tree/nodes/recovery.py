@@ -13,12 +13,12 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import Board
-from executive.tree.behaviours.composites import Conditional, MemoryComposite
-from executive.tree.behaviours.conditions import is_known_as
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import Explained, cause_of, message_of
+from executive.tree.behaviour import Explained, cause_of, message_of
+from executive.tree.board import Board
+from executive.tree.context import RunContext
 from executive.tree.node import NodeKind
+from executive.tree.nodes.composites import Conditional, MemoryComposite
+from executive.tree.nodes.guard import is_known_as
 from skills.api import Cause, ObjectObservation
 
 

@@ -7,11 +7,13 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from executive.tree.behaviours.board import FromBoard
-from executive.tree.behaviours.conditions import Holds, HoldsNothingElse
-from executive.tree.compiling.builder import PlanBuilder, pose_2d
-from executive.tree.compiling.handling import go_near_plan, held_plan, known_held_plan, pick_up_plan, tidied
-from executive.tree.compiling.search import (
+from executive.tree.board import FromBoard
+from executive.tree.node import NodeSpec
+from executive.tree.nodes.fallen import unless_fallen
+from executive.tree.nodes.guard import Holds, HoldsNothingElse
+from executive.tree.nodes.interrupts import dock_plan
+from executive.tree.nodes.pick_up import go_near_plan, held_plan, known_held_plan, pick_up_plan, tidied
+from executive.tree.nodes.search import (
     look_plans,
     people_looks,
     required_surfaces,
@@ -20,9 +22,7 @@ from executive.tree.compiling.search import (
     tally_of,
     where,
 )
-from executive.tree.node import NodeSpec
-from executive.tree.nodes.fallen import unless_fallen
-from executive.tree.nodes.interrupts import dock_plan
+from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.command import START, TIME_UNITS_S, Task, Thing
 from executive.words.geometry import inside
 from executive.words.knowledge import ANYBODY, ANYTHING

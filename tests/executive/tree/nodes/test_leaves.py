@@ -6,9 +6,9 @@ from types import MappingProxyType
 import pytest
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import BesideBoard, Board, FromBoardOr, SurfaceOfDetection
-from executive.tree.behaviours.context import leaf_seed
 from executive.tree.behaviours.leaves import Pause, RememberPose, SurfacesNear
+from executive.tree.board import BesideBoard, Board, FromBoardOr, SurfaceOfDetection
+from executive.tree.context import leaf_seed
 from skills.api import Cause, Surface
 from skills.robot import Pose2D
 

@@ -10,7 +10,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
-from executive.tree.behaviours.explained import ExplainedNode, cause_of, failed_for_good, message_of
+from executive.tree.behaviour import ExplainedNode, cause_of, failed_for_good, message_of
 from executive.tree.node import NodeKind
 from skills.api import Cause
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
-from executive.tree.behaviours.context import RunContext
+from executive.tree.context import RunContext
 from executive.words.policy import StaleData
 from skills.api import Cause, Failed, Thing
 from skills.arm.hold import Grip, HoldWatch, grip_again, hold_watch

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from itertools import product
 from typing import Final
 
-from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.node import NodeSpec
+from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.geometry import Point, distance_m, fits, nearest_side
 from executive.words.knowledge import Door, Knowledge
 from skills.files.errors import InputError

@@ -8,8 +8,6 @@ from pydrake.geometry import ProximityProperties, RoleAssign, SceneGraph
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 
-__all__ = ["multiply_friction"]
-
 _MATERIAL: Final = "material"
 _FRICTION: Final = "coulomb_friction"
 

@@ -30,7 +30,8 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import KnowsPlace
 from executive.words.command import Command, Task
 from executive.words.knowledge import BatteryFacts, Knowledge, SurfaceFacts
-from executive.words.steps import Do, Say, Step, steps_of_commands
+from executive.words.leaf_steps import Do, Say, steps_of_commands
+from executive.words.step import Step
 from plant.kinds import robot_kind
 from plant.worlds.world import World
 from skills.api import Surface

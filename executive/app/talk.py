@@ -23,7 +23,7 @@ from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills
-from executive.words.steps import Step
+from executive.words.step import Step
 
 __all__ = ["Talk", "conversation_of", "load_ahead"]
 

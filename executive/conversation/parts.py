@@ -13,9 +13,7 @@ from executive.language.understand import Understanding
 from executive.tree.compiler import CompiledTree
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
-from executive.words.steps import Step
-
-__all__ = ["NEVER_MIND", "OVER", "Reply", "ReplyKind", "Speech", "Waiting", "answer", "confirmation", "refusal"]
+from executive.words.step import Step
 
 OVER: Final = "the run is over; begin another with 'errand run'"
 NEVER_MIND: Final = "all right, never mind"

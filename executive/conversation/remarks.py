@@ -18,8 +18,6 @@ from executive.words.geometry import distance_m
 from executive.words.knowledge import Knowledge
 from skills.robot import Pose2D
 
-__all__ = ["RemarkAnswers", "doing_in_words", "place_in_words"]
-
 NEAR_M: Final = 1.3
 """How near to the edge of a surface the robot stands to be next to it."""
 IN_THE_ROOM_M: Final = 0.3

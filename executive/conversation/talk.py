@@ -40,11 +40,11 @@ from executive.language.wake import heard_wake, strip_wake
 from executive.run.control import Control, Mode
 from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree
-from executive.words.command import Command, Task, Thing
-from executive.words.steps import Step, steps_of_commands
+from executive.words.command import Command, Task
+from executive.words.leaf_steps import steps_of_commands
+from executive.words.step import Step
+from skills.api import Thing
 from skills.files.errors import InputError
-
-__all__ = ["REMEMBERED_S", "Conversation"]
 
 REMEMBERED_S: Final = 60.0
 """How long (robot's clock) what was spoken of is remembered, and a question waits for its answer."""

@@ -12,7 +12,8 @@ from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
 from executive.language.reference import ResolvedAction
 from executive.language.roles import HERE, Location
-from executive.words.command import Command, Task, Thing
+from executive.words.command import Command, Task
+from skills.api import Thing
 
 __all__ = ["CommandFrame", "command_frames", "spoken_command"]
 

@@ -12,8 +12,9 @@ from functools import cache
 from typing import Final
 
 from executive.language.lexicon import Patterns, read_table
-from executive.words.command import Command, Task, Thing
+from executive.words.command import Command, Task
 from executive.words.knowledge import Knowledge
+from skills.api import Thing
 
 __all__ = [
     "Amendment",

@@ -19,8 +19,9 @@ from executive.language.questions import ABLE, ClarifyingQuestion, RefusalError,
 from executive.language.roles import HERE, Location
 from executive.language.spelling import WordFacts, look_alikes, synonyms_of, words_for
 from executive.language.tokens import Token
-from executive.words.command import Command, Task, Thing
+from executive.words.command import Command, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
+from skills.api import Thing
 from skills.files.errors import known_names, listing
 
 __all__ = ["Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]

@@ -11,7 +11,7 @@ from typing import Final
 from executive.language.lexicon import lexicon
 from executive.language.nouns import NounKind
 from executive.language.tokens import Token
-from executive.words.command import Thing
+from skills.api import Thing
 
 __all__ = ["Phrase", "noun_phrases"]
 

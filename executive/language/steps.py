@@ -25,7 +25,7 @@ from executive.language.spelling import WordFacts
 from executive.language.tokens import Affirmed, Token, affirmed, name_table, parse_with_names
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
-from executive.words.steps import Step
+from executive.words.step import Step
 from skills.files.errors import listing
 
 __all__ = ["Part", "Steps", "Trace", "trace_sentence"]

@@ -17,7 +17,7 @@ from executive.language.steps import Trace, trace_sentence
 from executive.language.wake import strip_wake
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
-from executive.words.steps import Step
+from executive.words.step import Step
 from executive.words.yaml_steps import steps_to_data
 
 if TYPE_CHECKING:

@@ -19,8 +19,6 @@ from executive.words.condition import AllOf, AnyOf, Condition, Not, ValueIs, par
 from executive.words.expression import CLOCK, COMPARISONS, TIME_OF_DAY, Expression, ExpressionError
 from skills.quantities import bounds, likely, range_text
 
-__all__ = ["refuse_certain", "refuse_certain_comparisons"]
-
 Ranges = Mapping[str, Any]
 """The quantities of names that have one."""
 MOST_CASES: Final = 4096

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from executive.words.command import Command, Task, Thing
+from executive.words.command import Command, Task
 from executive.words.knowledge import Knowledge
-
-__all__ = ["UNNAMED", "UNSURE", "InGripper", "after_command", "cannot_take", "either", "is_same", "objection"]
+from skills.api import Thing
 
 
 @dataclass(frozen=True)

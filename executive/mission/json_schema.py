@@ -7,11 +7,9 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final, get_type_hints
 
+from executive.words.leaf_steps import COMMAND_KEYS
 from executive.words.mission import Mission
-from executive.words.steps import COMMAND_KEYS
 from skills.quantities import bounds, without_range, without_unit
-
-__all__ = ["mission_json_schema"]
 
 _NO_SKILLS: Final[Mapping[str, type]] = MappingProxyType({})
 

@@ -12,12 +12,10 @@ from pydantic import BaseModel
 from executive.mission.parameters import Given, with_parameters
 from executive.words.knowledge import Corner, Knowledge, knowledge_of_source
 from executive.words.mission import Mission, Stop
-from executive.words.steps import Place, Step
+from executive.words.step import Place, Step
 from skills.files.errors import Problems, suggestion
 from skills.files.schema import validate
 from skills.files.yaml_source import KeyPath, YamlSource, parse_yaml, read_yaml
-
-__all__ = ["for_robot", "import_folders", "load_mission", "locate", "overridden", "routes_in"]
 
 _NONE_GIVEN: Final[Given] = MappingProxyType({})
 _KEY: Final = "knowledge"

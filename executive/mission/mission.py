@@ -8,24 +8,15 @@ from typing import TYPE_CHECKING
 from executive.language.questions import Answerer, answer_by
 from executive.words.command import Command, parse_command
 from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.mission import Mission, QuestionPolicy
-from executive.words.steps import Do, Step, steps_of_commands
+from executive.words.step import Step
 from executive.words.yaml_steps import steps_from_yaml, steps_to_yaml
 from skills.files.errors import InputError
 
 if TYPE_CHECKING:
     from executive.language.parser import DependencyParser
     from executive.language.understand import Understanding
-
-__all__ = [
-    "lines_of",
-    "mission_from_commands",
-    "mission_from_lines",
-    "mission_from_meaning",
-    "mission_from_steps",
-    "steps_of",
-    "understood",
-]
 
 
 def understood(

@@ -22,8 +22,6 @@ from skills.files.yaml_scalars import scalar_of
 from skills.files.yaml_source import KeyPath, YamlSource
 from skills.quantities import LARGEST, Number, QuantityError, number_of, shown
 
-__all__ = ["Given", "given_values", "round_source", "values_in_json", "with_parameters"]
-
 _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _SCALARS: Final = (str, bool, int, float)

@@ -23,9 +23,6 @@ from skills.files.plugins import installed_plugins
 from skills.quantities import LongDuration, QuantityError, Seed, clock_text
 from skills.robot import Pose2D
 
-__all__ = ["Request", "Start", "start_in"]
-
-
 Start = Pose2D | Literal["unknown"]
 """Where the robot really stands: a pose (world frame), or a free one that the seed chooses and that nobody tells it."""
 

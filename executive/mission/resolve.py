@@ -32,9 +32,11 @@ from executive.words.condition import (
 from executive.words.expression import Expression, ExpressionError, Value, literal
 from executive.words.forms import Strict
 from executive.words.knowledge import ANYBODY, Knowledge
+from executive.words.leaf_steps import CallSkill, Do, Say, Set, UseMission
 from executive.words.mission import Mission, Parameter, QuestionPolicy
 from executive.words.policy import Policy
-from executive.words.steps import CallSkill, Do, ForEach, Group, Place, Say, Set, Step, Steps, UseMission
+from executive.words.step import Place, Step
+from executive.words.steps import ForEach, Group, Steps
 from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.files.outside import is_file
 from skills.files.schema import validate
@@ -43,8 +45,6 @@ from skills.files.yaml_source import KeyPath
 if TYPE_CHECKING:
     from executive.language.parser import DependencyParser
     from executive.language.understand import Understanding
-
-__all__ = ["mission_from_file"]
 
 MAX_STEPS: Final = 5000
 MAX_DEPTH: Final = 20

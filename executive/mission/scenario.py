@@ -9,8 +9,6 @@ from typing import Annotated, Any, Final
 from executive.words.option import Option
 from skills.quantities import Quantity
 
-__all__ = ["NO_SCENARIO", "RandomFaults", "Scenario"]
-
 RandomFaults = Annotated[int, Quantity(ge=0, le=100)]
 """How many faults a seed draws."""
 

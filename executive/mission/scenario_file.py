@@ -20,8 +20,6 @@ from skills.files.schema import Name, Text, validate
 from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import Coordinate, Delay, Height, Speed
 
-__all__ = ["EventFile", "ScenarioFile", "checked_fault", "load_scenario", "scenario_of"]
-
 _KINDS: Final = ("person", "door", "object")
 _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "person": ("at", "to", "from", "speed", "loop", "yields"),

@@ -8,8 +8,6 @@ from skills.files.outside import is_file, is_there
 from skills.files.yaml_source import read_yaml
 from skills.stack import DEFAULT_FILE, RobotStack, StackError, default_stack, stack_of
 
-__all__ = ["load_stack", "stack_file"]
-
 
 def stack_file(given: Path) -> Path:
     """A stack file as it was given, or the one of that name that comes with Errand."""

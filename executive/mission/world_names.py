@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from executive.words.command import START, TIME_UNITS_S, Command, Task, Thing
+from executive.words.command import START, TIME_UNITS_S, Command, Task
 from executive.words.knowledge import Knowledge
+from skills.api import Thing
 from skills.files.errors import suggestion
-
-__all__ = ["in_world_names", "unknown_names"]
 
 
 def unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:

@@ -15,9 +15,9 @@ import numpy as np
 
 from executive.record.schemas import RUN, TASK
 from executive.tree.compiler import CompiledTree
-from executive.words.command import START, Command, Task, Thing
+from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
-from skills.api import Publish
+from skills.api import Publish, Thing
 from skills.estimate.grid_map import GridMap
 from skills.perception.class_forms import class_forms
 from skills.robot import Clock

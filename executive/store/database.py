@@ -14,8 +14,6 @@ from typing import Final, Self
 
 from skills.files.errors import InputError, disk_is_full
 
-__all__ = ["STORE_FILE", "Database", "FileKind", "StoreError", "transaction"]
-
 BUSY_S: Final = 2.0
 
 

@@ -9,8 +9,6 @@ from typing import Any, Final
 from executive.store.missions import MissionState, MissionStore
 from executive.store.values import form
 
-__all__ = ["GivenMission", "GivenMissions"]
-
 _FAILED: Final = (MissionState.FAILURE, MissionState.ERROR, MissionState.CANCELLED)
 
 

@@ -11,8 +11,6 @@ from py_trees.common import Status
 from skills.api import Cause
 from skills.robot import Pose2D
 
-__all__ = ["Memory", "Recollection", "StepRecord"]
-
 AWAKE_AFTER_S = 0.5
 PATIENCE_S = 10.0
 

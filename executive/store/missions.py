@@ -17,8 +17,6 @@ from executive.store.values import form, from_text
 from skills.files.errors import InputError, listing
 from skills.robot import Pose2D
 
-__all__ = ["MissionState", "MissionStore", "StoredMission", "insert", "utc_now"]
-
 
 def utc_now() -> datetime:
     """The wall's clock, in UTC."""

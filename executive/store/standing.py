@@ -13,8 +13,6 @@ from executive.store.missions import MissionState, MissionStore, StoredMission, 
 from executive.store.triggers import Every, Missed, OnBatteryFull, Once, Schedule, Timed, Trigger, local, trigger_of
 from skills.files.errors import InputError
 
-__all__ = ["LATE", "MOST_WAITING", "StandingMission", "StandingMissions", "TooManyError"]
-
 LATE: Final = timedelta(seconds=90)
 """An occurrence that is noticed later than this is missed: the clock was set, or the machine slept."""
 SET_BACK: Final = timedelta(hours=1)

@@ -13,8 +13,6 @@ from typing import Any, Final, Protocol
 from skills.files.errors import InputError, listing
 from skills.files.plugins import PluginDefect, run_plugin
 
-__all__ = ["GROUP", "Fire", "TriggerSource", "refuse_missing_source", "trigger_source"]
-
 GROUP: Final = "errand.triggers"
 
 Fire = Callable[[str, bytes], None]

@@ -21,22 +21,6 @@ from typing import Final
 from skills.durations import seconds_in
 from skills.files.errors import InputError, listing, suggestion
 
-__all__ = [
-    "Every",
-    "Missed",
-    "OnBatteryFull",
-    "OnCall",
-    "OnTopic",
-    "Once",
-    "Schedule",
-    "Timed",
-    "Trigger",
-    "event_of",
-    "local",
-    "schedule_of",
-    "trigger_of",
-]
-
 FULL: Final = 0.95
 NOISE: Final = 0.01
 """A charge that falls is read now below a level and now above it; one that rises was lower by more than this."""

@@ -17,8 +17,6 @@ from typing import Final
 from executive.store.missions import MissionStore
 from skills.files.errors import InputError
 
-__all__ = ["LONGEST_WAIT", "WakeupPipe", "wake_server"]
-
 LONGEST_WAIT: Final = timedelta(minutes=1)
 """A wait counts the time that passes, but the wall's clock may be set meanwhile, or the machine may sleep."""
 _MOST_WAKES: Final = 4096

@@ -25,10 +25,11 @@ from executive.words.command import START, Command, Task
 from executive.words.expression import kind_of, literal
 from executive.words.goal import GoalCondition, When
 from executive.words.knowledge import Knowledge, Pose
+from executive.words.leaf_steps import CallSkill, Do, Say, UseMission
 from executive.words.mission import Mission
 from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
-from executive.words.steps import CallSkill, Do, Say, Step, UseMission
+from executive.words.step import Step
 from skills.api import Skill, Surface
 from skills.files.errors import InputError, Problems, SourceLine, listing
 from skills.quantities import Quantity

@@ -18,7 +18,7 @@ from executive.tree.plan import PlanBuilder, Registry, start_key
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.mission import Mission
-from executive.words.steps import Step
+from executive.words.step import Step
 from skills.files.errors import InputError
 from skills.perception.doorway import Doorway
 

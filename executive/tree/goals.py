@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from executive.words.command import START, Command, Task, Thing
+from executive.words.command import START, Command, Task
 from executive.words.goal import GoalCondition, GoalKind, Region, When
 from executive.words.knowledge import ANYBODY, Knowledge, Pose
+from skills.api import Thing
 
 __all__ = [
     "clearing_goals",

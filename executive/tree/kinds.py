@@ -17,7 +17,7 @@ from executive.tree.compiling.part import Assembled
 from executive.tree.context import RunContext
 from executive.tree.node import NodeKind, NodeSpec
 from executive.tree.plan import PlanBuilder
-from executive.words.steps import Step
+from executive.words.step import Step
 
 __all__ = ["KINDS", "Changes", "block_plan", "build", "writes"]
 

@@ -12,10 +12,10 @@ from executive.tree.board import Binding, Constant, FromBoard
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.registry import missing
-from executive.words.command import Command, Task, Thing
+from executive.words.command import Command, Task
 from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
 from executive.words.slug import slug
-from skills.api import Cause, Part, Skill, Surface
+from skills.api import Cause, Part, Skill, Surface, Thing
 from skills.files.errors import InputError, SourceLine, suggestion
 from skills.perception.class_forms import THING
 from skills.robot import Pose2D

@@ -14,20 +14,6 @@ from typing import Any, Final
 
 from skills.api import Thing
 
-__all__ = [
-    "START",
-    "TIME_UNITS_S",
-    "Command",
-    "Task",
-    "Thing",
-    "command_of_parts",
-    "is_attribute",
-    "may_be_attribute",
-    "parse_command",
-    "parts_of_command",
-    "thing",
-]
-
 _ATTRIBUTE: Final = re.compile(
     r"red|green|blue|yellow|orange|white|black|gr[ae]y|brown|pink|purple|violet|silver|golden|dark|bright|light"
     r"|big|small|large|little|tiny|huge|tall|short|long|wide|thin|thick|heavy|round|square|full|empty|open|closed"

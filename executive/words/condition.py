@@ -17,22 +17,6 @@ from skills.files.errors import listing
 from skills.files.schema import Name, Text
 from skills.quantities import Delay, Quantity, Share
 
-__all__ = [
-    "RANGES",
-    "READINGS",
-    "AllOf",
-    "AnyOf",
-    "ButtonPressed",
-    "Condition",
-    "DoorOpen",
-    "Look",
-    "LookFor",
-    "Not",
-    "Question",
-    "ValueIs",
-    "parts_of",
-]
-
 READINGS: Final[Mapping[str, Kind]] = MappingProxyType(
     {
         "battery": Kind.NUMBER,  # charge, from 0 to 1

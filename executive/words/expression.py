@@ -21,8 +21,6 @@ from skills.durations import seconds_in
 from skills.files.errors import suggestion
 from skills.quantities import QuantityError, clock_text
 
-__all__ = ["FUNCTIONS", "Expression", "ExpressionError", "Kind", "Template", "Value", "kind_of", "literal"]
-
 Value = bool | int | float | str
 MOST_LETTERS: Final = 500
 MOST_TEXT: Final = 2000

@@ -11,8 +11,6 @@ from pydantic_core import InitErrorDetails
 
 from skills.files.errors import listing
 
-__all__ = ["Forms", "Strict", "aliases"]
-
 
 class Strict(BaseModel):
     """A mapping without unknown keys, which never changes; code names its fields, files write their aliases."""

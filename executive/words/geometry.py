@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import shapely
 
-__all__ = ["Point", "Side", "distance_m", "fits", "inside", "nearest_side"]
-
 Point = tuple[float, float]
 
 

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 from executive.words.geometry import inside
 
-__all__ = ["GoalCondition", "GoalKind", "Region", "When"]
-
 
 class GoalKind(enum.Enum):
     """What must hold."""

@@ -16,23 +16,6 @@ from skills.files.yaml_source import YamlSource, read_yaml
 from skills.perception.class_forms import PERSON, THING, class_forms
 from skills.quantities import Angle, Coordinate, Opening, Quantity, TopHeight
 
-__all__ = [
-    "ANYBODY",
-    "ANYTHING",
-    "EVERYTHING",
-    "BatteryFacts",
-    "Door",
-    "Knowledge",
-    "Person",
-    "Place",
-    "Pose",
-    "RobotFacts",
-    "SurfaceFacts",
-    "ThingFacts",
-    "knowledge_of_source",
-    "load_knowledge",
-]
-
 ANYTHING: Final = "object"
 """The name that stands for every class of objects."""
 EVERYTHING: Final = "everything"

@@ -24,23 +24,6 @@ from executive.words.step import Fault, Scalar, Step, unreadable
 from skills.files.schema import Name, Text
 from skills.quantities import Duration, QuantityError, Share, clock_text
 
-__all__ = [
-    "COMMAND_KEYS",
-    "Answering",
-    "Awaited",
-    "CallSkill",
-    "Charging",
-    "Check",
-    "Do",
-    "Dock",
-    "Say",
-    "Set",
-    "Speak",
-    "UseMission",
-    "Wait",
-    "steps_of_commands",
-]
-
 COMMAND_KEYS: Final = ("take", "to", "do", "object")
 
 

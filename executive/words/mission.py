@@ -13,13 +13,12 @@ from executive.words.forms import Strict
 from executive.words.knowledge import Corner
 from executive.words.policy import OnFailure, OperatorQuestion, Policy
 from executive.words.robots import RobotsFile
-from executive.words.steps import Branch, Given, Handler, Scalar, Step, Steps, While
+from executive.words.step import Given, Scalar, Step
+from executive.words.steps import Branch, Handler, Steps, While
 from skills.files.errors import InputError, SourceLine
 from skills.files.schema import Name, Text
 from skills.files.yaml_source import KeyPath, YamlSource
 from skills.quantities import Delay, Speed
-
-__all__ = ["DEFAULT_WORLD", "LooseObject", "Mission", "MissionPart", "Parameter", "QuestionPolicy", "Route", "Stop"]
 
 DEFAULT_WORLD: Final = "flat"
 

@@ -11,8 +11,6 @@ from executive.words.forms import Strict
 from skills.files.schema import Text
 from skills.quantities import Duration, Quantity, Share
 
-__all__ = ["Guards", "OnFailure", "OperatorQuestion", "Policy", "StaleData"]
-
 Attempts = Annotated[int, Quantity(ge=0, le=100)]
 Objects = Annotated[int, Quantity(ge=0, le=10)]
 

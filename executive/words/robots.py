@@ -16,22 +16,6 @@ from skills.files.yaml_source import YamlSource
 from skills.quantities import Angle, Coordinate, QuantityError, number_in
 from skills.robot import Pose2D
 
-__all__ = [
-    "EVERYBODY",
-    "NamedRobot",
-    "RobotConfig",
-    "RobotsFile",
-    "checked_kind",
-    "checked_name",
-    "display_name",
-    "name_key",
-    "parse_robots",
-    "pose_in",
-    "robot_called",
-    "robots_in",
-    "same_name",
-]
-
 EVERYBODY: Final = frozenset({"all", "both", "everybody", "everyone", "you", "all robots", "all of you"})
 """Words that call all robots: none is the name of one."""
 _FORM: Final = "write NAME=KIND for each, for instance alice=spot,bob=fetch"

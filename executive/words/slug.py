@@ -4,8 +4,6 @@ import re
 import zlib
 from typing import Final
 
-__all__ = ["slug"]
-
 LONGEST_SLUG: Final = 80
 
 

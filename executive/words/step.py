@@ -15,8 +15,6 @@ from skills.files.errors import InputError, SourceLine
 from skills.files.yaml_source import KeyPath, YamlSource
 from skills.quantities import Number, Whole
 
-__all__ = ["Fault", "Given", "Place", "Scalar", "Step", "unreadable"]
-
 Given = str | StrictBool | Whole | Number
 Scalar = Given | None
 Fault = tuple[KeyPath, str, str]

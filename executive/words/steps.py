@@ -19,9 +19,7 @@ from executive.words.forms import Forms, Strict
 from executive.words.leaf_steps import (
     COMMAND_KEYS,
     Answering,
-    Awaited,
     CallSkill,
-    Charging,
     Check,
     Do,
     Dock,
@@ -30,45 +28,11 @@ from executive.words.leaf_steps import (
     Speak,
     UseMission,
     Wait,
-    steps_of_commands,
 )
-from executive.words.step import Fault, Given, Place, Scalar, Step, unreadable
+from executive.words.step import Fault, Scalar, Step, unreadable
 from skills.files.errors import listing
 from skills.files.schema import Name, Text
 from skills.quantities import Count, Duration
-
-__all__ = [
-    "BLOCKS",
-    "COMMAND_KEYS",
-    "Ask",
-    "Awaited",
-    "Branch",
-    "CallSkill",
-    "Charging",
-    "Check",
-    "Choose",
-    "Do",
-    "Dock",
-    "ForEach",
-    "Given",
-    "Group",
-    "Handler",
-    "Loop",
-    "Place",
-    "Repeat",
-    "Say",
-    "Scalar",
-    "Set",
-    "Speak",
-    "Step",
-    "Steps",
-    "Together",
-    "Try",
-    "UseMission",
-    "Wait",
-    "While",
-    "steps_of_commands",
-]
 
 
 def _none_is_empty(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:

@@ -11,20 +11,6 @@ from executive.words.option import Option
 from skills.files.errors import InputError, suggestion
 from skills.quantities import Quantity, QuantityError, number_in, number_of
 
-__all__ = [
-    "DAY_LIGHT",
-    "LIGHTS",
-    "NORMAL_LIGHT",
-    "NO_VARIATION",
-    "Brightness",
-    "Clutter",
-    "Friction",
-    "Light",
-    "MorePeople",
-    "Variation",
-    "light_called",
-]
-
 NORMAL_LIGHT: Final = "normal"
 MOST_CLUTTER: Final = 40
 MOST_PEOPLE: Final = 8

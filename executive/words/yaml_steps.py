@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from executive.words.forms import Strict
-from executive.words.steps import Step, Steps
+from executive.words.step import Step
+from executive.words.steps import Steps
 from skills.files.errors import InputError
 from skills.files.yaml_scalars import yaml_of
 from skills.files.yaml_source import parse_yaml
-
-__all__ = ["steps_from_yaml", "steps_to_data", "steps_to_yaml"]
 
 
 class _Document(Strict):

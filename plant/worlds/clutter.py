@@ -10,8 +10,6 @@ from plant.models.catalogue import load_catalogue
 from plant.worlds.placement import Placement, outline_of, place_one
 from plant.worlds.world import ObjectRule, RouteRule, StopRule, World, WorldError
 
-__all__ = ["place_clutter", "with_passers_by"]
-
 PAUSE_S = 4.0
 _CLUTTER_STREAM, _PASSING_STREAM = 11, 12
 _NEVER = frozenset({"person", "extinguisher"})

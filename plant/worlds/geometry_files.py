@@ -19,8 +19,6 @@ from skills.files.errors import InputError
 from skills.files.outside import file_beside, plain_file, read_text
 from skills.files.yaml_source import read_yaml
 
-__all__ = ["check_directives", "check_model"]
-
 OURS: Final = Path(__file__).resolve().parent.parent
 OWN_PACKAGE: Final = "world"
 """The package of a world's own folder, wherever that lies."""

@@ -42,9 +42,9 @@ from executive.store.missions import MissionState, MissionStore
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from executive.words.robots import RobotConfig
-from executive.words.steps import Do
 from tests.executive.conftest import (
     FETCH,
     KNOWLEDGE,

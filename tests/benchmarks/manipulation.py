@@ -51,8 +51,8 @@ from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.steps import Do
 from plant.models.imported import FACTS_FILE, read_imported
 from plant.pictures import best_view, render_view, save_png
 from plant.simulation import Simulation

@@ -38,32 +38,11 @@ from executive.store.resuming import resumed_tree
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.words.command import parse_command
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
+from executive.words.leaf_steps import Awaited, CallSkill, Charging, Check, Do, Dock, Say, Set, Speak, UseMission, Wait
 from executive.words.mission import Mission
 from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
-from executive.words.steps import (
-    Ask,
-    Awaited,
-    CallSkill,
-    Charging,
-    Check,
-    Choose,
-    Do,
-    Dock,
-    Group,
-    Handler,
-    Loop,
-    Repeat,
-    Say,
-    Set,
-    Speak,
-    Step,
-    Steps,
-    Together,
-    Try,
-    UseMission,
-    Wait,
-    While,
-)
+from executive.words.step import Step
+from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Steps, Together, Try, While
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectObservation, Part, Running, Skill, Succeeded, Thing
 from skills.check_door.skill import CheckDoorInputs
 from skills.files.errors import InputError

@@ -22,7 +22,8 @@ import yaml
 from executive.language.parser import load_parser
 from executive.language.understand import Status, Understanding, understand
 from executive.words.knowledge import load_knowledge
-from executive.words.steps import Step, steps_of_commands
+from executive.words.leaf_steps import steps_of_commands
+from executive.words.step import Step
 from plant.worlds.world import load_world
 from tests.executive.language.notation import as_noted, noted
 

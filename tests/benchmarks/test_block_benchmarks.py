@@ -17,23 +17,10 @@ from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.condition import AllOf, ButtonPressed, Not, ValueIs
 from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import Awaited, CallSkill, Do, Set, Wait
 from executive.words.mission import Mission
 from executive.words.policy import Policy
-from executive.words.steps import (
-    Awaited,
-    CallSkill,
-    Choose,
-    Do,
-    Group,
-    Handler,
-    Loop,
-    Repeat,
-    Set,
-    Together,
-    Try,
-    Wait,
-    While,
-)
+from executive.words.steps import Choose, Group, Handler, Loop, Repeat, Together, Try, While
 from tests.executive.conftest import (
     KNOWLEDGE,
     PORTS,

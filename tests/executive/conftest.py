@@ -20,8 +20,8 @@ from executive.tree.context import RunContext
 from executive.tree.snapshot import Change, Observed
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission
-from executive.words.steps import steps_of_commands
 from skills.api import (
     Cause,
     Failed,

@@ -18,9 +18,9 @@ from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from executive.words.policy import Policy
-from executive.words.steps import Do
 from plant import simulation
 from plant.worlds.placement import place_objects
 from plant.worlds.world import load_world

@@ -19,8 +19,8 @@ from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.steps import Do
 from plant.diagram import LooseModel
 from plant.models.spot.description import HAND_LINK
 from plant.simulation import Simulation

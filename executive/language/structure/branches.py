@@ -32,8 +32,9 @@ from executive.language.structure.row import (
 )
 from executive.words.command import Task
 from executive.words.condition import ValueIs
+from executive.words.leaf_steps import Awaited, Do, Wait
 from executive.words.policy import OnFailure
-from executive.words.steps import Awaited, Choose, Do, Group, Loop, Repeat, Steps, Together, Try, Wait
+from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, Try
 
 
 class Branches(Base):

@@ -18,10 +18,11 @@ from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.steps import Part, Steps, Trace
 from executive.language.tokens import Token
-from executive.words.command import START, Command, Task, Thing
+from executive.words.command import START, Command, Task
 from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
 from executive.words.geometry import inside
 from executive.words.knowledge import Knowledge
+from skills.api import Thing
 
 __all__ = [
     "IT",

@@ -26,7 +26,9 @@ from executive.language.structure.plain import (
 )
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
-from executive.words.steps import Awaited, Charging, Dock, Step, Steps, Wait, steps_of_commands
+from executive.words.leaf_steps import Awaited, Charging, Dock, Wait, steps_of_commands
+from executive.words.step import Step
+from executive.words.steps import Steps
 from skills.files.errors import listing
 
 __all__ = [

@@ -15,7 +15,9 @@ from executive.language.structure.plain import PlainReader, PlainReading, State,
 from executive.language.structure.requests import Done, template
 from executive.words.command import Command, Task
 from executive.words.condition import AllOf, Condition, Look, Not
-from executive.words.steps import Loop, Speak, Step, Steps, steps_of_commands
+from executive.words.leaf_steps import Speak, steps_of_commands
+from executive.words.step import Step
+from executive.words.steps import Loop, Steps
 
 
 @dataclass

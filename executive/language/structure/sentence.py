@@ -39,21 +39,9 @@ from executive.language.structure.row import LookedAt, Row, checked_statement, e
 from executive.words.command import Task
 from executive.words.condition import Look
 from executive.words.knowledge import Knowledge
-from executive.words.steps import (
-    Ask,
-    Awaited,
-    Check,
-    Choose,
-    Do,
-    Repeat,
-    Speak,
-    Step,
-    Steps,
-    Together,
-    Try,
-    Wait,
-    steps_of_commands,
-)
+from executive.words.leaf_steps import Awaited, Check, Do, Speak, Wait, steps_of_commands
+from executive.words.step import Step
+from executive.words.steps import Ask, Choose, Repeat, Steps, Together, Try
 from skills.files.schema_errors import first_error
 
 __all__ = ["Structured", "structured"]

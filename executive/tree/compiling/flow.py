@@ -23,7 +23,8 @@ from executive.tree.plan import PlanBuilder
 from executive.words.condition import READINGS, Condition, Look
 from executive.words.expression import Expression, Kind, Template, kind_of
 from executive.words.slug import slug
-from executive.words.steps import Group, Step
+from executive.words.step import Step
+from executive.words.steps import Group
 from skills.files.errors import InputError
 
 PYTHON_TYPES: Final[Mapping[Kind, type]] = {Kind.NUMBER: float, Kind.TEXT: str, Kind.TRUTH: bool}

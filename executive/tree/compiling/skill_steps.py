@@ -12,8 +12,8 @@ from executive.tree.port_values import FROM_KEY, PortValueError, gathered, port_
 from executive.tree.registry import missing
 from executive.tree.types import field_types
 from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import CallSkill
 from executive.words.slug import slug
-from executive.words.steps import CallSkill
 from skills.api import Skill
 from skills.files.errors import listing, suggestion
 

@@ -14,8 +14,7 @@ from executive.tree.board import FromBoard
 from executive.tree.context import RunContext
 from executive.tree.node import NodeKind, NodeSpec
 from executive.tree.plan import PlanBuilder
-from executive.words.command import Thing
-from skills.api import FLOOR, Cause, ObjectObservation, Surface
+from skills.api import FLOOR, Cause, ObjectObservation, Surface, Thing
 from skills.geometry import compose
 from skills.quantities import Coordinate, Length
 from skills.robot import Pose2D

@@ -22,7 +22,7 @@ from executive.tree.node import NodeKind
 from executive.tree.nodes.decisions import AnswerIs
 from executive.tree.nodes.doors import door_plan
 from executive.tree.plan import PlanBuilder
-from executive.words import steps as model
+from executive.words import leaf_steps as model
 from executive.words.condition import DoorOpen, Look
 
 

@@ -20,9 +20,9 @@ from executive.tree.nodes.pick_up import pick_up_plan, tidied
 from executive.tree.nodes.policies import FINAL_CAUSES
 from executive.tree.nodes.search import detect_plan, look_plans, required_surfaces, where
 from executive.tree.plan import PlanBuilder
-from executive.words.command import START, Command, Task, Thing
+from executive.words.command import START, Command, Task
 from executive.words.knowledge import EVERYTHING
-from skills.api import Cause, ObjectObservation
+from skills.api import Cause, ObjectObservation, Thing
 from skills.detect.words import numbered
 from skills.files.errors import listing
 from skills.perception.class_forms import THING

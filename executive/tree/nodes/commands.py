@@ -23,9 +23,10 @@ from executive.tree.nodes.search import (
     where,
 )
 from executive.tree.plan import PlanBuilder, pose_2d
-from executive.words.command import START, TIME_UNITS_S, Task, Thing
+from executive.words.command import START, TIME_UNITS_S, Task
 from executive.words.geometry import inside
 from executive.words.knowledge import ANYBODY, ANYTHING
+from skills.api import Thing
 from skills.detect.words import numbered, plural
 from skills.robot import Pose2D
 

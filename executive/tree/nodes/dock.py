@@ -9,7 +9,7 @@ from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.goals import command_goal
 from executive.tree.nodes.interrupts import dock_plan
 from executive.tree.plan import PlanBuilder, pose_2d
-from executive.words import steps as model
+from executive.words import leaf_steps as model
 from executive.words.command import Command, Task
 from skills.files.errors import InputError
 

@@ -27,9 +27,8 @@ from executive.tree.nodes.pick_up import LOOK_AGAIN_S, held_plan, pick_up_plan
 from executive.tree.nodes.recovery import Recovery
 from executive.tree.nodes.search import detect_plan
 from executive.tree.plan import PlanBuilder, after
-from executive.words.command import Thing
 from executive.words.geometry import distance_m
-from skills.api import FLOOR, Cause, Surface
+from skills.api import FLOOR, Cause, Surface, Thing
 from skills.geometry import compose
 from skills.quantities import Coordinate, Height
 from skills.robot import Pose2D

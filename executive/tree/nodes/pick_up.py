@@ -25,9 +25,8 @@ from executive.tree.nodes.aside import can_move_aside, move_aside_plan
 from executive.tree.nodes.guard import Holds
 from executive.tree.nodes.recovery import Recovery
 from executive.tree.plan import PlanBuilder, after
-from executive.words.command import Thing
 from executive.words.geometry import inside
-from skills.api import Cause, Surface
+from skills.api import Cause, Surface, Thing
 from skills.robot import Pose2D
 
 ATTEMPTS: Final = 4

@@ -20,6 +20,8 @@ from executive.tree.nodes.decisions import Decide
 from executive.tree.plan import PlanBuilder
 from executive.words import steps as model
 from executive.words.condition import READINGS, Condition, ValueIs, parts_of
+from executive.words.leaf_steps import CallSkill, Check, Do, Say, Set
+from executive.words.step import Step
 from skills.api import Cause
 from skills.files.errors import InputError, count_text
 from skills.robot import Clock
@@ -199,14 +201,14 @@ def _refuse_endless(block: model.Repeat, condition: Condition | None, builder: P
         raise InputError.at(builder.source, f"nothing in a round changes whether {condition}", hint=hint)
 
 
-def _given(steps: Iterable[model.Step]) -> set[str]:
+def _given(steps: Iterable[Step]) -> set[str]:
     """The names that steps may give a value."""
     found: set[str] = set()
     for step in (below for each in steps for below in each.walk()):
         match step:
-            case model.Set(set=values):
+            case Set(set=values):
                 found |= set(values)
-            case model.Do() | model.Say() | model.CallSkill() | model.Check() | model.Ask():
+            case Do() | Say() | CallSkill() | Check() | model.Ask():
                 found |= set((step.gives or {}).values())
     return found
 

@@ -11,10 +11,9 @@ from executive.tree.board import FromBoard, SurfaceOfDetection, pose_beside
 from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.tree.plan import PlanBuilder, pose_2d
-from executive.words.command import Thing
 from executive.words.geometry import inside
 from executive.words.knowledge import Knowledge, Pose
-from skills.api import Cause
+from skills.api import Cause, Thing
 from skills.files.errors import listing
 
 Ports = Mapping[str, object]

@@ -25,6 +25,7 @@ from executive.tree.nodes.decisions import Keys, View
 from executive.tree.plan import PlanBuilder
 from executive.words import steps as model
 from executive.words.expression import LARGEST, ExpressionError, Kind, Template, Value, kind_of
+from executive.words.leaf_steps import Speak
 from executive.words.slug import slug
 from skills.api import Asked, Cause, Failed, Question
 from skills.files.errors import InputError, suggestion
@@ -154,7 +155,7 @@ def _writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
     return {options["key"]: options["gives"]}
 
 
-def _speak_plan(assembler: Assembler, block: model.Speak, builder: PlanBuilder) -> Assembled:
+def _speak_plan(assembler: Assembler, block: Speak, builder: PlanBuilder) -> Assembled:
     if not block.text.names:
         return Assembled((builder.skill("speak", {"text": block.text.filled({})}),))
     check_template(block.text, builder, assembler)
@@ -231,4 +232,4 @@ def _default(block: model.Ask, names: Mapping[str, str], builder: PlanBuilder) -
 
 
 KINDS: Final[Mapping[str, NodeKind]] = {"question": NodeKind(AskPeople, ("context",), writes=_writes)}
-PLANS: Final[BlockPlans] = {model.Speak: _speak_plan, model.Ask: _ask_plan}
+PLANS: Final[BlockPlans] = {Speak: _speak_plan, model.Ask: _ask_plan}

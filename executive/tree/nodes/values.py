@@ -16,7 +16,7 @@ from executive.tree.context import RunContext
 from executive.tree.node import NodeKind
 from executive.tree.nodes.decisions import Keys, View
 from executive.tree.plan import PlanBuilder
-from executive.words import steps as model
+from executive.words import leaf_steps as model
 from executive.words.expression import Expression, ExpressionError, Template
 from skills.api import Cause
 

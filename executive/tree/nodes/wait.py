@@ -18,7 +18,7 @@ from executive.tree.context import RunContext
 from executive.tree.node import NodeKind
 from executive.tree.nodes.decisions import DAY_S, Decide
 from executive.tree.plan import PlanBuilder
-from executive.words import steps as model
+from executive.words import leaf_steps as model
 from skills.robot import Clock
 
 

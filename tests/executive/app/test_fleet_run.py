@@ -26,8 +26,8 @@ from executive.store.given import GivenMissions
 from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
 from executive.words.command import Command, Task, parse_command
+from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.mission import Mission
-from executive.words.steps import Do, steps_of_commands
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError
 from skills.robot import Pose2D

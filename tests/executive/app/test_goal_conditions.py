@@ -9,9 +9,10 @@ from executive.tree.compiler import compile_mission
 from executive.tree.goals import command_goal
 from executive.words.command import parse_command
 from executive.words.goal import GoalKind, When
+from executive.words.leaf_steps import CallSkill, Do, Speak, UseMission
 from executive.words.mission import Mission
 from executive.words.policy import OnFailure, Policy
-from executive.words.steps import CallSkill, Do, Loop, Repeat, Speak, UseMission
+from executive.words.steps import Loop, Repeat
 from plant.referee import Verdict
 from skills.speak.skill import Speak as SpeakSkill
 

@@ -8,24 +8,10 @@ from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.condition import DoorOpen, Look, ValueIs
 from executive.words.goal import GoalKind, When
+from executive.words.leaf_steps import Awaited, CallSkill, Check, Do, Set, Wait
 from executive.words.mission import Mission
 from executive.words.policy import Policy
-from executive.words.steps import (
-    Awaited,
-    CallSkill,
-    Check,
-    Choose,
-    Do,
-    Group,
-    Handler,
-    Loop,
-    Repeat,
-    Set,
-    Together,
-    Try,
-    Wait,
-    While,
-)
+from executive.words.steps import Choose, Group, Handler, Loop, Repeat, Together, Try, While
 from skills.api import Cause, Failed, Succeeded
 from skills.check_door.skill import CheckDoorInputs
 from tests.executive.conftest import KNOWLEDGE, scripted_skill

@@ -6,7 +6,7 @@ from executive.language.understand import understand
 from executive.mission.mission import mission_from_steps
 from executive.run.control import Control
 from executive.tree.compiler import compile_mission
-from executive.words.steps import steps_of_commands
+from executive.words.leaf_steps import steps_of_commands
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ from executive.conversation import Conversation, ReplyKind
 from executive.run.control import Mode
 from executive.run.outcome import Outcome
 from executive.words.command import Command
-from executive.words.steps import Do, steps_of_commands
+from executive.words.leaf_steps import Do, steps_of_commands
 from skills.api import Question
 from skills.testing.clock import VirtualClock
 

@@ -12,7 +12,9 @@ import re
 from collections.abc import Iterable
 
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
-from executive.words.steps import Ask, Check, Choose, Do, Dock, Group, Repeat, Speak, Step, Together, Try, Wait
+from executive.words.leaf_steps import Check, Do, Dock, Speak, Wait
+from executive.words.step import Step
+from executive.words.steps import Ask, Choose, Group, Repeat, Together, Try
 
 __all__ = ["as_noted", "noted"]
 

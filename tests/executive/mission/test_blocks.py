@@ -8,22 +8,8 @@ from executive.mission.resolve import MAX_NESTING, MAX_STEPS, mission_from_file
 from executive.words.command import Command
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Look, Not, ValueIs
 from executive.words.expression import Template
-from executive.words.steps import (
-    Ask,
-    Awaited,
-    Charging,
-    Check,
-    Choose,
-    Dock,
-    Group,
-    Handler,
-    Repeat,
-    Set,
-    Speak,
-    Together,
-    Try,
-    Wait,
-)
+from executive.words.leaf_steps import Awaited, Charging, Check, Dock, Set, Speak, Wait
+from executive.words.steps import Ask, Choose, Group, Handler, Repeat, Together, Try
 from skills.files.errors import InputError
 
 KITCHEN, HALL = Command(goal="kitchen"), Command(goal="hall")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
-from executive.words.command import Command, Task, Thing
+from executive.words.command import Command, Task
 from executive.words.condition import RANGES, AllOf, AnyOf, ButtonPressed, Condition, Look, Not, ValueIs
 from executive.words.expression import Expression, ExpressionError
+from skills.api import Thing
 from skills.quantities import Tries
 
 NAMES = {**RANGES, "count": Tries}

@@ -14,7 +14,9 @@ from executive.mission.mission import (
 from executive.mission.resolve import mission_from_file
 from executive.words.command import Command, parse_command
 from executive.words.knowledge import load_knowledge
-from executive.words.steps import Do, Loop, Place, Repeat
+from executive.words.leaf_steps import Do
+from executive.words.step import Place
+from executive.words.steps import Loop, Repeat
 from skills.files.errors import InputError
 from skills.files.yaml_source import YamlSource
 

@@ -12,8 +12,8 @@ from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.steps import Do
 from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause, ObjectObservation, Running, Skill, Succeeded, Thing
 from skills.robot import ArmTrajectory

@@ -12,8 +12,9 @@ from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.steps import Do, Group
+from executive.words.steps import Group
 from skills.api import Question
 from tests.visitors import OnMessage, OnTick
 

@@ -6,9 +6,10 @@ from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Awaited, CallSkill, Do, Set, Wait
 from executive.words.mission import Mission
 from executive.words.policy import Policy
-from executive.words.steps import Ask, Awaited, CallSkill, Do, Group, Set, Try, Wait
+from executive.words.steps import Ask, Group, Try
 from skills.api import Cause, Failed
 
 

@@ -13,8 +13,8 @@ from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.steps import Do
 from skills.api import Cause, Failed, Succeeded
 from tests.visitors import OnMessage
 

@@ -18,9 +18,9 @@ from executive.tree.compiler import compile_mission
 from executive.tree.node import NodeSpec
 from executive.tree.registry import installed_skills
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from executive.words.policy import Policy
-from executive.words.steps import Do
 from skills.api import Cause, Failed, ObjectObservation, Running, Succeeded, Surface, Thing
 from skills.quantities import Coordinate, Length
 

@@ -16,23 +16,10 @@ from executive.store.resuming import resumed_tree
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.condition import Look, Not, ValueIs
+from executive.words.leaf_steps import Awaited, CallSkill, Check, Set, Wait
 from executive.words.mission import Mission
 from executive.words.policy import OnFailure, Policy
-from executive.words.steps import (
-    Ask,
-    Awaited,
-    CallSkill,
-    Check,
-    Choose,
-    Group,
-    Loop,
-    Repeat,
-    Set,
-    Together,
-    Try,
-    Wait,
-    While,
-)
+from executive.words.steps import Ask, Choose, Group, Loop, Repeat, Together, Try, While
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 
 REQUEST = Request("blocks", seed=3, name="m", world_name="flat", robot="Alice", fingerprint="print")

@@ -14,9 +14,9 @@ from executive.store.resuming import BEFORE, ended_tree, resumed_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from executive.words.robots import RobotConfig
-from executive.words.steps import Do
 from skills.api import Cause, Failed, Running, Succeeded
 
 TAKE_AND_PUT = (

@@ -7,27 +7,10 @@ import pytest
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.condition import ButtonPressed, Condition, Look, Not, ValueIs
+from executive.words.leaf_steps import Awaited, CallSkill, Check, Do, Dock, Set, Speak, Wait
 from executive.words.mission import Mission
 from executive.words.policy import OnFailure, Policy
-from executive.words.steps import (
-    Ask,
-    Awaited,
-    CallSkill,
-    Check,
-    Choose,
-    Do,
-    Dock,
-    Group,
-    Handler,
-    Loop,
-    Repeat,
-    Set,
-    Speak,
-    Together,
-    Try,
-    Wait,
-    While,
-)
+from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Together, Try, While
 from skills.files.errors import InputError
 
 HOLDING, PRESSED = ValueIs(text="holding"), ButtonPressed(button="go")

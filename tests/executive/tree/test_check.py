@@ -11,9 +11,11 @@ from executive.tree.compiler import compile_mission
 from executive.tree.estimate import Route, load_estimates
 from executive.words.command import parse_command
 from executive.words.condition import Look
+from executive.words.leaf_steps import Awaited, CallSkill, Do, Wait
 from executive.words.mission import Mission
 from executive.words.policy import Policy
-from executive.words.steps import Awaited, CallSkill, Do, Loop, Place, Repeat, Together, Wait
+from executive.words.step import Place
+from executive.words.steps import Loop, Repeat, Together
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap
 from skills.files.yaml_source import YamlSource

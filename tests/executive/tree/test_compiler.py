@@ -8,8 +8,9 @@ from executive.tree.compiler import compile_mission
 from executive.tree.estimate import expected
 from executive.tree.goals import surfaces_to_search
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.steps import Do, Place
+from executive.words.step import Place
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
 from skills.files.errors import InputError
 from skills.files.yaml_source import YamlSource

@@ -32,8 +32,8 @@ from executive.view.server import PageContent, PageServer
 from executive.view.styles import Styles
 from executive.view.watch import SEND_LIMIT_S, ControlWatch
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.steps import Do
 from skills.api import Cause, Failed, Question
 from skills.estimate.grid_map import GridMap
 from skills.robot import Pose2D

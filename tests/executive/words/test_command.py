@@ -2,7 +2,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.words.command import Command, Task, Thing, parse_command, thing
+from executive.words.command import Command, Task, parse_command, thing
+from skills.api import Thing
 
 TEXT_FORMS = [
     (Command(), "Take [Nothing] to [Nothing] and do [Nothing] to [Nothing]"),

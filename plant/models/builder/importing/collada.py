@@ -16,8 +16,6 @@ from plant.models.builder.mesh import Colour
 from skills.files.outside import read_text
 from skills.robot import FloatArray
 
-__all__ = ["Collada", "read_collada"]
-
 MOST_BYTES: Final = 100_000_000
 MOST_NODES: Final = 10_000
 MOST_DEPTH: Final = 50

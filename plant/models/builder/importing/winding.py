@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from skills.robot import FloatArray
 
-__all__ = ["outward", "pieces"]
-
 MOST_PIECES: Final = 1_000
 Faces = NDArray[np.int64]
 

@@ -8,22 +8,10 @@ from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.condition import AllOf, AnyOf, Look, Not, ValueIs
+from executive.words.leaf_steps import Awaited, CallSkill, Check, Set, Wait
 from executive.words.mission import Mission
 from executive.words.policy import Policy
-from executive.words.steps import (
-    Awaited,
-    CallSkill,
-    Check,
-    Choose,
-    Group,
-    Handler,
-    Loop,
-    Repeat,
-    Set,
-    Together,
-    Try,
-    Wait,
-)
+from executive.words.steps import Choose, Group, Handler, Loop, Repeat, Together, Try
 from skills.api import Cause, Failed, Succeeded
 
 BEER = Look.of(parse_command("Take [Nothing] to [shelf] and do [find] to [beer]"))

@@ -13,8 +13,8 @@ from executive.tree.nodes.search import surfaces_elsewhere
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
 from executive.words.knowledge import load_knowledge
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.steps import Do
 from skills.api import Cause, Failed, Succeeded, Thing
 from skills.robot import Pose2D
 

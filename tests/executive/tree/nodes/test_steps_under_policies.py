@@ -6,9 +6,9 @@ from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
-from executive.words.steps import Do
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.robot import Battery
 

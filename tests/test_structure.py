@@ -14,21 +14,21 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 3100,
+    "executive/words": 2945,
     "executive/language": 9300,
     "executive/speech": 1750,
-    "executive/mission": 2000,
+    "executive/mission": 1934,
     "executive/tree": 8100,
     "executive/run": 3350,
     "executive/record": 1050,
-    "executive/store": 1900,
-    "executive/conversation": 650,
+    "executive/store": 1864,
+    "executive/conversation": 611,
     "executive/view": 1500,
     "executive/testing": 900,
     "executive/app": 7900,
     "executive/cli": 4350,
     "skills": 24950,
-    "plant": 12600,
+    "plant": 12566,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 557, 118, 40
 """All modules; those that one other imports; file names that stand more than once."""

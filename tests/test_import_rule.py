@@ -140,7 +140,7 @@ def test_the_root_of_executive_holds_no_modules() -> None:
             "from executive.language import understand",
             ["executive.language.understand"],
         ),
-        ("executive/mission/mission.py", "from executive.language import understand", []),
+        ("executive/mission/resolve.py", "from executive.language import understand", []),
         ("executive/tree/estimate.py", "def f():\n    import executive.run.runner", ["executive.run.runner"]),
         ("executive/tree/estimate.py", "from executive.attic import old", ["executive.attic.old"]),
         ("executive/view/svg.py", "from executive.tree.node_view import NodeView", []),

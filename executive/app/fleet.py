@@ -18,7 +18,6 @@ from executive.app.prepared import Prepared
 from executive.app.report_file import EndedTree
 from executive.app.robots import PlacedRobot
 from executive.language.robots import Part, Whom
-from executive.mission.mission import mission_from_lines
 from executive.mission.request import Request
 from executive.run.visitor import RunEntry, TickNote
 from executive.store.given import GivenMission, GivenMissions
@@ -31,6 +30,7 @@ from executive.tree.nodes.guard import KnowsPlace
 from executive.words.command import Command, Task
 from executive.words.knowledge import BatteryFacts, Knowledge, SurfaceFacts
 from executive.words.leaf_steps import Do, Say, steps_of_commands
+from executive.words.mission import Mission
 from executive.words.step import Step
 from plant.kinds import robot_kind
 from plant.worlds.world import World
@@ -176,10 +176,11 @@ def _patient(knowledge: Knowledge) -> Knowledge:
 
 def charging_missions(world: World, knowledge: Knowledge, robots: Mapping[str, PlacedRobot]) -> Mapping[str, Prepared]:
     """What each robot does to charge; one without a dock is not among them."""
-    line = str(Command(task=Task.CHARGE))
-    setting = Setting(Request(commands=(line,), world_name=world.name), world, _patient(knowledge), robots)
+    charge = Command(task=Task.CHARGE)
+    setting = Setting(Request(commands=(str(charge),), world_name=world.name), world, _patient(knowledge), robots)
+    steps = steps_of_commands([charge])
     return {
-        name: setting.for_robot(name).compile(mission_from_lines((line,), world=world.name, robot_name=name))
+        name: setting.for_robot(name).compile(Mission.of_steps(steps, world=world.name, robot=name))
         for name, robot in robots.items()
         if robot.dock is not None
     }

@@ -14,13 +14,6 @@ from executive.app.worlds import knowledge_of, open_world, refuse_blocked, with_
 from executive.language.parser import load_parser
 from executive.language.questions import Answerer, ClarifyingQuestion, answer_by
 from executive.mission.load import for_robot, import_folders, load_mission, overridden, routes_in
-from executive.mission.mission import (
-    mission_from_lines,
-    mission_from_meaning,
-    mission_from_steps,
-    steps_of,
-    understood,
-)
 from executive.mission.request import Request
 from executive.mission.resolve import mission_from_file
 from executive.tree.compiler import compile_mission
@@ -28,6 +21,7 @@ from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge, Pose
 from executive.words.mission import DEFAULT_WORLD, Mission, MissionPart, QuestionPolicy
 from executive.words.robots import RobotConfig, robot_called, robots_in
+from executive.words.yaml_steps import steps_from_lines
 from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
 from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.files.texts import LONGEST_ANSWER, plain_text
@@ -100,7 +94,6 @@ class Setting:
     def understand(self) -> Addressed:
         """What the request's sentence asks of each robot. Raises InputError: it is not understood."""
         from executive.language.robots import understand_for_robots_asking  # which a mission file does not need
-        from executive.language.understand import Status
 
         asked = self.request.require_wake
         meant = understand_for_robots_asking(
@@ -111,8 +104,7 @@ class Setting:
             knowledge=self.knowledge,
             require_wake=self.knowledge.robot.require_wake if asked is None else asked,
         )
-        if meant.status is not Status.OK:
-            raise InputError(meant.reason or "the sentence was not understood")
+        _refuse_unclear(meant)
         return meant
 
     def answerer(self, policy: QuestionPolicy | None) -> Answerer:
@@ -130,18 +122,19 @@ class Setting:
 
     def part(self, name: str, meanings: Sequence[Understanding]) -> Prepared:
         """What one robot is to do: all that was meant for it, from where it stands. Raises InputError: it cannot be."""
-        steps = tuple(step for meant in meanings for step in steps_of(meant))
+        steps = tuple(step for meant in meanings for step in meant.all_steps)
         notes = tuple(note for meant in meanings for note in meant.notes)
-        mission = mission_from_steps(steps, world=self.world.name, robot_name=name)
+        mission = Mission.of_steps(steps, world=self.world.name, robot=name)
         return self.for_robot(name).compile(mission.with_notes(notes))
 
     def mission_of_commands(self) -> Mission:
         """The mission of the request's commands in their text form, or of steps in YAML."""
         request = self.request
         try:
-            mission = mission_from_lines(request.commands, world=self.world.name, robot_name=request.robot)
+            steps = steps_from_lines(request.commands)
         except ValueError as error:
             raise InputError(f"the mission '{request.name}' cannot be read: {error}", hint="give it again") from error
+        mission = Mission.of_steps(steps, world=self.world.name, robot=request.robot)
         return mission.model_copy(update={"name": request.name})
 
     def for_file(self, loaded: Mission) -> Prepared:
@@ -219,17 +212,28 @@ def _for_the_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
         return setting.for_file(loaded)
     if request.sentence is None:
         return setting.compile(setting.mission_of_commands())
+    from executive.language.understand import understand_asking  # which a mission file does not need
+
     wake = robot.require_wake if request.require_wake is None else request.require_wake
-    meant = understood(
+    meant = understand_asking(
         request.sentence,
+        answer=setting.answerer(request.questions),
         parser=load_parser(),
         knowledge=setting.knowledge,
         require_wake=wake,
-        answer=setting.answerer(request.questions),
     )
-    mission = mission_from_meaning(meant, world=setting.world.name, robot_name=robot.name)
+    _refuse_unclear(meant)
+    mission = Mission.of_steps(meant.all_steps, world=setting.world.name, robot=robot.name).with_notes(meant.notes)
     asked = replace(request, sentence=meant.text, require_wake=wake)
     return replace(setting, request=asked).compile(mission, meant)
+
+
+def _refuse_unclear(meant: Understanding | Addressed) -> None:
+    """Raise InputError where a sentence is refused, leaves a question open or is not for this robot."""
+    from executive.language.understand import Status
+
+    if meant.status is not Status.OK:
+        raise InputError(meant.reason or "the sentence was not understood")
 
 
 def _for_whom_it_calls(setting: Setting) -> Prepared:

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from executive.app.robots import PlacedRobot
-from executive.mission.mission import lines_of
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge
 from executive.words.mission import Mission
+from executive.words.yaml_steps import lines_of_steps
 from plant.worlds.world import World
 from skills.robot import Pose2D
 
@@ -76,7 +76,7 @@ def together(every: Sequence[Prepared]) -> Prepared:
 
 def compiled_request(request: Request, tree: CompiledTree) -> Request:
     """The request with the name, the commands and the fingerprint of its tree."""
-    commands = lines_of(tree.steps)
+    commands = lines_of_steps(tree.steps)
     return replace(request, name=tree.mission_name, commands=commands, fingerprint=_fingerprint(tree))
 
 

@@ -18,11 +18,11 @@ from executive.language.questions import RefusalError
 from executive.language.reference import Memory
 from executive.language.understand import Understanding, understand
 from executive.language.wake import addressed_to
-from executive.mission.mission import mission_from_steps
 from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills
+from executive.words.mission import Mission
 from executive.words.step import Step
 
 __all__ = ["Talk", "conversation_of", "load_ahead"]
@@ -112,7 +112,7 @@ def _understood(text: str, memory: Memory | None, prepared: Prepared) -> Underst
 
 def _compiled(steps: Sequence[Step], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
     """The tree of a mission of these steps, under a name that is not taken. Raises InputError, as `check` does."""
-    mission = mission_from_steps(steps, world=prepared.world.name, robot_name=prepared.mission.robot_name)
+    mission = Mission.of_steps(steps, world=prepared.world.name, robot=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)
     tree = compile_mission(

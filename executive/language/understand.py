@@ -17,6 +17,7 @@ from executive.language.steps import Trace, trace_sentence
 from executive.language.wake import strip_wake
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import steps_of_commands
 from executive.words.step import Step
 from executive.words.yaml_steps import steps_to_data
 
@@ -64,6 +65,11 @@ class Understanding:
     memory: Memory | None = None
     trace: Trace | None = field(default=None, compare=False, repr=False)
     steps: tuple[Step, ...] = ()
+
+    @property
+    def all_steps(self) -> tuple[Step, ...]:
+        """What it asks for as steps: those that decide, repeat or wait, else its commands."""
+        return self.steps or steps_of_commands(self.commands)
 
     @property
     def refused_as(self) -> RefusalKind | None:

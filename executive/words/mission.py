@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, StrictBool, field_validator, model_validator
@@ -193,6 +193,16 @@ class Mission(_Whole):
         if (data.get("steps") is None) == (data.get("parts") is None):
             raise ValueError("a mission has either 'steps', or 'parts' for several robots")
         return {"steps": None, **data}
+
+    @classmethod
+    def of_steps(cls, steps: Sequence[Step], *, world: str, robot: str) -> Self:
+        """A mission without a file, named for its first command, or else for its first block."""
+        first = next((command for step in steps for each in step.walk() for command in each.commands), None)
+        if first is None:
+            name = type(steps[0]).__name__.lower() if steps else "do"
+        else:
+            name = " ".join(filter(None, (first.verb or "do", str(first.object or first.item or first.goal or ""))))
+        return cls(name=name, world=world, robot=robot or None, steps=tuple(steps))
 
     @property
     def document(self) -> YamlSource | None:

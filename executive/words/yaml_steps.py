@@ -1,4 +1,4 @@
-"""Steps as the YAML that a person would write for them, and back."""
+"""Steps as lines and back: commands in their text form, else the YAML that a person would write."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from executive.words.command import parse_command
 from executive.words.forms import Strict
+from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Steps
 from skills.files.errors import InputError
@@ -32,6 +34,25 @@ def steps_to_yaml(steps: Iterable[Step]) -> tuple[str, ...]:
         return ()
     text = yaml_of(data, width=1_000_000)
     return tuple(text.splitlines())
+
+
+def lines_of_steps(steps: Sequence[Step]) -> tuple[str, ...]:
+    """What `steps_from_lines` reads: the commands where there are only such, else the steps in YAML.
+
+    Of a mission file, whose steps can be more than that, only the commands.
+    """
+    walked = [step for one in steps for step in one.walk()]
+    if all(isinstance(step, Do) for step in walked) or any(step.source is not None for step in walked):
+        return tuple(str(command) for step in walked for command in step.commands)
+    return steps_to_yaml(steps)
+
+
+def steps_from_lines(lines: Sequence[str]) -> Steps:
+    """The steps of commands in their text form, or of YAML. Raises ValueError: the lines are neither."""
+    try:
+        return steps_of_commands(tuple(map(parse_command, lines)))
+    except ValueError:
+        return steps_from_yaml(lines)
 
 
 def steps_from_yaml(lines: Sequence[str]) -> Steps:

@@ -22,7 +22,7 @@ from executive.language.robots import Addressed, Part, Whom, understand_for_robo
 from executive.language.understand import Status
 from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
-from tests.benchmarks.structured_sentences import Score, in_full, steps_of
+from tests.benchmarks.structured_sentences import Score, in_full
 from tests.executive.language.notation import as_noted, noted
 
 __all__ = ["TABLES", "measured"]
@@ -65,7 +65,7 @@ def _wanted(text: str) -> tuple[str, tuple[int, ...], str]:
 
 def _said(part: Part) -> tuple[str, tuple[int, ...], str]:
     who = part.robot.value if isinstance(part.robot, Whom) else part.robot
-    return who, part.after, noted(steps_of(part.meaning))
+    return who, part.after, noted(part.meaning.all_steps)
 
 
 def _line(text: str, answer: Addressed) -> str:

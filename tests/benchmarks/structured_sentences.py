@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -22,12 +22,10 @@ import yaml
 from executive.language.parser import load_parser
 from executive.language.understand import Status, Understanding, understand
 from executive.words.knowledge import load_knowledge
-from executive.words.leaf_steps import steps_of_commands
-from executive.words.step import Step
 from plant.worlds.world import load_world
 from tests.executive.language.notation import as_noted, noted
 
-__all__ = ["TABLES", "Score", "in_full", "measured", "steps_of"]
+__all__ = ["TABLES", "Score", "in_full", "measured"]
 
 TABLES: Final = tuple(Path(__file__).with_name(f"structured_sentences{name}.yaml") for name in ("", "_later", "_last"))
 _SHORT: Final = re.compile(r"\b(fetch|carry|put|take|give|go|find|charge)\(([^()]*)\)")
@@ -81,15 +79,11 @@ def _answers(table: Path) -> Iterator[tuple[str, list[str] | str, Understanding]
 def _right(expected: list[str] | str, answer: Understanding) -> bool:
     if isinstance(expected, str):
         return answer.status is not Status.OK
-    return answer.status is Status.OK and noted(steps_of(answer)) == as_noted(map(in_full, expected))
+    return answer.status is Status.OK and noted(answer.all_steps) == as_noted(map(in_full, expected))
 
 
 def _wrongly_accepted(expected: list[str] | str, answer: Understanding) -> bool:
     return answer.status is Status.OK and not _right(expected, answer)
-
-
-def steps_of(answer: Understanding) -> Sequence[Step]:
-    return answer.steps or steps_of_commands(answer.commands)
 
 
 def in_full(text: str) -> str:
@@ -97,7 +91,7 @@ def in_full(text: str) -> str:
 
 
 def _line(text: str, answer: Understanding) -> str:
-    found = noted(steps_of(answer)) if answer.status is Status.OK else answer.reason
+    found = noted(answer.all_steps) if answer.status is Status.OK else answer.reason
     return f"{text}\n      {found}"
 
 

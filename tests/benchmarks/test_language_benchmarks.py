@@ -11,10 +11,10 @@ import yaml
 
 from executive.language.parser import load_parser
 from executive.language.understand import understand
-from executive.mission.mission import mission_from_meaning, understood
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from executive.words.knowledge import load_knowledge
+from executive.words.mission import Mission
 from plant.worlds.world import load_world
 from tests.benchmarks import robots_sentences, structured_sentences
 
@@ -53,8 +53,8 @@ def test_parse_to_compiled_tree(benchmark):
     knowledge, registry = load_knowledge(load_world("flat").knowledge_path), built_in_skills()
 
     def compiled():
-        meant = understood(SENTENCE, parser=parser, knowledge=knowledge, require_wake=True)
-        mission = mission_from_meaning(meant, world="flat", robot_name="Alice")
+        meant = understand(SENTENCE, parser=parser, knowledge=knowledge, require_wake=True)
+        mission = Mission.of_steps(meant.all_steps, world="flat", robot="Alice")
         return compile_mission(mission, knowledge=knowledge, registry=registry)
 
     assert benchmark(compiled).commands

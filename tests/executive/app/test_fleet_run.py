@@ -18,7 +18,6 @@ from executive.app.prepared import Prepared
 from executive.app.robots import PlacedRobot
 from executive.cli import entry
 from executive.cli.fleet_command import _to_do, resumable_lines
-from executive.mission.mission import lines_of
 from executive.mission.request import Request
 from executive.record.reader import read_events
 from executive.run.visitor import RunEntry
@@ -28,6 +27,7 @@ from executive.tree.compiler import compile_mission
 from executive.words.command import Command, Task, parse_command
 from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.mission import Mission
+from executive.words.yaml_steps import lines_of_steps
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError
 from skills.robot import Pose2D
@@ -51,7 +51,9 @@ class ScriptedMission(Prepared):
 
     def with_mission(self, mission):
         tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
-        return replace(self, request=replace(self.request, commands=lines_of(tree.steps)), mission=mission, tree=tree)
+        return replace(
+            self, request=replace(self.request, commands=lines_of_steps(tree.steps)), mission=mission, tree=tree
+        )
 
 
 class ScriptedOffers(Offers):
@@ -92,7 +94,7 @@ class Fleet:
     def _prepared(self, request, mission):
         tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
         world = SimpleNamespace(name="scripted", dock=START)
-        asked = replace(request, commands=lines_of(tree.steps))
+        asked = replace(request, commands=lines_of_steps(tree.steps))
         return ScriptedMission(asked, mission, world, self.knowledge, tree, {}, registry=self.registry)
 
     def queue(self, *lines):

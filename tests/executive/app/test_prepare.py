@@ -83,6 +83,19 @@ def test_a_mission_file_goes_to_the_robot_that_is_done_first(tmp_path):
     assert (prepared.mission.robot_name, prepared.robot.kind) == ("Bob", "fetch")
 
 
+@pytest.mark.parametrize(
+    ("sentence", "require_wake", "says"),
+    [
+        ("sing", False, "sing"),
+        ("fetch me a drink", True, "Hey Alice"),
+        ("put the coke on the table", False, "kitchen table or coffee table"),
+    ],
+)
+def test_a_sentence_that_is_not_understood_is_refused_with_the_reason(sentence, require_wake, says):
+    with pytest.raises(InputError, match=says):
+        prepare(Request(sentence=sentence, world="flat", require_wake=require_wake))
+
+
 def test_a_sentence_to_a_robot_that_is_not_there_is_refused():
     with pytest.raises(InputError, match="Carl"):
         asked("Hey Carl, go to the kitchen")

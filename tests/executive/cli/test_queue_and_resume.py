@@ -14,7 +14,6 @@ from typer.testing import CliRunner
 from executive.app.mission_run import Finished
 from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry
-from executive.mission.mission import mission_from_commands
 from executive.run.visitor import TickNote
 from executive.store.missions import MissionStore
 from executive.store.wakeup import WakeupPipe
@@ -23,6 +22,8 @@ from executive.tree.node_view import node_view
 from executive.tree.registry import installed_skills
 from executive.tree.snapshot import Change, NodeState
 from executive.words.command import Command
+from executive.words.leaf_steps import steps_of_commands
+from executive.words.mission import Mission
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
@@ -66,7 +67,7 @@ def first_leaf(tree):
 
 def corrected_to(goal, prepared, robot="Alice"):
     """A note of going elsewhere being under way."""
-    go = mission_from_commands([Command(goal=goal)], world="flat", robot_name=robot)
+    go = Mission.of_steps(steps_of_commands([Command(goal=goal)]), world="flat", robot=robot)
     other = compile_mission(
         go.model_copy(update={"name": f"go {goal} 2"}), knowledge=prepared.knowledge, registry=installed_skills()
     )

@@ -3,10 +3,9 @@ import pytest
 from executive.conversation import Conversation, Speech
 from executive.language.parser import load_parser
 from executive.language.understand import understand
-from executive.mission.mission import mission_from_steps
 from executive.run.control import Control
 from executive.tree.compiler import compile_mission
-from executive.words.leaf_steps import steps_of_commands
+from executive.words.mission import Mission
 
 
 @pytest.fixture(scope="session")
@@ -20,7 +19,7 @@ def speech(parser, knowledge, registry):
         return understand(text, parser=parser, knowledge=knowledge, require_wake=False, memory=memory)
 
     def compiled(steps, taken):
-        mission = mission_from_steps(steps, world="test", robot_name="Alice")
+        mission = Mission.of_steps(steps, world="test", robot="Alice")
         number = 1 + sum(name.startswith(mission.name) for name in taken)
         named = mission if number == 1 else mission.model_copy(update={"name": f"{mission.name} {number}"})
         return compile_mission(named, knowledge=knowledge, registry=registry)
@@ -40,7 +39,7 @@ def talk(speech, control):
     def begin(sentence="fetch me a coke from the kitchen", **options):
         conversation = Conversation(speech, control, **options)
         meant = speech.understand(sentence, None)
-        tree = speech.compile(meant.steps or steps_of_commands(meant.commands), frozenset())
+        tree = speech.compile(meant.all_steps, frozenset())
         control.begin({"Alice": tree})
         conversation.set_mission(tree, memory=meant.memory)
         return conversation

@@ -3,20 +3,16 @@ from pathlib import Path
 import pytest
 
 from executive.language.parser import load_parser
+from executive.language.understand import understand
 from executive.mission.load import load_mission, overridden
-from executive.mission.mission import (
-    lines_of,
-    mission_from_commands,
-    mission_from_lines,
-    mission_from_meaning,
-    understood,
-)
 from executive.mission.resolve import mission_from_file
 from executive.words.command import Command, parse_command
 from executive.words.knowledge import load_knowledge
-from executive.words.leaf_steps import Do
+from executive.words.leaf_steps import Do, steps_of_commands
+from executive.words.mission import Mission
 from executive.words.step import Place
 from executive.words.steps import Loop, Repeat
+from executive.words.yaml_steps import lines_of_steps, steps_from_lines
 from skills.files.errors import InputError
 from skills.files.yaml_source import YamlSource
 
@@ -158,9 +154,19 @@ def test_an_error_can_name_the_line_of_any_key(write):
     assert str(error).endswith("mission.yaml:2: unknown world 'flat'; known are x")
 
 
-def test_a_sentence_becomes_a_mission(parser, knowledge):
-    meant = understood("fetch me a drink", parser=parser, knowledge=knowledge)
-    mission = mission_from_meaning(meant, world="flat", robot_name="Alice")
+@pytest.fixture
+def spoken(parser, knowledge):
+    """The mission of a sentence."""
+
+    def mission(sentence):
+        meant = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
+        return Mission.of_steps(meant.all_steps, world="flat", robot="Alice")
+
+    return mission
+
+
+def test_a_sentence_becomes_a_mission(spoken):
+    mission = spoken("fetch me a drink")
     assert (mission.name, mission.world, mission.robot_name) == ("fetch drink", "flat", "Alice")
     assert [str(command) for command in mission.commands] == [
         "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
@@ -169,52 +175,34 @@ def test_a_sentence_becomes_a_mission(parser, knowledge):
     assert mission.steps[0].source is None
 
 
-@pytest.mark.parametrize(
-    ("sentence", "require_wake", "says"),
-    [
-        ("sing", False, "sing"),
-        ("fetch me a drink", True, "Hey Alice"),
-        ("put the cube on the table", False, "kitchen table or coffee table"),
-    ],
-)
-def test_a_sentence_that_is_not_understood_says_why(parser, knowledge, sentence, require_wake, says):
-    with pytest.raises(InputError, match=says):
-        understood(sentence, parser=parser, knowledge=knowledge, require_wake=require_wake)
-
-
 def test_commands_become_a_mission_named_for_the_first():
     command = parse_command("Take [Nothing] to [hall] and do [Nothing] to [Nothing]")
-    assert mission_from_commands([command], world="flat", robot_name="Alice").name == "do hall"
+    assert Mission.of_steps(steps_of_commands([command]), world="flat", robot="Alice").name == "do hall"
 
 
 STRUCTURED = "if there is a beer in the kitchen bring it, otherwise wait until half past two"
 
 
-def test_a_sentence_that_decides_becomes_a_mission_of_its_steps(parser, knowledge):
-    meant = understood(STRUCTURED, parser=parser, knowledge=knowledge)
-    mission = mission_from_meaning(meant, world="flat", robot_name="Alice")
-    assert mission.steps == meant.steps
+def test_a_sentence_that_decides_becomes_a_mission_named_for_its_first_command(spoken):
+    mission = spoken(STRUCTURED)
+    assert [step.key for step in mission.steps] == ["if"]
     assert mission.name == "bring beer"
 
 
-def test_a_mission_without_commands_is_named_for_its_first_block(parser, knowledge):
-    meant = understood("wait until half past two", parser=parser, knowledge=knowledge)
-    assert mission_from_meaning(meant, world="flat", robot_name="Alice").name == "wait"
+def test_a_mission_without_commands_is_named_for_its_first_block(spoken):
+    assert spoken("wait until half past two").name == "wait"
 
 
 @pytest.mark.parametrize("sentence", [STRUCTURED, "fetch me a drink"])
-def test_what_a_sentence_asks_for_comes_back_from_its_lines(parser, knowledge, sentence):
-    meant = understood(sentence, parser=parser, knowledge=knowledge)
-    mission = mission_from_meaning(meant, world="flat", robot_name="Alice")
-    again = mission_from_lines(lines_of(mission.steps), world="flat", robot_name="Alice")
-    assert (again.world, again.robot_name) == ("flat", "Alice")
-    assert lines_of(again.steps) == lines_of(mission.steps)
+def test_what_a_sentence_asks_for_comes_back_from_its_lines(spoken, sentence):
+    lines = lines_of_steps(spoken(sentence).steps)
+    assert lines_of_steps(steps_from_lines(lines)) == lines
 
 
 def test_of_a_file_only_the_commands_are_lines():
     place = Place(YamlSource(Path("mission.yaml"), None, {}, first_line=3), ())
     step = Do.of(Command(goal="hall")).with_place(place)
-    assert lines_of((Repeat(loop=Loop(times=2), steps=(step,)).with_place(place),)) == (str(step.commands[0]),)
+    assert lines_of_steps((Repeat(loop=Loop(times=2), steps=(step,)).with_place(place),)) == (str(step.commands[0]),)
 
 
 MISSIONS = [
@@ -235,5 +223,5 @@ def test_the_fetch_drink_file_and_the_sentence_are_the_same_mission(parser):
     root = Path(__file__).parents[3]
     knowledge = load_knowledge(root / "plant" / "worlds" / "flat" / "knowledge.yaml")
     from_file = mission_from_file(root / "missions" / "fetch_drink.yaml", parser=parser, knowledge=knowledge)
-    spoken = understood("fetch me a drink from the kitchen", parser=parser, knowledge=knowledge)
+    spoken = understand("fetch me a drink from the kitchen", parser=parser, knowledge=knowledge, require_wake=False)
     assert [str(c) for c in from_file.commands] == [str(c) for c in spoken.commands]

@@ -12,12 +12,12 @@ from executive.app.prepared import Prepared
 from executive.conversation import Conversation, Reply, ReplyKind, Speech
 from executive.conversation.parts import Waiting
 from executive.language.addressees import Whom, addressees
+from executive.language.cleaning import addressed_to
 from executive.language.followups import remark_of
 from executive.language.parser import load_parser
 from executive.language.questions import RefusalError
 from executive.language.reference import Memory
 from executive.language.understand import Understanding, understand
-from executive.language.wake import addressed_to
 from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree, compile_mission

@@ -23,6 +23,7 @@ from executive.conversation.parts import (
     refusal,
 )
 from executive.conversation.remarks import RemarkAnswers
+from executive.language.cleaning import heard_wake, strip_wake
 from executive.language.followups import (
     Amendment,
     FollowUp,
@@ -36,7 +37,6 @@ from executive.language.followups import (
 from executive.language.questions import ClarifyingQuestion, with_answer
 from executive.language.reference import Memory
 from executive.language.understand import Status, Understanding
-from executive.language.wake import heard_wake, strip_wake
 from executive.run.control import Control, Mode
 from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree

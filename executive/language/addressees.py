@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from typing import Final
 
+from executive.language.cleaning import addressed_to
 from executive.language.lexicon import Patterns, lexicon, read_table
 from executive.language.questions import RefusalError
-from executive.language.wake import addressed_to
 from executive.words.robots import display_name, robot_called
 from skills.files.errors import listing
 

@@ -8,13 +8,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
-from executive.language.cleaning import clean, foreign_reason, placeholder
+from executive.language.cleaning import clean, foreign_reason, placeholder, strip_wake
 from executive.language.parser import DependencyParser
 from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, with_answer
 from executive.language.reference import Memory
 from executive.language.spelling import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
-from executive.language.wake import strip_wake
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands

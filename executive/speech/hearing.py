@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 from executive.language.clauses import split
-from executive.language.cleaning import clean
+from executive.language.cleaning import SAME_NAME, Address, addressed_to, clean, heard_wake
 from executive.language.lexicon import lexicon
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
@@ -16,7 +16,6 @@ from executive.language.robots import Part, understand_for_robots
 from executive.language.roles import HERE
 from executive.language.spelling import SoundAlikes, sound_distance
 from executive.language.understand import Status, Understanding, understand
-from executive.language.wake import SAME_NAME, Address, addressed_to, heard_wake
 from executive.speech.interpret import Reading
 from executive.speech.recogniser import Vocabulary
 from executive.words.command import Command, is_attribute

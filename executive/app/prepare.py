@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
 
@@ -29,8 +30,7 @@ from skills.files.yaml_source import KeyPath, read_yaml
 from skills.robot import Pose2D
 
 if TYPE_CHECKING:
-    from executive.language.robots import Addressed, Part
-    from executive.language.understand import Understanding
+    from executive.language.understand import Part, Understanding
 
 __all__ = ["Setting", "prepare", "prepare_alone"]
 
@@ -91,19 +91,20 @@ class Setting:
         world = replace(self.world, start=robot.start, dock=robot.dock)
         return replace(self, world=world, knowledge=knowledge_for(robot, self.robots, self.knowledge))
 
-    def understand(self) -> Addressed:
+    def understand(self) -> Understanding:
         """What the request's sentence asks of each robot. Raises InputError: it is not understood."""
-        from executive.language.robots import understand_for_robots_asking  # which a mission file does not need
+        from executive.language.robots import understand_for_robots  # which a mission file does not need
+        from executive.language.understand import ask_until_clear
 
         asked = self.request.require_wake
-        meant = understand_for_robots_asking(
-            self.request.sentence or "",
-            answer=self.answerer(self.request.questions),
+        meaning = partial(
+            understand_for_robots,
             robots=tuple(self.robots),
             parser=load_parser(),
             knowledge=self.knowledge,
             require_wake=self.knowledge.robot.require_wake if asked is None else asked,
         )
+        meant = ask_until_clear(self.request.sentence or "", meaning, self.answerer(self.request.questions))
         _refuse_unclear(meant)
         return meant
 
@@ -212,23 +213,18 @@ def _for_the_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
         return setting.for_file(loaded)
     if request.sentence is None:
         return setting.compile(setting.mission_of_commands())
-    from executive.language.understand import understand_asking  # which a mission file does not need
+    from executive.language.understand import ask_until_clear, understand  # which a mission file does not need
 
     wake = robot.require_wake if request.require_wake is None else request.require_wake
-    meant = understand_asking(
-        request.sentence,
-        answer=setting.answerer(request.questions),
-        parser=load_parser(),
-        knowledge=setting.knowledge,
-        require_wake=wake,
-    )
+    meaning = partial(understand, parser=load_parser(), knowledge=setting.knowledge, require_wake=wake)
+    meant = ask_until_clear(request.sentence, meaning, setting.answerer(request.questions))
     _refuse_unclear(meant)
     mission = Mission.of_steps(meant.all_steps, world=setting.world.name, robot=robot.name).with_notes(meant.notes)
     asked = replace(request, sentence=meant.text, require_wake=wake)
     return replace(setting, request=asked).compile(mission, meant)
 
 
-def _refuse_unclear(meant: Understanding | Addressed) -> None:
+def _refuse_unclear(meant: Understanding) -> None:
     """Raise InputError where a sentence is refused, leaves a question open or is not for this robot."""
     from executive.language.understand import Status
 

@@ -18,11 +18,10 @@ from executive.app.worlds import knowledge_of, open_world
 from executive.cli.options import takes_request
 from executive.cli.output import BAD_INPUT, console_for, refusals
 from executive.language.parser import load_parser
-from executive.language.robots import Part
-from executive.language.understand import Status, Understanding
+from executive.language.understand import Part, Status, Understanding
 from executive.mission.request import Request
 from executive.speech.activity import load_detector
-from executive.speech.hearing import SpeechReader, TeamReader, refuse_alike, spoken_phrases
+from executive.speech.hearing import Reader, refuse_alike, spoken_phrases
 from executive.speech.listener import HeardUtterance, Hearing, Listener, Recording, follow, microphone_blocks
 from executive.speech.recogniser import Vocabulary, read_vocabulary, vocabulary_of_world
 from executive.speech.voice import Voice, installed_voice
@@ -106,7 +105,7 @@ def listener_for(
         )
         called_by = (first, tuple(others)) if require_wake else (None, ())
         words = Vocabulary((*names.names, *robots), *called_by)
-        team = TeamReader(load_parser(), knowledge, words, tuple(robots), require_wake)
+        team = Reader(load_parser(), knowledge, words, tuple(robots), require_wake)
         return Listener(load_whisper(), load_detector, team, spoken_phrases(words))
     name = robot_name or knowledge.robot.name
     called = name if require_wake else None
@@ -117,7 +116,7 @@ def listener_for(
     )
     heard = Vocabulary(words.names, called)
     world = None if open_words else knowledge
-    reader = SpeechReader(load_parser(), world, heard, name, require_wake, knowledge.robot.others)
+    reader = Reader(load_parser(), world, heard, (name,), require_wake, tuple(knowledge.robot.others))
     return Listener(load_whisper(), load_detector, reader, spoken_phrases(heard))
 
 
@@ -135,7 +134,7 @@ def heard_sentence(wav: Path, listener: Listener) -> str:
     recording = listener.file(wav)
     if not recording.heard:
         raise InputError(recording.reason or "", hint="speak louder, or nearer to the microphone", file=wav)
-    return " ".join(one.meant.understanding.text for one in recording.decisive)
+    return " ".join(one.meant.text for one in recording.decisive)
 
 
 def hear_request(wav: Path, request: Request, *, console: Console) -> str:
@@ -171,7 +170,7 @@ def show_hearing(hearings: Iterable[Hearing], console: Console, voice: Voice) ->
 
 
 def _show_heard(heard: HeardUtterance, console: Console, voice: Voice) -> None:
-    meaning = heard.meant.understanding
+    meaning = heard.meant
     console.print(Text(f"{heard.start_s:7.1f} s  {heard.text}"))
     console.print(Text(f"           {answer_line(meaning)}", style="green" if meaning.commands else "yellow"))
     if meaning.status is not Status.NOT_ADDRESSED:

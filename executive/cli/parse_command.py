@@ -13,7 +13,7 @@ from executive.app.worlds import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, print_json, refusals, write_text
 from executive.language.explain import arcs_svg, explain, explanation_lines
 from executive.language.parser import load_parser
-from executive.language.understand import Status, Understanding, parse_lines
+from executive.language.understand import Status, Understanding, understand
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.yaml_steps import steps_to_yaml
 from skills.files.errors import InputError
@@ -46,7 +46,7 @@ def parse(
         parser = load_parser()
         lines = [sentence] if sentence is not None else _lines_of(file)
         wake = knowledge is not None and knowledge.robot.require_wake
-        told = parse_lines(lines, parser=parser, knowledge=knowledge, require_wake=wake)
+        told = (understand(line, parser=parser, knowledge=knowledge, require_wake=wake) for line in lines)
         if jsonl:
             for meaning in told:
                 print(json.dumps(_values(meaning, explained), ensure_ascii=False), flush=True)

@@ -143,9 +143,9 @@ class Conversation(RunVisitor):
         short = text[:_MOST_LETTERS]
         if not self._require_wake:
             wake = strip_wake(short, name)
-            if wake.other_name is None:
+            if wake.name in (None, name):
                 return wake.text, None
-            return short, Reply(ReplyKind.IGNORED, f"it is said to {wake.other_name}, and I am {name}")
+            return short, Reply(ReplyKind.IGNORED, f"it is said to {wake.name}, and I am {name}")
         address = heard_wake(short, name, others=self._others)
         if address.name is None and self._waiting(now_s) is None:
             return short, Reply(ReplyKind.IGNORED, f'my name was not said; begin with "Hey {name}"')

@@ -20,7 +20,7 @@ from executive.language.items import (
     requested,
     spoken_words,
 )
-from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, THERE, Location, Roles, read_roles
@@ -68,18 +68,18 @@ _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
 
 def read_actions(
-    clauses: Sequence[Predicate], words: Lexicon, *, told: bool = False, recipient: Location | None = None
+    clauses: Sequence[Predicate], *, told: bool = False, recipient: Location | None = None
 ) -> tuple[Action, ...]:
     """The actions of all clauses, in order.
 
     `told` says that things were spoken of before, which may be left out; `recipient` is given things where a clause
     does not say to whom.
     """
-    merged = requested(clauses, words)
+    merged = requested(clauses)
     found = [
         replace(action, said=_said(clause), anew=before is not None and _ends_with_then(before))
         for before, clause in zip([None, *merged], merged, strict=False)
-        for action in _given(_actions(clause, words), clause, recipient)
+        for action in _given(_actions(clause), clause, recipient)
     ]
     found = list(_with_elided(found, told))
     last = [replace(action, unknown=(action.said,)) if action.departs else action for action in found[-1:]]
@@ -125,27 +125,27 @@ def _goes_nowhere(action: Action) -> bool:
     return action.kind is VerbKind.GO and action.goal is None and action.unknown == (action.verb,)
 
 
-def _actions(clause: Predicate, words: Lexicon) -> Iterator[Action]:
+def _actions(clause: Predicate) -> Iterator[Action]:
     if clause.verb is None:
         yield Action(None, "", unknown=(spoken_words(clause.items),))
     elif isinstance(clause.verb, Outside):
         yield Action(None, "", unknown=(spoken_words([clause.verb, *clause.items]),))
     elif isinstance(clause.verb, Being):
-        yield _being(clause, clause.verb, words)
+        yield _being(clause, clause.verb)
     else:
-        yield from _acting(clause, clause.verb, words)
+        yield from _acting(clause, clause.verb)
 
 
-def _being(clause: Predicate, being: Being, words: Lexicon) -> Action:
+def _being(clause: Predicate, being: Being) -> Action:
     """A status check ("is there a hammer in the workshop"), or a statement ("there is a hammer in the workshop")."""
     if being.narrated:
-        return _narrated(clause, being, words)
+        return _narrated(clause, being)
     if _is_state(clause, being):
         named = clause.subject is not None and not (clause.subject.phrase.speaker or clause.subject.phrase.pronoun)
         return Action(None, being.text, (clause.subject.phrase,) if named and clause.subject else ())
     if clause.subject is not None and clause.subject.phrase.speaker and not being.asked:
-        return _lacking(clause, being, words)
-    roles = read_roles(clause.items, words, describes=False)
+        return _lacking(clause, being)
+    roles = read_roles(clause.items, describes=False)
     objects = [*([clause.subject.phrase] if clause.subject else []), *roles.objects]
     if clause.subject and not being.asked and roles.recipient is not None and len(objects) == 1 and not roles.unknown:
         return Action(None, being.text, tuple(objects), teller=roles.recipient.phrase)
@@ -164,9 +164,9 @@ def _being(clause: Predicate, being: Being, words: Lexicon) -> Action:
     return Action(kind, "be", tuple(objects[:1]), place, unknown=unknown, choices=choices, teller=being.teller)
 
 
-def _narrated(clause: Predicate, being: Being, words: Lexicon) -> Action:
+def _narrated(clause: Predicate, being: Being) -> Action:
     """What happened or goes on, with the thing that it happens to; nothing to do by itself."""
-    roles = read_roles(clause.items, words, describes=False)
+    roles = read_roles(clause.items, describes=False)
     lacked = [place.phrase for place in roles.sources if place.preposition == _OUT_OF and place.phrase is not None]
     things = [*roles.objects, *([] if roles.searched is None else [roles.searched]), *lacked]
     things = things or [phrase for phrase in (being.topic,) if phrase is not None]
@@ -175,12 +175,12 @@ def _narrated(clause: Predicate, being: Being, words: Lexicon) -> Action:
     return Action(None, being.text, named[:1], place, teller=being.teller)
 
 
-def _departs(verb: Verb, roles: Roles, words: Lexicon) -> bool:
+def _departs(verb: Verb, roles: Roles) -> bool:
     """Whether a place is only left ("leave the kitchen and go to the hall"), which is part of going elsewhere."""
     sources = [place.phrase for place in roles.sources if place.phrase is not None]
     left = (
         roles.objects
-        if verb.text in words.leaves
+        if verb.text in lexicon().leaves
         else sources
         if VerbKind.GO in verb.kinds and not roles.objects
         else []
@@ -189,9 +189,9 @@ def _departs(verb: Verb, roles: Roles, words: Lexicon) -> bool:
     return places and not (roles.goals or roles.ats or roles.recipient or roles.unknown or roles.searched)
 
 
-def _lacking(clause: Predicate, being: Being, words: Lexicon) -> Action:
+def _lacking(clause: Predicate, being: Being) -> Action:
     """What the speaker lacks ("we are out of napkins"), or where they are ("I am in the hall")."""
-    roles = read_roles(clause.items, words, describes=False)
+    roles = read_roles(clause.items, describes=False)
     lacked = [place.phrase for place in roles.sources if place.phrase is not None]
     place = next(iter(roles.ats), None)
     return Action(None, being.text, tuple(lacked), place, unknown=(*roles.unknown, *(p.spoken for p in roles.objects)))
@@ -213,30 +213,30 @@ def _asks(phrase: Phrase) -> bool:
     return any(token.tag in _QUESTION_TAGS for token in phrase.tokens)
 
 
-def _acting(clause: Predicate, verb: Verb, words: Lexicon) -> Iterator[Action]:
+def _acting(clause: Predicate, verb: Verb) -> Iterator[Action]:
     going = verb.kinds == {VerbKind.GO}
-    roles = read_roles(clause.items, words, describes=not going, puts=VerbKind.PLACE in verb.kinds)
-    if verb.text in words.gives and len(roles.objects) > 1 and not roles.recipient and not roles.listed:
+    roles = read_roles(clause.items, describes=not going, puts=VerbKind.PLACE in verb.kinds)
+    if verb.text in lexicon().gives and len(roles.objects) > 1 and not roles.recipient and not roles.listed:
         roles.unknown.append(roles.objects[0].spoken)
-    if _departs(verb, roles, words):
+    if _departs(verb, roles):
         yield Action(None, verb.text, departs=True)
         return
     kind = _kind(verb, roles)
     blank = Action(kind, verb.text, unknown=tuple(roles.unknown), choices=tuple(map(tuple, roles.choices)))
     if kind is VerbKind.GO:
-        yield from _going(blank, roles, words)
+        yield from _going(blank, roles)
     elif kind is VerbKind.FIND or (kind is VerbKind.CHECK and roles.searched is not None):
         yield from _finding(replace(blank, kind=VerbKind.FIND), roles)
     elif kind is VerbKind.WAIT:
         yield _waiting(blank, roles)
     elif kind is VerbKind.CHARGE:
-        yield _charging(blank, roles, words)
+        yield _charging(blank, roles)
     elif kind is VerbKind.CHECK:
         bare = all(isinstance(item, Separator) for item in clause.items)
         looks = VerbKind.FIND if bare else blank.kind
         yield replace(blank, kind=looks, unknown=(spoken_words([verb, *clause.items]),))
     else:
-        yield from _carrying(blank, roles, words)
+        yield from _carrying(blank, roles)
 
 
 def _kind(verb: Verb, roles: Roles) -> VerbKind:
@@ -246,7 +246,7 @@ def _kind(verb: Verb, roles: Roles) -> VerbKind:
     return next(kind for kind in VerbKind if kind in verb.kinds and kind is not VerbKind.GO)
 
 
-def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
+def _going(blank: Action, roles: Roles) -> Iterator[Action]:
     """One action for each place to go to."""
     bare = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
     passed = [place for place in roles.ats if roles.goals and place.preposition in _AROUND]
@@ -256,7 +256,7 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     if bare and blank.verb.endswith((" down", " up", " along")):
         passed += [replace(place, preposition=blank.verb.split()[-1]) for place in bare if roles.goals]
         bare = [] if roles.goals else bare
-    elif bare and (blank.verb not in words.bare_goal or (blank.verb in words.enters and _things(roles.objects))):
+    elif bare and (blank.verb not in lexicon().bare_goal or (blank.verb in lexicon().enters and _thing(roles.objects))):
         blank = replace(blank, unknown=(*blank.unknown, *(phrase.spoken for phrase in roles.objects)))
     if _goes_for(roles):
         fetched = tuple(phrase for phrase in (roles.searched,) if phrase is not None)
@@ -266,7 +266,7 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     places = [*roles.goals, *roles.ats, *bare, *([] if headed is None else [Location(headed)]), *roles.joined_goals]
     passed += roles.paths if places else []
     places = places or roles.paths
-    if not places and blank.verb in words.goes_back:
+    if not places and blank.verb in lexicon().goes_back:
         places = [HERE]
     recipient = None if roles.recipient is HERE and roles.favour else roles.recipient
     unfit = (recipient, None if headed is not None else roles.searched)
@@ -276,7 +276,7 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     yield from (replace(blank, goal=place) for place in places) if places else (blank,)
 
 
-def _things(phrases: Sequence[Phrase]) -> bool:
+def _thing(phrases: Sequence[Phrase]) -> bool:
     """Whether any of them is a thing and no place."""
     return any(phrase.kind is NounKind.THING and not phrase.known for phrase in phrases)
 
@@ -317,11 +317,11 @@ def _waiting(blank: Action, roles: Roles) -> Action:
     return replace(blank, goal=goal, time=time, unknown=(*blank.unknown, *extra))
 
 
-def _charging(blank: Action, roles: Roles, words: Lexicon) -> Action:
+def _charging(blank: Action, roles: Roles) -> Action:
     """Charging the robot's own battery at its dock; it charges nothing else and nowhere else."""
     things = [phrase.spoken for phrase in roles.objects if not phrase.addressed]
     places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
-    docks = [place.text for place in places if place.phrase is None or place.phrase.head.lemma not in words.docks]
+    docks = [place.text for place in places if place.phrase is None or place.phrase.head.lemma not in lexicon().docks]
     searched = [] if roles.searched is None else [roles.searched.spoken]
     return replace(blank, unknown=(*blank.unknown, *things, *docks, *searched, *(p.text for p in _beyond(roles))))
 
@@ -332,7 +332,7 @@ def _beyond(roles: Roles) -> Iterator[Location]:
     yield from (place for place in (*roles.sources, *roles.paths, *recipient, *roles.joined_goals) if place)
 
 
-def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
+def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
     """Taking, bringing and putting: sort out from where, to where and for whom.
 
     One thing of a kind for each of several places: "a beer to Robin and Charlie".
@@ -342,12 +342,12 @@ def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
         to_place = bool(goals) and not goals[0].person
         rest = [] if to_place and roles.favour else [roles.recipient]
         goals = [*goals, *rest] if to_place else [roles.recipient, *goals]
-    at_is_goal = blank.kind is VerbKind.PLACE or blank.verb in words.at_is_goal or len(ats) > 1
-    at_is_goal = at_is_goal or any(_lies_in(place, words) for place in sources)
+    at_is_goal = blank.kind is VerbKind.PLACE or blank.verb in lexicon().at_is_goal or len(ats) > 1
+    at_is_goal = at_is_goal or any(_lies_in(place) for place in sources)
     if ats and not goals and at_is_goal:
         goals.append(ats.pop())
     sources += ats
-    goal = next(iter(goals), HERE if blank.verb in words.hands and not sources else None)
+    goal = next(iter(goals), HERE if blank.verb in lexicon().hands and not sources else None)
     shared = roles.joined_goals if goal is not None and _for_each(roles) else []
     rivals = [place.phrase for place in ([] if shared else [goal, *roles.joined_goals]) if place and place.phrase]
     if len(rivals) > 1:
@@ -360,9 +360,9 @@ def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     yield from (replace(carried, goal=place) for place in shared)
 
 
-def _lies_in(place: Location, words: Lexicon) -> bool:
+def _lies_in(place: Location) -> bool:
     """Whether it was said that a thing is in a place ("the cup that is on the desk"), not only from where."""
-    return words.prepositions.get(tuple(place.preposition.split())) is not PrepositionRole.SOURCE
+    return lexicon().prepositions.get(tuple(place.preposition.split())) is not PrepositionRole.SOURCE
 
 
 def _for_each(roles: Roles) -> bool:

@@ -11,9 +11,9 @@ from typing import Final
 
 from executive.language.addressees import Saying, Who, addressees
 from executive.language.amounts import AMOUNTS
-from executive.language.cleaning import smoothed
 from executive.language.items import Item
 from executive.language.lexicon import Patterns, lexicon, read_table
+from executive.language.tokens import smoothed
 
 __all__ = ["ACTS", "CLAUSES", "Behind", "Clause", "Cue", "cue_behind", "cut", "split", "text_of", "verb_positions"]
 

@@ -14,17 +14,18 @@ from typing import Final
 from executive.language.command_frames import CommandFrame
 from executive.language.lexicon import lexicon
 from executive.language.limits import check_relation
+from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase
 from executive.language.questions import ABLE, ClarifyingQuestion, RefusalError, Slot, perhaps, which
 from executive.language.roles import HERE, Location
-from executive.language.spelling import WordFacts, look_alikes, synonyms_of, words_for
+from executive.language.spelling import look_alikes, synonyms_of, words_for
 from executive.language.tokens import Token
 from executive.words.command import Command, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
 from skills.api import Thing
 from skills.files.errors import known_names, listing
 
-__all__ = ["Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]
+__all__ = ["Grounded", "check_unwanted", "ground", "known_line"]
 
 
 @dataclass(frozen=True)
@@ -42,20 +43,15 @@ def known_line(knowledge: Knowledge | None) -> str:
     return f"{ABLE}; known things: {listing(knowledge.thing_names())}; known places: {listing(knowledge.place_names())}"
 
 
-def ground(frames: Sequence[CommandFrame], knowledge: Knowledge) -> tuple[Command, ...]:
-    """The commands of `ground_noted`. Raises as that does."""
-    return ground_noted(frames, knowledge).commands
-
-
-def ground_noted(frames: Sequence[CommandFrame], knowledge: Knowledge, facts: WordFacts | None = None) -> Grounded:
+def ground(frames: Sequence[CommandFrame], knowledge: Knowledge, parser: DependencyParser) -> Grounded:
     """The frames as commands in the world's own names, with default places where none was said.
 
-    `facts` on English words widen what an unknown name may stand for.
+    What the parser knows of English words widens what an unknown name may stand for.
 
     Raises:
         RefusalError: a thing, place or person is unknown, or could be several; with a question where that helps.
     """
-    grounder = _Grounder(knowledge, facts)
+    grounder = _Grounder(knowledge, parser)
     commands = tuple(command for frame in grounder.needed_there(frames) for command in grounder.commands(frame))
     return Grounded(commands, tuple(dict.fromkeys(grounder.notes)))
 
@@ -78,7 +74,7 @@ class _Grounder:
     """Looks names up in one world, and notes what it took for what."""
 
     knowledge: Knowledge
-    facts: WordFacts | None
+    parser: DependencyParser
     notes: list[str] = field(default_factory=list)
 
     def needed_there(self, frames: Sequence[CommandFrame]) -> tuple[CommandFrame, ...]:
@@ -285,7 +281,7 @@ class _Grounder:
         """A question where something known looks, sounds or means alike; else a refusal."""
         heard = forms[0]
         ends = (name for form in forms for spelling, name in known.items() if spelling == _last(form))
-        near = (name for form in forms for name in look_alikes(form, known, self.facts))
+        near = (name for form in forms for name in look_alikes(form, known, self.parser))
         candidates = tuple(dict.fromkeys([*ends, *near]))
         if candidates:
             return _asking(perhaps(slot, heard, candidates))

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Final
 
 from executive.language.items import Being, Chunk, Item, Row, Separator, Unknown, Verb, command_position
-from executive.language.lexicon import PrepositionRole, VerbKind
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.tokens import Token
@@ -54,7 +54,7 @@ def where_is(row: Row, items: list[Item]) -> Item | None:
     row.silent |= set() if inverted else {end}
     if asks:
         items.pop()
-    return Verb(_FIND, row.words.verbs[(_FIND,)])
+    return Verb(_FIND, lexicon().verbs[(_FIND,)])
 
 
 def _is_be(row: Row, at: int) -> bool:
@@ -77,7 +77,7 @@ def how_many(row: Row, items: list[Item]) -> Item | None:
     verb = row.tokens[end : end + 1]
     if row.tokens[row.at + 1].word != "many" or not verb or verb[0].lemma != "be":
         return None
-    if phrase.person and (len(phrase.tokens) > 3 or phrase.head.word not in row.words.any_person):
+    if phrase.person and (len(phrase.tokens) > 3 or phrase.head.word not in lexicon().any_person):
         return None
     if any(t.tag == "IN" and b.word in ("a", "an") for t, b in pairwise(row.tokens[end:])):
         return None
@@ -111,7 +111,7 @@ def what_is(row: Row, items: list[Item]) -> Item | None:
         return None
     if asks:
         items.pop()
-    items += [Verb(_FIND, row.words.verbs[(_FIND,)]), Chunk(OBJECTS)]
+    items += [Verb(_FIND, lexicon().verbs[(_FIND,)]), Chunk(OBJECTS)]
     return found
 
 
@@ -119,7 +119,7 @@ def _whatever(row: Row) -> Chunk | None:
     """The place behind "what is" or "is there anything"."""
     at, asked = row.at, False
     for word in (token.word for token in row.tokens[row.at :]):
-        if word not in row.words.asked_with and (asked or word not in _WHATEVER):
+        if word not in lexicon().asked_with and (asked or word not in _WHATEVER):
             break
         asked = asked or word in _WHATEVER
         at += 1
@@ -129,7 +129,7 @@ def _whatever(row: Row) -> Chunk | None:
 def _place_at(row: Row, at: int) -> Chunk | None:
     """A preposition, and behind it a place in the house."""
     longest = (tuple(t.word for t in row.tokens[at : at + n]) for n in range(3, 0, -1))
-    preposition = next((words for words in longest if words in row.words.prepositions), None)
+    preposition = next((words for words in longest if words in lexicon().prepositions), None)
     phrase = None if preposition is None else row.phrase_at(at + len(preposition))
     if preposition is None or phrase is None or not (phrase.known or phrase.kind is NounKind.PLACE):
         return None
@@ -141,7 +141,7 @@ def _fullness(row: Row) -> Chunk | None:
     """The place in "is the bench empty"."""
     phrase = row.phrase_at(row.at + 1) if _is_be(row, row.at) else None
     end = row.at + 1 + (0 if phrase is None else len(phrase.tokens))
-    if phrase is None or end >= len(row.tokens) or row.tokens[end].word not in row.words.fullness:
+    if phrase is None or end >= len(row.tokens) or row.tokens[end].word not in lexicon().fullness:
         return None
     if not (phrase.known or phrase.kind is NounKind.PLACE) or phrase.person:
         return None
@@ -161,10 +161,10 @@ _BRING: Final = "bring"
 def reported_speech(row: Row, items: list[Item]) -> Item | None:
     """ "I left it in the hall" tells where a thing is; behind a noun it tells only which one is meant."""
     subject = items[-1] if items else None
-    if not isinstance(subject, Chunk) or row.tokens[row.at].word not in row.words.told:
+    if not isinstance(subject, Chunk) or row.tokens[row.at].word not in lexicon().told:
         return None
     phrase = subject.phrase
-    if subject.role is not None or not (phrase.head.word in row.words.subjects or phrase.person):
+    if subject.role is not None or not (phrase.head.word in lexicon().subjects or phrase.person):
         return None
     items.pop()
     text = row.take(1)
@@ -177,7 +177,7 @@ def reported_speech(row: Row, items: list[Item]) -> Item | None:
 
 def needed(row: Row, items: list[Item]) -> Item | None:
     """ "The patient in room four needs a blanket" asks to bring somebody something."""
-    found = row.match(row.words.needs)
+    found = row.match(lexicon().needs)
     first = len(items) - 1
     while found is not None and first > 0 and isinstance(item := items[first], Chunk) and item.role is not None:
         first -= 1
@@ -188,7 +188,7 @@ def needed(row: Row, items: list[Item]) -> Item | None:
     if not behind or behind[0].tag in ("TO", "IN") or behind[0].pos in ("PUNCT", "CCONJ"):
         return None
     row.at += len(found)
-    items.insert(first, Verb(_BRING, row.words.verbs[(_BRING,)]))
+    items.insert(first, Verb(_BRING, lexicon().verbs[(_BRING,)]))
     return Separator("")
 
 
@@ -209,7 +209,7 @@ def belongs(row: Row, items: list[Item]) -> Item | None:
     items[first + 1 :] = [
         replace(item, role=PrepositionRole.SOURCE) if isinstance(item, Chunk) else item for item in items[first + 1 :]
     ]
-    items.insert(first, Verb(_PUT, row.words.verbs[(_PUT,)]))
+    items.insert(first, Verb(_PUT, lexicon().verbs[(_PUT,)]))
     return Separator("")
 
 
@@ -221,7 +221,7 @@ def goes_on(row: Row, items: list[Item]) -> Item | None:
     subject = items[-1]
     if not isinstance(subject, Chunk) or subject.role is not None or not command_position(items[:-1]):
         return None
-    if any(word.tag.startswith("W") for word in subject.phrase.tokens) or token.lemma in row.words.asks:
+    if any(word.tag.startswith("W") for word in subject.phrase.tokens) or token.lemma in lexicon().asks:
         return None
     items.pop()
     return Being(row.take(1), existential=True, asked=False, narrated=True, topic=subject.phrase)
@@ -238,7 +238,7 @@ def narrated(row: Row, items: list[Item]) -> Item | None:
         return None
     length = _told_verb(row)
     asked = any(token.tag.startswith("W") for token in subject.phrase.tokens)
-    if not length or asked or row.tokens[row.at + length - 1].lemma in row.words.asks:
+    if not length or asked or row.tokens[row.at + length - 1].lemma in lexicon().asks:
         return None
     del items[at:]
     phrase = subject.phrase
@@ -256,7 +256,7 @@ def _told_verb(row: Row) -> int:
         return 1
     if first.tag == "MD" and words[1:2] and words[1] in _NOT and tags[2:] == ["VB"]:
         return 3
-    progressive = first.lemma == "be" and tags[1:2] == ["VBG"] and (words[1],) not in row.words.fillers
+    progressive = first.lemma == "be" and tags[1:2] == ["VBG"] and (words[1],) not in lexicon().fillers
     perfect = first.lemma == "have" and first.pos == "AUX" and tags[1:2] == ["VBN"]
     future = words[1:] == ["going", "to"] and [t.tag for t in row.tokens[row.at + 3 : row.at + 4]] == ["VB"]
     if progressive and future:

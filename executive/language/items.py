@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from typing import Final
 
-from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind, lexicon
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.tokens import Token
@@ -156,7 +156,6 @@ class Row:
 
     tokens: Sequence[Token]
     phrases: Mapping[int, Phrase]
-    words: Lexicon
     at: int = 0
     silent: set[int] = field(default_factory=set)
 
@@ -285,19 +284,19 @@ def without_name(clauses: Sequence[Predicate]) -> tuple[Predicate, ...]:
     return tuple(rest if first.verb is None and called and rest else clauses)
 
 
-def requested(predicates: Sequence[Predicate], words: Lexicon) -> list[Predicate]:
+def requested(predicates: Sequence[Predicate]) -> list[Predicate]:
     """The predicates as they are meant: a place before the first verb behind it, reasons and "check if" left out."""
-    return list(_without_checks(_without_reasons(_with_fronted(_with_verb(predicates, words)))))
+    return list(_without_checks(_without_reasons(_with_fronted(_with_verb(predicates)))))
 
 
-def _with_verb(clauses: Sequence[Predicate], words: Lexicon) -> Sequence[Predicate]:
+def _with_verb(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
     """Say "take" where there is no verb at all: "hammer to the kitchen, please"."""
     items = [item for clause in clauses for item in clause.items if not isinstance(item, Separator)]
     chunks = [item for item in items if isinstance(item, Chunk)]
     carried = [chunk.role for chunk in chunks] == [None, PrepositionRole.GOAL] and len(chunks) == len(items)
     if len(clauses) != 1 or clauses[0].verb is not None or not carried or chunks[0].phrase.kind is not NounKind.THING:
         return clauses
-    return (replace(clauses[0], verb=Verb(_TAKE, words.verbs[(_TAKE,)])),)
+    return (replace(clauses[0], verb=Verb(_TAKE, lexicon().verbs[(_TAKE,)])),)
 
 
 def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:

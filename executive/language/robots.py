@@ -4,77 +4,26 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Any, Final
+from typing import Final
 
 from executive.language.addressees import Saying, Who, Whom, addressees
 from executive.language.clauses import Clause, Split, split
 from executive.language.cleaning import clean
 from executive.language.parser import DependencyParser
-from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind
+from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.spelling import Corrected
-from executive.language.understand import Status, Understanding, asked_until_clear, meaning, spelled, understand
+from executive.language.spelling import Corrected, correct_spelling
+from executive.language.steps import Steps, Trace
+from executive.language.understand import Part, Status, Understanding, meaning, understand
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
 from executive.words.robots import display_name, robot_called
 from skills.files.errors import listing
 
-__all__ = ["Addressed", "Part", "Whom", "understand_for_robots", "understand_for_robots_asking"]
-
-
-@dataclass(frozen=True)
-class Part:
-    """What one robot is to do, or each (`Whom.ALL`), or any (`Whom.ANY`), once the parts `after` (from 0) are done.
-
-    `speaker_by` is the robot by whose start the speaker stands: "me" and "here" are there. None: by the world's start.
-    """
-
-    robot: str | Whom
-    meaning: Understanding
-    after: tuple[int, ...] = ()
-    speaker_by: str | None = None
-
-    def to_json(self) -> dict[str, Any]:
-        """The part as JSON values."""
-        robot = self.robot.value if isinstance(self.robot, Whom) else self.robot
-        return {
-            "robot": robot,
-            "after": list(self.after),
-            "speaker_by": self.speaker_by,
-            "meaning": self.meaning.to_json(),
-        }
-
-
-@dataclass(frozen=True)
-class Addressed:
-    """A sentence for several robots: its parts when `status` is OK, else the reason in one line.
-
-    `question`, `notes`, `unknown_words` and `memory` are as those of `Understanding`.
-    """
-
-    text: str
-    status: Status
-    parts: tuple[Part, ...] = ()
-    reason: str | None = None
-    unknown_words: tuple[str, ...] = ()
-    question: ClarifyingQuestion | None = None
-    notes: tuple[str, ...] = ()
-    memory: Memory | None = field(default=None, compare=False)
-
-    def to_json(self) -> dict[str, Any]:
-        """The answer as JSON values."""
-        return {
-            "text": self.text,
-            "status": self.status.value,
-            "reason": self.reason,
-            "unknown_words": list(self.unknown_words),
-            "question": None if self.question is None else self.question.to_json(),
-            "notes": list(self.notes),
-            "parts": [part.to_json() for part in self.parts],
-        }
+__all__ = ["Whom", "understand_for_robots"]
 
 
 def understand_for_robots(
@@ -82,73 +31,52 @@ def understand_for_robots(
     *,
     robots: Sequence[str],
     parser: DependencyParser,
-    knowledge: Knowledge,
+    knowledge: Knowledge | None,
     require_wake: bool = False,
     memory: Memory | None = None,
     correct: bool = True,
-) -> Addressed:
-    """What `sentence` asks of the robots called `robots`; with one robot just what `understand` makes of it.
+) -> Understanding:
+    """What `sentence` asks of the robots called `robots`, in parts; with one robot just what `understand` makes of it.
 
-    A part that nobody is named for is for any of them. `require_wake` says that one of the names, or a word that calls
-    all, must be said. The other arguments are those of `understand`. Never raises on text.
+    A part that nobody is named for is for any of them. For several robots the names must be known. `require_wake` says
+    that one of the names, or a word that calls all, must be said. The other arguments are those of `understand`. Never
+    raises on text.
     """
+    text = clean(sentence)
+    names = tuple(map(display_name, robots))
     if len(robots) == 1:
-        name = display_name(robots[0])
         alone = understand(
             sentence,
             parser=parser,
             knowledge=knowledge,
             require_wake=require_wake,
-            robot_name=name,
+            robot_name=names[0],
             memory=memory,
             correct=correct,
         )
-        return _of_one(alone, robots[0])
-    text = clean(sentence)
-    names = tuple(map(display_name, robots))
+        return replace(
+            alone, parts=(Part(robots[0], alone, speaker_by=robots[0]),) if alone.status is Status.OK else ()
+        )
+    assert knowledge is not None
     stranger = re.match(rf"\W*{_GREETING}\b[\s,]+(?P<name>[A-Z][\w'-]*)\s*,", text)
-    said = spelled(text, parser, knowledge) if correct else Corrected(text)
+    said = correct_spelling(text, knowledge, parser) if correct else Corrected(text)
+    addressed = True
     try:
         cut = split(said.text, names)
+        addressed = cut.listener is not None
         everybody = stranger is not None and addressees(names).forms.called.fullmatch(stranger["name"]) is not None
         if cut.listener is None and stranger is not None and not everybody:
             what = f"there is no robot called {stranger['name']}; there are {listing(names)}"
-            return Addressed(sentence, Status.NOT_ADDRESSED, reason=what, unknown_words=(stranger["name"],))
+            return Understanding(sentence, Status.NOT_ADDRESSED, reason=what, unknown_words=(stranger["name"],))
         if require_wake and cut.listener is None:
             called = listing((f'"Hey {name}"' for name in names), last="or")
             reason = f"no robot's name was said; begin with {called}"
-            return Addressed(sentence, Status.NOT_ADDRESSED, reason=reason)
-        found = _Reader(tuple(robots), parser, knowledge).addressed(sentence, cut, memory)
+            return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
+        found = _Reader(tuple(robots), Steps(parser, knowledge), knowledge).addressed(sentence, cut, memory)
     except RefusalError as refusal:
-        return Addressed(sentence, Status.REFUSED, reason=refusal.reason, unknown_words=tuple(refusal.unknown))
-    return replace(found, notes=(*said.notes, *found.notes))
-
-
-def understand_for_robots_asking(
-    sentence: str,
-    *,
-    answer: Answerer,
-    robots: Sequence[str],
-    parser: DependencyParser,
-    knowledge: Knowledge,
-    require_wake: bool = False,
-    correct: bool = True,
-) -> Addressed:
-    """The same once its questions are answered; one that is left open is what comes back."""
-
-    def meant(text: str) -> Addressed:
-        return understand_for_robots(
-            text, robots=robots, parser=parser, knowledge=knowledge, require_wake=require_wake, correct=correct
-        )
-
-    return asked_until_clear(sentence, meant, answer)
-
-
-def _of_one(meant: Understanding, robot: str) -> Addressed:
-    """The meaning of a sentence where there is but one robot."""
-    parts = (Part(robot, meant, speaker_by=robot),) if meant.status is Status.OK else ()
-    rest = (meant.reason, meant.unknown_words, meant.question, meant.notes, meant.memory)
-    return Addressed(meant.text, meant.status, parts, *rest)
+        found = Understanding(sentence, Status.REFUSED, reason=refusal.reason, unknown_words=refusal.unknown)
+        return replace(found, addressed=addressed)
+    return replace(found, notes=(*said.notes, *found.notes), addressed=addressed)
 
 
 @dataclass(frozen=True)
@@ -163,10 +91,10 @@ class _Read:
 @dataclass(frozen=True)
 class _Reader:
     robots: tuple[str, ...]
-    parser: DependencyParser
+    steps: Steps
     knowledge: Knowledge
 
-    def addressed(self, sentence: str, cut: Split, memory: Memory | None) -> Addressed:
+    def addressed(self, sentence: str, cut: Split, memory: Memory | None) -> Understanding:
         """The parts of a sentence that was cut."""
         read: list[_Read] = []
         told: tuple[Clause, ...] = ()
@@ -187,13 +115,12 @@ class _Reader:
             read.append(one)
         if not read:
             names = listing(map(display_name, self.robots))
-            return Addressed(sentence, Status.REFUSED, reason=f"nothing was said that {names} could do")
+            return Understanding(sentence, Status.REFUSED, reason=f"nothing was said that {names} could do")
         notes = tuple(dict.fromkeys(note for one in read for note in one.meaning.notes))
-        return Addressed(sentence, Status.OK, tuple(self._parts(read, cut)), notes=notes, memory=memory)
+        return Understanding(sentence, Status.OK, notes=notes, memory=memory, parts=tuple(self._parts(read, cut)))
 
     def _meaning(self, text: str, clauses: Sequence[Clause], memory: Memory | None) -> Understanding:
-        said = Corrected(text)
-        return meaning(text, said, parser=self.parser, knowledge=self.knowledge, memory=memory, clauses=clauses)
+        return meaning(Trace(text, memory or Memory()), self.steps, clauses)
 
     def _read(self, part: Saying, clauses: Sequence[Clause], before: Sequence[_Read], memory: Memory | None) -> _Read:
         """The meaning of a part, and what it waits for. Raises RefusalError."""
@@ -261,7 +188,7 @@ class _Reader:
             what = f"{self._named(part.who)} cannot all take the one {definite[0].text}; say which of them"
             raise RefusalError(what, [definite[0].text])
 
-    def _refused(self, sentence: str, one: _Read) -> Addressed | None:
+    def _refused(self, sentence: str, one: _Read) -> Understanding | None:
         """The answer where a piece is not understood, or speaks of a robot as of a person."""
         meant = one.meaning
         named = [name for name in self.robots if re.search(rf"\b{re.escape(name)}\b", one.part.text, re.IGNORECASE)]
@@ -272,12 +199,10 @@ class _Reader:
                 f"{name} is a robot, and not somebody to go to or to hand things to; "
                 f"say what {name} is to do, or put things on a table and let {name} bring them from there"
             )
-            return Addressed(sentence, Status.REFUSED, reason=reason, unknown_words=(name,))
+            return Understanding(sentence, Status.REFUSED, reason=reason, unknown_words=(name,))
         if meant.status is Status.OK:
             return None
-        return Addressed(
-            sentence, meant.status, (), meant.reason, meant.unknown_words, meant.question, meant.notes, meant.memory
-        )
+        return replace(meant, text=sentence)
 
     def _parts(self, read: Sequence[_Read], cut: Split) -> Iterator[Part]:
         """A part for each robot of each part."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.language.items import Adverb, Chunk, Item, Separator, Unknown, Whether
-from executive.language.lexicon import Lexicon, PrepositionRole
+from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 
@@ -99,7 +99,7 @@ class _Spoken:
     joint: str
 
 
-def read_roles(items: Sequence[Item], words: Lexicon, *, describes: bool, puts: bool = False) -> Roles:
+def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) -> Roles:
     """Sort the items behind a verb.
 
     `describes` says that a first "near", "on top of" with more places behind it tells which object is meant, `puts`

@@ -19,7 +19,7 @@ import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import Final, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -28,11 +28,13 @@ from rapidfuzz.distance import OSA
 from executive.language.lexicon import read_table
 from executive.words.knowledge import Knowledge
 
+if TYPE_CHECKING:
+    from executive.language.parser import DependencyParser
+
 __all__ = [
     "Alike",
     "Corrected",
     "SoundAlikes",
-    "WordFacts",
     "correct_spelling",
     "look_alikes",
     "nearest_by_sound",
@@ -239,17 +241,6 @@ def _sounds() -> _Sounds:
     return _Sounds(weak, vowels, alike)
 
 
-@runtime_checkable
-class WordFacts(Protocol):
-    """What is known of English words."""
-
-    def is_word(self, word: str) -> bool:
-        """Whether it is a frequent English word."""
-
-    def similarity(self, word: str, other: str) -> float:
-        """How near two words are in meaning, from -1 to 1."""
-
-
 @dataclass(frozen=True)
 class Corrected:
     """A sentence with known names in place of misspelled ones, and a word on each ("I take ...")."""
@@ -275,7 +266,7 @@ def synonyms_of(word: str, known: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(ring)) or tuple(dict.fromkeys(kind))
 
 
-def look_alikes(word: str, known: Mapping[str, str], facts: WordFacts | None) -> tuple[str, ...]:
+def look_alikes(word: str, known: Mapping[str, str], facts: DependencyParser) -> tuple[str, ...]:
     """The known names that an unknown word may be a slip for, or is near in meaning, the likeliest first."""
     wanted = word.lower()
     if len(wanted) > _MOST_LETTERS:
@@ -283,14 +274,14 @@ def look_alikes(word: str, known: Mapping[str, str], facts: WordFacts | None) ->
     sounds = {one.phrase: one.distance for one in _alikes(tuple(known)).all(wanted)}
     slips = ((_slip(wanted, spelling, sounds.get(spelling, 1.0)), name) for spelling, name in known.items())
     near = [name for slip, name in sorted(slips) if slip < 1.0]
-    if facts is not None and not near:
+    if not near:
         head = wanted.split()[-1] if wanted else ""
         scored = [(facts.similarity(head, spelling.split()[-1]), name) for spelling, name in known.items()]
         near = [name for score, name in sorted(scored, reverse=True) if score >= ALIKE_MEANING]
     return tuple(dict.fromkeys(near))[:_MOST_CANDIDATES]
 
 
-def correct_spelling(text: str, knowledge: Knowledge, facts: WordFacts) -> Corrected:
+def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -> Corrected:
     """Write known names in place of what is misspelled so that only one of them can be meant.
 
     A word is misspelled when it is no English word; the name must be within one slip, or two for long names. Names
@@ -326,7 +317,9 @@ class _Known:
     spelled: Mapping[str, str]
 
 
-def _corrected_at(words: Sequence[re.Match[str]], at: int, known: _Known, facts: WordFacts) -> tuple[int, str | None]:
+def _corrected_at(
+    words: Sequence[re.Match[str]], at: int, known: _Known, facts: DependencyParser
+) -> tuple[int, str | None]:
     """How many words from here on are one name, and that name where it must be written anew."""
     rows = [[word.group().lower() for word in words[at : at + count]] for count in range(_LONGEST_NAME, 0, -1)]
     fitting = [row for row in rows if at + len(row) <= len(words)]
@@ -343,7 +336,7 @@ def _corrected_at(words: Sequence[re.Match[str]], at: int, known: _Known, facts:
     return 1, None
 
 
-def _only_near(row: Sequence[str], known: _Known, facts: WordFacts) -> str | None:
+def _only_near(row: Sequence[str], known: _Known, facts: DependencyParser) -> str | None:
     """The one known name that misspelled words can mean; None where they are English or could be several."""
     strange = [word for word in row if word not in known.words]
     if not strange or any(_may_be_right(word, facts) for word in strange):
@@ -356,7 +349,7 @@ def _only_near(row: Sequence[str], known: _Known, facts: WordFacts) -> str | Non
     return None if unsure or not near else known.spelled.get(near[0][1], near[0][1])
 
 
-def _may_be_right(word: str, facts: WordFacts) -> bool:
+def _may_be_right(word: str, facts: DependencyParser) -> bool:
     """Whether a word that is no known name is one that was meant."""
     return not _FEWEST_LETTERS <= len(word) <= _MOST_LETTERS or facts.is_word(word) or facts.is_word(_singular(word))
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import enum
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 
 from executive.language.cleaning import clean, foreign_reason, placeholder, strip_wake
 from executive.language.parser import DependencyParser
 from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, with_answer
 from executive.language.reference import Memory
-from executive.language.spelling import Corrected, WordFacts, correct_spelling
-from executive.language.steps import Trace, trace_sentence
+from executive.language.spelling import Corrected, correct_spelling
+from executive.language.steps import Steps, Trace
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands
@@ -21,19 +21,10 @@ from executive.words.step import Step
 from executive.words.yaml_steps import steps_to_data
 
 if TYPE_CHECKING:
+    from executive.language.addressees import Whom
     from executive.language.clauses import Clause
-    from executive.language.structure.sentence import Structured
 
-__all__ = [
-    "Status",
-    "Understanding",
-    "asked_until_clear",
-    "meaning",
-    "parse_lines",
-    "spelled",
-    "understand",
-    "understand_asking",
-]
+__all__ = ["Part", "Status", "Understanding", "ask_until_clear", "meaning", "understand"]
 
 
 class Status(enum.Enum):
@@ -49,9 +40,10 @@ class Status(enum.Enum):
 class Understanding:
     """What a sentence means: commands when `status` is OK, else the reason in one line.
 
-    `steps` is the whole mission where it decides, repeats, waits or the like, and empty otherwise.
+    `steps` is the whole mission where it decides, repeats, waits or the like, and empty otherwise. `parts` say which of
+    the robots does what, where it was understood for robots by name; several have no `commands` and `steps` but these.
     `question` is what the robot asks back, `notes` say which name was taken for which, `memory` is what was spoken of,
-    `trace` how the answer came about.
+    `trace` how the answer came about. `addressed` says that a robot was called by its name.
     """
 
     text: str
@@ -64,6 +56,8 @@ class Understanding:
     memory: Memory | None = None
     trace: Trace | None = field(default=None, compare=False, repr=False)
     steps: tuple[Step, ...] = ()
+    parts: tuple[Part, ...] = ()
+    addressed: bool = field(default=False, compare=False)
 
     @property
     def all_steps(self) -> tuple[Step, ...]:
@@ -89,6 +83,28 @@ class Understanding:
         }
 
 
+@dataclass(frozen=True)
+class Part:
+    """What one robot is to do, or each (`Whom.ALL`), or any (`Whom.ANY`), once the parts `after` (from 0) are done.
+
+    `speaker_by` is the robot by whose start the speaker stands: "me" and "here" are there. None: by the world's start.
+    """
+
+    robot: str | Whom
+    meaning: Understanding
+    after: tuple[int, ...] = ()
+    speaker_by: str | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """The part as JSON values."""
+        return {
+            "robot": self.robot if isinstance(self.robot, str) else self.robot.value,
+            "after": list(self.after),
+            "speaker_by": self.speaker_by,
+            "meaning": self.meaning.to_json(),
+        }
+
+
 def understand(
     sentence: str,
     *,
@@ -111,119 +127,46 @@ def understand(
         correct: whether misspelled names are taken for known ones where that is safe.
     """
     name = robot_name or (knowledge.robot.name if knowledge else "robot")
-    wake = strip_wake(clean(sentence), name, knowledge.robot.others if knowledge else ())
-    if wake.other_name is not None and knowledge is not None:
-        reason = f"it is said to {wake.other_name}, and this robot is {name}"
-        return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason, unknown_words=(wake.other_name,))
-    if require_wake and not wake.addressed:
+    called = strip_wake(clean(sentence), name, knowledge.robot.others if knowledge else ())
+    addressed = called.name == name
+    if called.name not in (None, name) and knowledge is not None:
+        reason = f"it is said to {called.name}, and this robot is {name}"
+        return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason, unknown_words=(called.name or "",))
+    if require_wake and not addressed:
         reason = f'the robot\'s name was not said; begin with "Hey {name}"'
         return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
     if (blank := placeholder(sentence)) is not None:
         odd = RefusalError(f"{blank!r} is no word; say it in words", [blank])
         trace = Trace(sentence, refusal=odd, refused_at="cleaning")
-        return Understanding(sentence, Status.REFUSED, (), odd.reason, odd.unknown, trace=trace)
-    corrected = spelled(wake.text, parser, knowledge) if correct else Corrected(wake.text)
-    return meaning(sentence, corrected, parser=parser, knowledge=knowledge, memory=memory)
+        return Understanding(sentence, Status.REFUSED, (), odd.reason, odd.unknown, trace=trace, addressed=addressed)
+    said = Corrected(called.text)
+    if correct and knowledge is not None:
+        said = correct_spelling(called.text, knowledge, parser)
+    found = meaning(Trace(said.text, memory or Memory()), Steps(parser, knowledge))
+    return replace(found, text=sentence, notes=(*said.notes, *found.notes), addressed=addressed)
 
 
-def spelled(text: str, parser: DependencyParser, knowledge: Knowledge | None) -> Corrected:
-    """The text with the world's names in place of misspelled ones, where words can be judged."""
-    if knowledge is None or not isinstance(parser, WordFacts):
-        return Corrected(text)
-    return correct_spelling(text, knowledge, parser)
+def meaning(said: Trace, steps: Steps, clauses: Sequence[Clause] | None = None) -> Understanding:
+    """What a text for one robot means, which is that of an empty trace; its clauses where they are known."""
+    trace = steps.run(said)
+    if steps.knowledge is not None and _MENTIONED.search(said.text) is not None:
+        from executive.language.structure.sentence import structured
 
-
-def meaning(
-    sentence: str,
-    said: Corrected,
-    *,
-    parser: DependencyParser,
-    knowledge: Knowledge | None,
-    memory: Memory | None,
-    clauses: Sequence[Clause] | None = None,
-) -> Understanding:
-    """What a text for one robot means, the text being `said` of the sentence; its clauses where they are known."""
-    trace = trace_sentence(said.text, parser=parser, knowledge=knowledge, memory=memory)
-    if knowledge is not None and _MENTIONED.search(said.text) is not None:
-        trace = _with_structure(trace, said.text, clauses, parser, knowledge, memory)
-    refusal, notes = trace.refusal, (*said.notes, *trace.notes)
+        trace = structured(trace, clauses, steps, said.memory)
+    refusal = trace.refusal
     if refusal is None:
-        found = Understanding(sentence, Status.OK, trace.commands, notes=notes, memory=trace.memory, trace=trace)
-        return replace(found, steps=trace.steps)
+        ok = Understanding(said.text, Status.OK, trace.commands, notes=trace.notes, memory=trace.memory, trace=trace)
+        return replace(ok, steps=trace.steps)
     status = Status.QUESTION if refusal.question else Status.REFUSED
     reason = foreign_reason(said.text) or refusal.reason
-    return Understanding(sentence, status, (), reason, refusal.unknown, refusal.question, notes, trace=trace)
+    return Understanding(said.text, status, (), reason, refusal.unknown, refusal.question, trace.notes, trace=trace)
 
 
-def _with_structure(
-    plain: Trace,
-    text: str,
-    clauses: Sequence[Clause] | None,
-    parser: DependencyParser,
-    knowledge: Knowledge,
-    memory: Memory | None,
-) -> Trace:
-    """What a sentence that is no list of plain commands means, if it decides, repeats, waits, says or asks."""
-    from executive.language.clauses import split
-    from executive.language.structure.sentence import structured
+def ask_until_clear(sentence: str, meant: Callable[[str], Understanding], answer: Answerer) -> Understanding:
+    """What a sentence means with the answers to its questions in their places, at most three; `text` has them, too.
 
-    try:
-        said, read = split(text).clauses if clauses is None else clauses, plain.refusal is None
-        found = structured(said, parser=parser, knowledge=knowledge, memory=memory, plain=read)
-    except RefusalError as refusal:
-        return replace(plain, refusal=refusal, refused_at="structure")
-    return plain if found is None else _traced(plain, found)
-
-
-def _traced(plain: Trace, found: Structured) -> Trace:
-    """The trace of the whole sentence, with what its parts became."""
-    commands = tuple(command for step in found.steps for each in step.walk() for command in each.commands)
-    trace = Trace(plain.text, plain.opened, plain.tokens, commands=commands, notes=found.notes, memory=found.memory)
-    return replace(trace, parts=found.parts, steps=found.steps)
-
-
-def parse_lines(
-    lines: Iterable[str], *, parser: DependencyParser, knowledge: Knowledge | None, require_wake: bool = False
-) -> Iterator[Understanding]:
-    """Understand each line for itself, in order; an empty line is refused, not skipped."""
-    for line in lines:
-        yield understand(line.rstrip("\r\n"), parser=parser, knowledge=knowledge, require_wake=require_wake)
-
-
-def understand_asking(
-    sentence: str,
-    *,
-    answer: Answerer,
-    parser: DependencyParser,
-    knowledge: Knowledge,
-    require_wake: bool,
-    robot_name: str | None = None,
-    correct: bool = True,
-) -> Understanding:
-    """What a sentence means once its questions are answered; `text` is the sentence with the answers in their places.
-
-    The arguments are those of `understand`. A question that is left open, or whose answer is not understood, is what
-    comes back.
+    A question that is left open, or whose answer is not understood, is what comes back.
     """
-
-    def meant(text: str) -> Understanding:
-        return understand(
-            text, parser=parser, knowledge=knowledge, require_wake=require_wake, robot_name=robot_name, correct=correct
-        )
-
-    return asked_until_clear(sentence, meant, answer)
-
-
-class _Asking(Protocol):
-    @property
-    def question(self) -> ClarifyingQuestion | None: ...
-
-
-Meant = TypeVar("Meant", bound=_Asking)
-
-
-def asked_until_clear(sentence: str, meant: Callable[[str], Meant], answer: Answerer) -> Meant:
-    """What a sentence means with the answers to its questions in their places, at most three."""
     found = meant(sentence)
     for _ in range(_MOST_QUESTIONS):
         said = None if found.question is None else answer(found.question)

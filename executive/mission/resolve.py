@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -281,18 +282,18 @@ class _Resolver:
 
     def _meaning(self, error: _Error, path: KeyPath, sentence: str) -> Understanding:
         """What a sentence means; one that stands there again means the same. Raises InputError: not understood."""
-        from executive.language.understand import Status, understand_asking
+        from executive.language.understand import Status, ask_until_clear, understand
 
         if sentence not in self.understood:
-            self.understood[sentence] = understand_asking(
-                sentence,
-                answer=self.answer,
+            meaning = partial(
+                understand,
                 parser=self.parser,
                 knowledge=self.knowledge,
                 require_wake=False,
                 robot_name=self.robot_name,
                 correct=False,
             )
+            self.understood[sentence] = ask_until_clear(sentence, meaning, self.answer)
         meant = self.understood[sentence]
         if meant.status is not Status.OK:
             hint = "say it in other words, or write take, to, do and object"

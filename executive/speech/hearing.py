@@ -5,24 +5,22 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import Final
 
-from executive.language.clauses import split
-from executive.language.cleaning import SAME_NAME, Address, addressed_to, clean, heard_wake
+from executive.language.cleaning import SAME_NAME, Address, heard_wake
 from executive.language.lexicon import lexicon
 from executive.language.parser import DependencyParser
-from executive.language.questions import RefusalError
-from executive.language.robots import Part, understand_for_robots
+from executive.language.robots import understand_for_robots
 from executive.language.roles import HERE
 from executive.language.spelling import SoundAlikes, sound_distance
-from executive.language.understand import Status, Understanding, understand
+from executive.language.understand import Status, Understanding
 from executive.speech.interpret import Reading
 from executive.speech.recogniser import Vocabulary
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
 from skills.files.errors import InputError
 
-__all__ = ["Meant", "Reader", "SpeechReader", "TeamReader", "refuse_alike", "spoken_phrases"]
+__all__ = ["Reader", "refuse_alike", "spoken_phrases"]
 
 _GREETINGS: Final = ("Hey", "Hi", "OK")
 _EVERYBODY: Final = ("everyone", "everybody")
@@ -33,132 +31,55 @@ _UNRESOLVED: Final = frozenset({"her", "him"})
 
 
 @dataclass(frozen=True)
-class Meant:
-    """What a heard sentence means, and whether the robot was called by its name.
+class Reader:
+    """Reads heard sentences for one robot, or for several: one, some or all of them may be called.
 
-    The text of `understanding` is the sentence with the robot's name spelled right, so that it can be typed instead.
-    `parts` say which of several robots does what.
-    """
-
-    understanding: Understanding
-    addressed: bool
-    parts: tuple[Part, ...] = ()
-
-
-class Reader(Protocol):
-    """Reads heard sentences."""
-
-    @property
-    def vocabulary(self) -> Vocabulary:
-        """The names that are listened for."""
-
-    @property
-    def require_wake(self) -> bool:
-        """Whether a robot must be called."""
-
-    @property
-    def robots(self) -> tuple[str, ...]:
-        """The robots that can be called."""
-
-    def read(self, text: str) -> Reading[Meant]:
-        """What a text means."""
-
-    def calls(self, text: str) -> bool:
-        """Whether a robot is called in a text."""
-
-
-@dataclass(frozen=True)
-class SpeechReader:
-    """Reads heard sentences for one robot.
-
-    `knowledge` None keeps names as spoken; then names outside the vocabulary, where there is one, do not fit.
+    `knowledge` None, for one robot, keeps names as spoken; then names outside the vocabulary, where there is one, do
+    not fit. `other_robots` are called as well, and do not listen.
     """
 
     parser: DependencyParser
     knowledge: Knowledge | None
     vocabulary: Vocabulary
-    robot_name: str
-    require_wake: bool
-    other_robots: Collection[str] = ()
-
-    @property
-    def robots(self) -> tuple[str, ...]:
-        """The robot."""
-        return (self.robot_name,)
-
-    def read(self, text: str) -> Reading[Meant]:
-        """What `text` means; it fits when it becomes commands in known names."""
-        address = self._address(text)
-        addressed = address.name is not None
-        understood = understand(
-            address.text if addressed else text,
-            parser=self.parser,
-            knowledge=self.knowledge,
-            require_wake=self.require_wake and not addressed,
-            robot_name=self.robot_name,
-        )
-        typed = f"Hey {self.robot_name}, {address.text}" if addressed else text
-        meant = Meant(replace(understood, text=typed), addressed)
-        if understood.status is Status.NOT_ADDRESSED:
-            return Reading(meant, fits=False, correctable=False)
-        if understood.status is not Status.OK:
-            return Reading(meant, fits=False, suspects=understood.unknown_words)
-        strange = () if self.knowledge else tuple(self._strange(understood.commands))
-        return Reading(meant, fits=not strange, suspects=strange)
-
-    def calls(self, text: str) -> bool:
-        """Whether the robot is called in `text`, its name perhaps misspelled."""
-        return self._address(text).name is not None
-
-    def _address(self, text: str) -> Address:
-        return heard_wake(_with_pause(text, self.robot_name), self.robot_name, others=self.other_robots)
-
-    def _strange(self, commands: tuple[Command, ...]) -> Iterator[str]:
-        """Names in the commands that the vocabulary does not know; none is strange where there is no vocabulary."""
-        known = {_plain(name) for name in self.vocabulary.names}
-        spoken = (name for command in commands for name in _names(command))
-        yield from (name for name in dict.fromkeys(spoken) if known and not _knows(known, name))
-
-
-@dataclass(frozen=True)
-class TeamReader:
-    """Reads heard sentences for several robots: one, some or all of them may be called."""
-
-    parser: DependencyParser
-    knowledge: Knowledge
-    vocabulary: Vocabulary
     robots: tuple[str, ...]
     require_wake: bool
+    other_robots: tuple[str, ...] = ()
 
-    def read(self, text: str) -> Reading[Meant]:
-        """What `text` means for each; it fits when it becomes commands."""
-        said = self._as_called(text)
-        asked = understand_for_robots(
-            said, robots=self.robots, parser=self.parser, knowledge=self.knowledge, require_wake=self.require_wake
+    def read(self, text: str) -> Reading[Understanding]:
+        """What `text` means; it fits when it becomes commands in known names.
+
+        The text of the meaning is the sentence with the name of the robot that it calls spelled right, so that it can
+        be typed instead.
+        """
+        called, alone = self._called(text), len(self.robots) == 1
+        typed = called.text if called.name is None else f"Hey {called.name}, {called.text}"
+        meant = understand_for_robots(
+            called.text if alone else typed,
+            robots=self.robots,
+            parser=self.parser,
+            knowledge=self.knowledge,
+            require_wake=self.require_wake and not (alone and called.name),
         )
-        commands = tuple(command for part in asked.parts for command in part.meaning.commands)
-        rest = (commands, asked.reason, asked.unknown_words, asked.question, asked.notes, asked.memory)
-        meant = Meant(Understanding(said, asked.status, *rest), self.calls(said), asked.parts)
-        if asked.status is Status.NOT_ADDRESSED:
+        if alone:
+            meant = replace(meant, text=typed, parts=(), addressed=called.name is not None)
+        else:
+            meant = replace(meant, commands=tuple(each for part in meant.parts for each in part.meaning.commands))
+        if meant.status is Status.NOT_ADDRESSED:
             return Reading(meant, fits=False, correctable=False)
-        return Reading(meant, fits=asked.status is Status.OK, suspects=asked.unknown_words)
+        if meant.status is not Status.OK:
+            return Reading(meant, fits=False, suspects=meant.unknown_words)
+        known = {_plain(name) for name in self.vocabulary.names} if self.knowledge is None else set()
+        spoken = dict.fromkeys(name for command in meant.commands for name in _names(command))
+        strange = tuple(name for name in spoken if known and not _knows(known, name))
+        return Reading(meant, fits=not strange, suspects=strange)
 
-    def calls(self, text: str) -> bool:
-        """Whether robots are called in `text`, a name perhaps misspelled."""
-        try:
-            return split(clean(self._as_called(text)), self.robots).listener is not None
-        except RefusalError:
-            return True
-
-    def _as_called(self, text: str) -> str:
-        """The text with the name of the robot that it begins with spelled right."""
+    def _called(self, text: str) -> Address:
+        """Which robot is called in `text`, its name perhaps misspelled, and the rest of the text."""
         for name in self.robots:
             text = _with_pause(text, name)
-        if addressed_to(text, self.robots).name is not None:
-            return text
-        others = {name: [other for other in self.robots if other != name] for name in self.robots}
+        others = {name: {*self.robots, *self.other_robots} - {name} for name in self.robots}
         heard = (heard_wake(text, name, others=others[name]) for name in self.robots)
-        return next((f"Hey {one.name}, {one.text}" for one in heard if one.name is not None), text)
+        return next((one for one in heard if one.name is not None), Address(None, text))
 
 
 def refuse_alike(robots: Sequence[str]) -> None:

@@ -11,11 +11,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from executive.language.robots import Part
 from executive.language.spelling import SoundAlikes
-from executive.language.understand import Status
+from executive.language.understand import Part, Status, Understanding
 from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Utterance
-from executive.speech.hearing import Meant, Reader
+from executive.speech.hearing import Reader
 from executive.speech.interpret import interpret, opening_as_heard
 from executive.speech.recogniser import Recogniser, Vocabulary
 from executive.speech.sound import RATE_HZ, Loudness, Samples, joined, level_db, read_wav
@@ -36,7 +35,7 @@ class HeardUtterance:
     start_s: float
     end_s: float
     text: str
-    meant: Meant
+    meant: Understanding
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,8 @@ class Listener:
             return None
         text, meant = best.text, best.meaning
         if meant.addressed:
-            text = opening_as_heard(recognition, text, self.reader.robots, self.reader.calls)
+            calls = lambda said: self.reader.read(said).meaning.addressed  # noqa: E731
+            text = opening_as_heard(recognition, text, self.reader.robots, calls)
             meant = meant if text == best.text else self.reader.read(text).meaning
         return HeardUtterance(utterance.start_s, utterance.end_s, text, meant)
 
@@ -114,13 +114,13 @@ class Recording:
     @property
     def decisive(self) -> tuple[HeardUtterance, ...]:
         """The utterances that count: those to the robot, or all when none is."""
-        told = tuple(o for o in self.heard if o.meant.understanding.status is not Status.NOT_ADDRESSED)
+        told = tuple(o for o in self.heard if o.meant.status is not Status.NOT_ADDRESSED)
         return told or self.heard[:1]
 
     @property
     def status(self) -> Status:
         """OK when all that was said to the robot is, else what became of the first that is not."""
-        states = [one.meant.understanding.status for one in self.decisive]
+        states = [one.meant.status for one in self.decisive]
         return next((state for state in states if state is not Status.OK), Status.OK if states else Status.REFUSED)
 
     @property
@@ -128,7 +128,7 @@ class Recording:
         """What is to be done; nothing when any part of it was not understood."""
         if self.status is not Status.OK:
             return ()
-        return tuple(command for one in self.decisive for command in one.meant.understanding.commands)
+        return tuple(command for one in self.decisive for command in one.meant.commands)
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -140,13 +140,13 @@ class Recording:
         """Why there are no commands."""
         if not self.heard:
             return SILENT if self.loudness.silent else NOBODY_SPOKE
-        return next(filter(None, (one.meant.understanding.reason for one in self.decisive)), None)
+        return next(filter(None, (one.meant.reason for one in self.decisive)), None)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What may be wrong with the sound, and which name was taken for which."""
         clipped = (CLIPPED,) if self.loudness.much_clipped else ()
-        return (*clipped, *(note for one in self.decisive for note in one.meant.understanding.notes))
+        return (*clipped, *(note for one in self.decisive for note in one.meant.notes))
 
     def to_json(self) -> dict[str, Any]:
         """The answer as JSON values."""

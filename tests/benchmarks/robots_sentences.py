@@ -18,8 +18,8 @@ from typing import Final
 import yaml
 
 from executive.language.parser import load_parser
-from executive.language.robots import Addressed, Part, Whom, understand_for_robots
-from executive.language.understand import Status
+from executive.language.robots import Whom, understand_for_robots
+from executive.language.understand import Part, Status, Understanding
 from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
 from tests.benchmarks.structured_sentences import Score, in_full
@@ -41,7 +41,7 @@ def measured(table: Path) -> Score:
     return Score(len(rows), sum(right), taken, missed)
 
 
-def _answers(table: Path) -> Iterator[tuple[str, list[str] | str, Addressed]]:
+def _answers(table: Path) -> Iterator[tuple[str, list[str] | str, Understanding]]:
     """Each sentence with what is expected of it, and the answer."""
     parser, knowledge = load_parser(), load_knowledge(load_world("flat").knowledge_path)
     for names, rows in yaml.safe_load(table.read_text(encoding="utf-8")).items():
@@ -50,7 +50,7 @@ def _answers(table: Path) -> Iterator[tuple[str, list[str] | str, Addressed]]:
             yield text, expected, understand_for_robots(text, robots=robots, parser=parser, knowledge=knowledge)
 
 
-def _right(expected: list[str] | str, answer: Addressed) -> bool:
+def _right(expected: list[str] | str, answer: Understanding) -> bool:
     if isinstance(expected, str):
         return answer.status is not Status.OK
     return answer.status is Status.OK and [_said(part) for part in answer.parts] == [_wanted(text) for text in expected]
@@ -68,7 +68,7 @@ def _said(part: Part) -> tuple[str, tuple[int, ...], str]:
     return who, part.after, noted(part.meaning.all_steps)
 
 
-def _line(text: str, answer: Addressed) -> str:
+def _line(text: str, answer: Understanding) -> str:
     if answer.status is not Status.OK:
         return f"{text}\n      {answer.reason}"
     parts = (

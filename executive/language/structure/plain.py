@@ -11,12 +11,11 @@ from executive.language.indirect import OBJECTS
 from executive.language.items import Adverb, Being, Chunk, Item, Verb, Whether
 from executive.language.lexicon import PrepositionRole, lexicon
 from executive.language.nouns import NounKind
-from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.steps import Part, Steps, Trace
+from executive.language.steps import Steps, Trace
 from executive.language.tokens import Token
 from executive.words.command import START, Command, Task
 from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
@@ -129,51 +128,55 @@ _THERE_IS: Final = Being("there is", existential=True, asked=False)
 
 @dataclass(frozen=True)
 class PlainReader:
-    """Understands plain parts in one world."""
+    """Understands plain parts in one world. Its methods raise RefusalError."""
 
-    parser: DependencyParser
+    steps: Steps
     knowledge: Knowledge
 
-    @property
-    def _steps(self) -> Steps:
-        return Steps(self.parser, self.knowledge)
+    def _run(self, trace: Trace, *, behind: str | None = None, upto: str | None = None) -> Trace:
+        found = self.steps.run(trace, behind=behind, upto=upto)
+        if found.refusal is not None:
+            raise found.refusal
+        return found
 
     def commands_of(self, text: str, state: State, lead: Sequence[Item] = ()) -> PlainReading:
-        """What a plain part asks for, behind the items `lead`. Raises RefusalError: it leaves something open."""
-        part = Part(tuple(lead), elliptic=True, recipient=state.recipient)
-        return self._reading(self._steps.trace(text, state.memory, part), state)
+        """What a plain part asks for, behind the items `lead`."""
+        trace = Trace(text, state.memory, tuple(lead), elliptic=True, recipient=state.recipient)
+        return self._reading(self._run(trace), state)
 
     def commands_of_items(self, items: Sequence[Item], state: State, tokens: Sequence[Token] = ()) -> PlainReading:
-        """The same of items, and the words that they were read from. Raises RefusalError."""
-        trace = Trace("", tokens=tuple(tokens), items=tuple(items), memory=state.memory)
-        return self._reading(self._steps.rest(trace, behind="reading"), state)
+        """The same of items, and the words that they were read from."""
+        trace = Trace("", state.memory, tokens=tuple(tokens), items=tuple(items))
+        return self._reading(self._run(trace, behind="reading"), state)
 
     def commands_of_actions(self, trace: Trace, actions: Sequence[Action], state: State) -> PlainReading:
-        """The same of actions in the place of those of a trace. Raises RefusalError."""
+        """The same of actions in the place of those of a trace."""
         trace = replace(trace, actions=tuple(actions), memory=state.memory)
-        return self._reading(self._steps.rest(trace, behind="understanding"), state)
+        return self._reading(self._run(trace, behind="understanding"), state)
 
     def actions_of(self, text: str, state: State) -> Trace:
-        """What a plain part asks for up to its actions. Raises RefusalError."""
-        return _unrefused(self._steps.trace(text, state.memory, Part(elliptic=True), upto="understanding"))
+        """What a plain part asks for up to its actions."""
+        return self._run(Trace(text, state.memory, elliptic=True), upto="understanding")
 
     def _reading(self, trace: Trace, state: State) -> PlainReading:
-        commands = _without_taking(_unrefused(trace).commands, state.held)
+        commands = trace.commands
+        first = commands[0] if commands else None
+        if first is not None and state.held is not None and first.task is Task.GRASP and first.object == state.held:
+            commands = commands[1:]
         return PlainReading(commands, self._after(commands, trace.memory, state), trace)
 
     def items_of(self, text: str) -> tuple[Item, ...]:
-        """The items of some words. Raises RefusalError."""
-        return _unrefused(self._steps.trace(text, upto="reading")).items
+        """The items of some words."""
+        return self._run(Trace(text), upto="reading").items
 
     def go_to(self, text: str, state: State) -> PlainReading:
-        """Going to a place that is spoken of in a noun phrase, or "there". Raises RefusalError."""
+        """Going to a place that is spoken of in a noun phrase, or "there"."""
         items = (Adverb(here=False),) if text.lower() == "there" else self.items_of(text)
         return self.commands_of_items((verb("go"), *behind_preposition(items, "to")), state)
 
     def check(self, text: str, state: State, lead: Sequence[Item] = (), *, said: str | None = None) -> Supposed:
-        """Whether what the text states, or denies, is so; `said` says more of it. Raises RefusalError."""
-        part = Part((verb("check"), Whether(), *lead), asked=True)
-        read = _unrefused(self._steps.trace(text, part=part, upto="reading"))
+        """Whether what the text states, or denies, is so; `said` says more of it."""
+        read = self._run(Trace(text, lead=(verb("check"), Whether(), *lead), asked=True), upto="reading")
         assert read.affirmed is not None
         words = [token.word for token in read.tokens if token.index not in read.affirmed.silent]
         if (left_out := next((word for word in words if word in _LEFT_OUT), None)) is not None:
@@ -182,26 +185,26 @@ class PlainReader:
         return found.denied(said or text) if read.affirmed.denied else found
 
     def exists(self, what: str, text: str, state: State) -> Supposed:
-        """Whether there is what is named, or is not ("no beer in the hall"); `text` says it. Raises RefusalError."""
+        """Whether there is what is named, or is not ("no beer in the hall"); `text` says it."""
         return self.check(what, state, (_THERE_IS,), said=text)
 
     def it_is_there(self, text: str, state: State) -> Supposed:
-        """Whether a thing that was spoken of is where that was. Raises RefusalError."""
+        """Whether a thing that was spoken of is where that was."""
         return self.look_by_items((verb("check"), Whether(), IT, _IS, Adverb(here=False)), text, state)
 
     def anything_on(self, place: str, text: str, state: State) -> Supposed:
-        """Whether anything lies in a place. Raises RefusalError."""
+        """Whether anything lies in a place."""
         return self.look_by_items(
             (verb("find"), Chunk(OBJECTS), *behind_preposition(self.items_of(place), "on")), text, state
         )
 
     def look(self, who: str, room: str, text: str, state: State) -> Supposed:
-        """Whether somebody is in a room. Raises RefusalError."""
+        """Whether somebody is in a room."""
         where = Chunk(phrase_of_name(room, NounKind.PLACE), "in", PrepositionRole.AT)
         return self.look_by_items((verb("check"), Whether(), *self.items_of(who), _IS, where), text, state)
 
     def look_by_items(self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()) -> Supposed:
-        """The condition that the looks of some items make; `text` says it. Raises RefusalError: they are no looks."""
+        """The condition that the looks of some items make; `text` says it."""
         try:
             reading = self.commands_of_items([self._by_name(item, state) for item in items], state, tokens)
         except RefusalError as refusal:
@@ -227,14 +230,14 @@ class PlainReader:
         return replace(item, phrase=person.phrase) if isinstance(item, Chunk) and he else item
 
     def room_of(self, place: Location, state: State) -> str:
-        """The room of a place that was read. Raises RefusalError."""
+        """The room of a place that was read."""
         assert place.phrase is not None
         return self._room(
             self.commands_of_items((verb("go"), Chunk(place.phrase, "to", PrepositionRole.GOAL)), state), place.text
         )
 
     def room(self, text: str, state: State) -> str:
-        """The room of a place as it is spoken. Raises RefusalError."""
+        """The room of a place as it is spoken."""
         return self._room(self.go_to(text, state), text)
 
     def _room(self, reading: PlainReading, text: str) -> str:
@@ -290,17 +293,3 @@ class PlainReader:
         if place is not None and place in self.knowledge.people and command.goal_at is None:
             return self.knowledge.room(self.knowledge.people[place].at)
         return None if place is None or self.knowledge.place(place) is None else self.knowledge.room(place)
-
-
-def _unrefused(trace: Trace) -> Trace:
-    """The trace. Raises RefusalError: that of a step."""
-    if trace.refusal is not None:
-        raise trace.refusal
-    return trace
-
-
-def _without_taking(commands: tuple[Command, ...], held: Thing | None) -> tuple[Command, ...]:
-    """The commands without that to take what is in the gripper already."""
-    first = commands[0] if commands else None
-    taken = first is not None and held is not None and first.task is Task.GRASP and first.object == held
-    return commands[1:] if taken else commands

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cue_behind, cut
+from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cue_behind, cut, split
 from executive.language.items import Adverb, Chunk
 from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
-from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
+from executive.language.steps import Steps as PlainSteps
+from executive.language.steps import Trace
 from executive.language.structure.branches import Branches
 from executive.language.structure.conditions import suppose
 from executive.language.structure.plain import PlainReader, State, at_start, behind_preposition, phrase_of_name, verb
@@ -38,13 +39,12 @@ from executive.language.structure.requests import (
 from executive.language.structure.row import LookedAt, Row, checked_statement, end_of, sentence_of
 from executive.words.command import Task
 from executive.words.condition import Look
-from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Awaited, Check, Do, Speak, Wait, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Repeat, Steps, Together, Try
 from skills.files.schema_errors import first_error
 
-__all__ = ["Structured", "structured"]
+__all__ = ["structured"]
 
 
 class Builder(Branches):
@@ -149,7 +149,7 @@ class Builder(Branches):
         if found is not None and not _spoken_of(found, clause.text):
             self.modified(row, clause, found)
             return at + 1
-        said = speech_in(clause.text, self.reader.knowledge, self.reader.parser)
+        said = speech_in(clause.text, self.reader.knowledge, self.reader.steps.parser)
         if said is None:
             return None
         text = said.text if said.text is not None else self.told
@@ -353,49 +353,40 @@ MOST_NESTED: Final = 2
 MOST_CLAUSES: Final = 24
 
 
-@dataclass(frozen=True)
-class Structured:
-    """The steps of a sentence, its clauses, notes on what was taken for what, and what was spoken of."""
+def structured(plain: Trace, clauses: Sequence[Clause] | None, steps: PlainSteps, memory: Memory) -> Trace:
+    """The trace of a sentence that decides, repeats, waits, says or asks, from that of its plain reading.
 
-    steps: Steps
-    parts: tuple[str, ...]
-    notes: tuple[str, ...]
-    memory: Memory
-
-
-def structured(
-    clauses: Sequence[Clause],
-    *,
-    parser: DependencyParser,
-    knowledge: Knowledge,
-    memory: Memory | None,
-    plain: bool = False,
-) -> Structured | None:
-    """The steps of a sentence's clauses; None where it lists plain commands nevertheless.
-
-    `plain` says that it could be read as such a list, too: then only what certainly decides or repeats is read
-    otherwise.
-
-    Raises:
-        RefusalError: it decides, repeats, waits, says or asks something that is not surely understood; the message
-            names the words.
+    It is the plain one where the sentence lists plain commands nevertheless: where it could be read as such a list,
+    only what certainly decides or repeats is read otherwise. `clauses` are those of the sentence, where they are known,
+    and `memory` is what was spoken of before.
     """
-    if plain and not any(one.kind is not None or cue_behind(one.text) is not None for one in clauses):
-        return None
-    if len(clauses) > MOST_CLAUSES:
-        raise RefusalError(f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most")
-    builder = Builder(PlainReader(parser, knowledge))
     try:
-        steps, state = builder.sequence(clauses, at_start(knowledge, memory or Memory()))
+        return _structured(plain, split(plain.text).clauses if clauses is None else clauses, steps, memory)
+    except RefusalError as refusal:
+        return replace(plain, refusal=refusal, refused_at="structure")
     except ValidationError as error:
         _, wrong, _ = first_error(error.errors())
-        raise RefusalError(f"a number in it {wrong}") from error
+        return replace(plain, refusal=RefusalError(f"a number in it {wrong}"), refused_at="structure")
+
+
+def _structured(plain: Trace, clauses: Sequence[Clause], plain_steps: PlainSteps, memory: Memory) -> Trace:
+    """The same. Raises RefusalError: something is not surely understood; the message names the words."""
+    decides = any(one.kind is not None or cue_behind(one.text) is not None for one in clauses)
+    if plain.refusal is None and not decides:
+        return plain
+    if len(clauses) > MOST_CLAUSES:
+        raise RefusalError(f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most")
+    assert plain_steps.knowledge is not None
+    builder = Builder(PlainReader(plain_steps, plain_steps.knowledge))
+    steps, state = builder.sequence(clauses, at_start(plain_steps.knowledge, memory))
     if all(isinstance(step, Do) for step in steps) and not builder.special:
-        return None
+        return plain
     if max(map(_depth, steps), default=0) > MOST_NESTED:
         raise RefusalError("one thing inside another inside a third is too much; say it in two sentences")
     parts = tuple(" | ".join(filter(None, (each.joint.strip(" ,;."), each.cue, each.text))) for each in clauses)
-    return Structured(steps, parts, tuple(dict.fromkeys(builder.notes)), state.memory)
+    commands = tuple(command for step in steps for each in step.walk() for command in each.commands)
+    found = Trace(plain.text, state.memory, opened=plain.opened, tokens=plain.tokens, commands=commands)
+    return replace(found, notes=tuple(dict.fromkeys(builder.notes)), parts=parts, steps=steps)
 
 
 def _depth(step: Step) -> int:

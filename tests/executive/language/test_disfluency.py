@@ -2,14 +2,13 @@ import pytest
 
 from executive.language.disfluency import repair_disfluencies
 from executive.language.items import spoken_words
-from executive.language.lexicon import lexicon
 from executive.language.phrases import noun_phrases
 from executive.language.reading import split_items
 
 
 def hint(parser, text):
     tokens = parser.parse(text)
-    return spoken_words(repair_disfluencies(split_items(tokens, noun_phrases(tokens), lexicon())))
+    return spoken_words(repair_disfluencies(split_items(tokens, noun_phrases(tokens))))
 
 
 @pytest.mark.parametrize(

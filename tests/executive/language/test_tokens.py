@@ -1,6 +1,6 @@
 import pytest
 
-from executive.language.tokens import name_table, parse_with_names
+from executive.language.tokens import name_table, parse_with_names, rephrased
 
 
 @pytest.fixture(scope="module")
@@ -85,3 +85,21 @@ def test_every_word_still_hangs_on_a_root(parser, text):
         for _ in tokens:
             token = tokens[token.head]
         assert token.head == token.index
+
+
+@pytest.mark.parametrize(
+    ("text", "command"),
+    [
+        ("could you please get it", "get it"),
+        ("Can you, please, get it?", "get it?"),
+        ("there is one here can you get it", "there is one here , get it"),
+        ("I would like a coke", "bring me a coke"),
+        ("I would like you to get a coke", "get a coke"),
+        ("I'd like something to drink", "bring me a drink"),
+        ("get it please", "get it"),
+        ("robot get it", "get it"),
+        ("get it", "get it"),
+    ],
+)
+def test_polite_forms_become_plain_commands(text, command):
+    assert rephrased(text) == command

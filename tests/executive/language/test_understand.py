@@ -5,7 +5,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from executive.language.understand import Status, parse_lines, understand
+from executive.language.understand import Status, understand
 from executive.words.command import parse_command
 
 HERE = Path(__file__).parent
@@ -117,8 +117,8 @@ def test_with_open_vocabulary_names_stay_as_spoken(parser, sentence, commands):
 
 
 def test_lines_are_answered_in_order_and_one_by_one(parser):
-    lines = ["go to the attic\n", "\n", "what day is it\n"]
-    answers = list(parse_lines(lines, parser=parser, knowledge=None))
+    lines = ["go to the attic", "", "what day is it"]
+    answers = [understand(line, parser=parser, knowledge=None, require_wake=False) for line in lines]
     assert [answer.status.value for answer in answers] == ["ok", "refused", "refused"]
     assert answers[0].to_json() == {
         "text": "go to the attic",

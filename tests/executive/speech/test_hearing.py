@@ -3,32 +3,32 @@
 import pytest
 
 from executive.language.understand import Status
-from executive.speech.hearing import SpeechReader, spoken_phrases
+from executive.speech.hearing import Reader, spoken_phrases
 from executive.speech.recogniser import Vocabulary, vocabulary_of_world
 
 
 @pytest.fixture(scope="module")
 def reader(flat, parser):
-    return SpeechReader(parser, flat, vocabulary_of_world(flat, called=True), "Alice", require_wake=True)
+    return Reader(parser, flat, vocabulary_of_world(flat, called=True), ("Alice",), require_wake=True)
 
 
 @pytest.fixture(scope="module")
 def open_reader(parser):
     words = Vocabulary(("big dish", "washing machine", "cupboard", "Robin"))
-    return SpeechReader(parser, None, words, "Alice", require_wake=False)
+    return Reader(parser, None, words, ("Alice",), require_wake=False)
 
 
 @pytest.mark.parametrize("call", ["Hey Alice, ", "High Alice, ", "Hey Ellis ", "OK Alice. ", "Alice "])
 def test_a_call_may_be_misheard(reader, call):
     reading = reader.read(f"{call}go to the kitchen")
     assert reading.fits and reading.meaning.addressed
-    assert reading.meaning.understanding.text == "Hey Alice, go to the kitchen"
+    assert reading.meaning.text == "Hey Alice, go to the kitchen"
 
 
 def test_what_is_said_to_others_does_not_fit_and_is_not_corrected(reader):
     reading = reader.read("Robin, go to the kitchen")
     assert not reading.fits and not reading.correctable and not reading.meaning.addressed
-    assert reading.meaning.understanding.status is Status.NOT_ADDRESSED
+    assert reading.meaning.status is Status.NOT_ADDRESSED
 
 
 def test_a_story_about_the_robot_is_no_call(reader):
@@ -37,7 +37,7 @@ def test_a_story_about_the_robot_is_no_call(reader):
 
 def test_other_robots_are_told_from_this_one(flat, parser):
     words = vocabulary_of_world(flat, called=True)
-    reader = SpeechReader(parser, flat, words, "Alice", require_wake=True, other_robots=("Ellis",))
+    reader = Reader(parser, flat, words, ("Alice",), require_wake=True, other_robots=("Ellis",))
     assert not reader.read("Hey Ellis, go to the kitchen").meaning.addressed
 
 
@@ -49,7 +49,7 @@ def test_an_unknown_name_is_to_blame(reader):
 
 def test_names_outside_an_open_vocabulary_are_to_blame(open_reader):
     reading = open_reader.read("put the big fish into the washing machine")
-    assert reading.meaning.understanding.status is Status.OK
+    assert reading.meaning.status is Status.OK
     assert (reading.fits, reading.suspects) == (False, ("big fish",))
 
 
@@ -59,7 +59,7 @@ def test_plurals_and_adjectives_are_no_other_names(open_reader, text):
 
 
 def test_without_a_vocabulary_every_name_fits(parser):
-    reader = SpeechReader(parser, None, Vocabulary(), "Alice", require_wake=False)
+    reader = Reader(parser, None, Vocabulary(), ("Alice",), require_wake=False)
     assert reader.read("put the tuba into the wardrobe").fits
 
 

@@ -8,7 +8,7 @@ from made_speech import LoudIsSpeech, ScriptedRecogniser, silence, speech_like, 
 
 from executive.language.understand import Status
 from executive.speech.activity import load_detector
-from executive.speech.hearing import SpeechReader, spoken_phrases
+from executive.speech.hearing import Reader, spoken_phrases
 from executive.speech.listener import Listener, follow, microphone_blocks
 from executive.speech.recogniser import vocabulary_of_world
 from executive.speech.sound import RATE_HZ
@@ -21,7 +21,7 @@ GO = "Hey Alice, go to the kitchen."
 def listener_to(flat, parser):
     def made(*texts, detector=LoudIsSpeech):
         words = vocabulary_of_world(flat, called=True)
-        reader = SpeechReader(parser, flat, words, "Alice", require_wake=True)
+        reader = Reader(parser, flat, words, ("Alice",), require_wake=True)
         return Listener(ScriptedRecogniser(list(texts)), detector, reader, spoken_phrases(words))
 
     return made
@@ -125,7 +125,7 @@ BLOCK = RATE_HZ // 10
 def hearings(flat, parser):
     def made(sound, *texts):
         words = vocabulary_of_world(flat, called=True)
-        reader = SpeechReader(parser, flat, words, "Alice", require_wake=True)
+        reader = Reader(parser, flat, words, ("Alice",), require_wake=True)
         listener = Listener(ScriptedRecogniser(list(texts)), LoudIsSpeech, reader, spoken_phrases(words))
         return list(follow((sound[at : at + BLOCK] for at in range(0, len(sound), BLOCK)), listener))
 
@@ -136,7 +136,7 @@ def test_a_sentence_is_finished_soon_after_its_end(hearings):
     heard = hearings(speech_like(1.0, 3.0, 2.0), "Hey Alice, go to the kitchen.")
     (ended,) = [hearing for hearing in heard if hearing.finished]
     assert ended.time_s == pytest.approx(4.8, abs=0.15)
-    assert ended.finished.meant.understanding.status is Status.OK
+    assert ended.finished.meant.status is Status.OK
 
 
 def test_what_is_being_said_is_shown_every_second(hearings):

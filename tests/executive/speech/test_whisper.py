@@ -8,7 +8,7 @@ from made_speech import silence
 
 import executive.speech.recogniser as extra
 from executive.speech.activity import load_detector
-from executive.speech.hearing import SpeechReader, spoken_phrases
+from executive.speech.hearing import Reader, spoken_phrases
 from executive.speech.listener import Listener
 from executive.speech.recogniser import vocabulary_of_world
 from executive.speech.sound import joined, read_wav
@@ -33,7 +33,7 @@ def _no_network(*args, **more):
 @pytest.fixture
 def listener(whisper, flat, parser):
     words = vocabulary_of_world(flat, called=True)
-    reader = SpeechReader(parser, flat, words, "Alice", require_wake=True)
+    reader = Reader(parser, flat, words, ("Alice",), require_wake=True)
     return Listener(whisper, load_detector, reader, spoken_phrases(words))
 
 

@@ -1,12 +1,13 @@
 """Sentences that decide, repeat, wait and go on: the mission of each, and what near misses are refused for."""
 
+from functools import partial
 from pathlib import Path
 
 import pytest
 import yaml
 
 from executive.language.structure.sentence import MOST_NESTED
-from executive.language.understand import Status, understand, understand_asking
+from executive.language.understand import Status, ask_until_clear, understand
 from executive.words.condition import DoorOpen
 from executive.words.yaml_steps import steps_from_yaml, steps_to_yaml
 from tests.executive.language.notation import as_noted, noted
@@ -74,13 +75,8 @@ def test_a_door_that_could_be_several_is_asked_about(meant):
     [("the second one", "staff room"), ("back aisle", "back aisle"), ("staff room", "staff room")],
 )
 def test_the_answer_tells_which_door(parser, worlds, reply, room):
-    answer = understand_asking(
-        "if the kitchen door is open, come back",
-        answer=lambda question: reply,
-        parser=parser,
-        knowledge=worlds["shop"],
-        require_wake=False,
-    )
+    asked = partial(understand, parser=parser, knowledge=worlds["shop"], require_wake=False)
+    answer = ask_until_clear("if the kitchen door is open, come back", asked, lambda question: reply)
     assert answer.steps[0].condition == DoorOpen(door=("kitchen", room))
 
 

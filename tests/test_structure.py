@@ -14,9 +14,9 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2945,
-    "executive/language": 9000,
-    "executive/speech": 1650,
+    "executive/words": 2980,
+    "executive/language": 8770,
+    "executive/speech": 1620,
     "executive/mission": 1934,
     "executive/tree": 8100,
     "executive/run": 3350,

@@ -17,7 +17,7 @@ from executive.app.prepare import Setting, prepare_alone
 from executive.app.prepared import Prepared
 from executive.app.report_file import EndedTree
 from executive.app.robots import PlacedRobot
-from executive.language.robots import Whom
+from executive.language.addressees import Whom
 from executive.language.understand import Part
 from executive.mission.request import Request
 from executive.run.visitor import RunEntry, TickNote

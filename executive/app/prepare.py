@@ -256,7 +256,7 @@ def _for_whom_it_calls(setting: Setting) -> Prepared:
 
 def _part_for_each(part: Part, setting: Setting) -> Iterator[Part]:
     """The part for each robot that it is for. Raises InputError: it is for any of them, and none can do it."""
-    from executive.language.robots import Whom
+    from executive.language.addressees import Whom
 
     if part.robot is Whom.ALL:
         yield from (replace(part, robot=name) for name in setting.robots)

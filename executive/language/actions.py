@@ -27,8 +27,6 @@ from executive.language.roles import HERE, THERE, Location, Roles, read_roles
 from executive.language.tokens import Token
 from executive.words.command import TIME_UNITS_S
 
-__all__ = ["Action", "read_actions"]
-
 
 @dataclass(frozen=True)
 class Action:

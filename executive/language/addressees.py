@@ -15,8 +15,6 @@ from executive.language.questions import RefusalError
 from executive.words.robots import display_name, robot_called
 from skills.files.errors import listing
 
-__all__ = ["Addressees", "Saying", "Who", "Whom", "addressees"]
-
 _NUMBERS: Final = {"two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "both": 2}
 _YOU: Final = frozenset({"you", "yourself"})
 _SOMEBODY: Final = frozenset({"he", "she", "it", "they", "that", "this", "you"})

@@ -9,8 +9,6 @@ from typing import Final
 
 from executive.language.lexicon import Patterns, lexicon
 
-__all__ = ["AMOUNTS", "TimeOfDay", "count_of", "seconds_of", "share_of", "time_of", "times_of"]
-
 
 @cache
 def _number_pattern() -> str:

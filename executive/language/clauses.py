@@ -15,8 +15,6 @@ from executive.language.items import Item
 from executive.language.lexicon import Patterns, lexicon, read_table
 from executive.language.tokens import smoothed
 
-__all__ = ["ACTS", "CLAUSES", "Behind", "Clause", "Cue", "cue_behind", "cut", "split", "text_of", "verb_positions"]
-
 CLAUSES: Final = Patterns("structures.yaml", words=AMOUNTS)
 ACTS: Final = Patterns("structures.yaml", "acts", AMOUNTS)
 

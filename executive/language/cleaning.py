@@ -17,8 +17,6 @@ from typing import Final
 from executive.language.lexicon import Patterns, lexicon, read_table
 from executive.language.spelling import sound_distance
 
-__all__ = ["Address", "addressed_to", "clean", "foreign_reason", "heard_wake", "placeholder", "strip_wake"]
-
 _APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
 _ALLOWED: Final = re.compile(r"[^\w\s,.;:!?'\-]|_")
 _AND: Final = re.compile(r"(?<=\s)[&+](?=\s)")

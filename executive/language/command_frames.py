@@ -15,8 +15,6 @@ from executive.language.roles import HERE, Location
 from executive.words.command import Command, Task
 from skills.api import Thing
 
-__all__ = ["CommandFrame", "command_frames", "spoken_command"]
-
 _GOES_FOR: Final = frozenset({VerbKind.FIND, VerbKind.PICK, VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP})
 
 _FETCHES: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.PICK})

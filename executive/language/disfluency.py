@@ -24,8 +24,6 @@ from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
 
-__all__ = ["repair_disfluencies", "unwanted_things"]
-
 _IT: Final = frozenset({"it", "them"})
 _CONTRAST: Final = "but"
 _WHERE_FROM: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.AT, PrepositionRole.BESIDE})

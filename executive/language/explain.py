@@ -14,8 +14,6 @@ from executive.language.steps import Trace
 from executive.language.tokens import Token
 from executive.words.yaml_steps import steps_to_yaml
 
-__all__ = ["ActionRow", "Explanation", "ThingRow", "TokenRow", "arcs_svg", "explain", "explanation_lines", "tree_lines"]
-
 
 @dataclass(frozen=True)
 class TokenRow:

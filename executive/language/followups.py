@@ -16,17 +16,6 @@ from executive.words.command import Command, Task
 from executive.words.knowledge import Knowledge
 from skills.api import Thing
 
-__all__ = [
-    "Amendment",
-    "FollowUp",
-    "FollowUpKind",
-    "Remark",
-    "amended",
-    "follow_up_of",
-    "remark_of",
-    "without_fetching",
-]
-
 
 class FollowUpKind(enum.Enum):
     """How a sentence goes on from the one before."""

@@ -25,8 +25,6 @@ from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
 from skills.api import Thing
 from skills.files.errors import known_names, listing
 
-__all__ = ["Grounded", "check_unwanted", "ground", "known_line"]
-
 
 @dataclass(frozen=True)
 class Grounded:

@@ -12,19 +12,6 @@ from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.tokens import Token
 
-__all__ = [
-    "OBJECTS",
-    "belongs",
-    "do_we_have",
-    "goes_on",
-    "how_many",
-    "narrated",
-    "needed",
-    "reported_speech",
-    "what_is",
-    "where_is",
-]
-
 _FIND: Final = "find"
 _AT: Final = "at"
 _LOOKED_FOR: Final = frozenset({NounKind.THING, NounKind.PERSON, None})

@@ -15,28 +15,6 @@ from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.tokens import Token
 
-__all__ = [
-    "LONGEST",
-    "Adverb",
-    "Being",
-    "Chunk",
-    "Correction",
-    "Item",
-    "Negation",
-    "Outside",
-    "Predicate",
-    "Row",
-    "Separator",
-    "Unknown",
-    "Verb",
-    "Whether",
-    "command_position",
-    "predicates",
-    "requested",
-    "spoken_words",
-    "without_name",
-]
-
 
 @dataclass(frozen=True)
 class Verb:

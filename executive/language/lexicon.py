@@ -12,8 +12,6 @@ from typing import Any, Final
 
 import yaml
 
-__all__ = ["Lexicon", "Patterns", "PrepositionRole", "VerbKind", "lexicon", "read_table"]
-
 Phrase = tuple[str, ...]
 
 
@@ -140,11 +138,10 @@ def _phrases(texts: Iterable[str]) -> frozenset[Phrase]:
 
 
 @cache
-def read_table(name: str) -> dict[str, Any]:
+def read_table(name: str) -> Any:
     """A table of this package: all that is no list or mapping is text, "on" and "no" among it."""
     text = resources.files(__package__).joinpath("tables", name).read_text(encoding="utf-8")
-    data: dict[str, Any] = yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
-    return data
+    return yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
 
 
 def _kinds(verbs: Mapping[str, Iterable[str]]) -> dict[Phrase, frozenset[VerbKind]]:

@@ -18,8 +18,6 @@ from executive.language.roles import HERE, Location
 from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
 
-__all__ = ["check_feasible", "check_relation", "check_ways_and_speaker", "not_understood", "refuse_harm"]
-
 
 def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | None) -> None:
     """Refuse odd numbers, to carry people, to serve all of a kind, what no hand can hold, and places out of reach.

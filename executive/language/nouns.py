@@ -18,8 +18,6 @@ import numpy.typing as npt
 
 from executive.language.lexicon import read_table
 
-__all__ = ["WEIGHTS_FILE", "FloatArray", "NounKind", "NounKinds", "noun_examples"]
-
 FloatArray = npt.NDArray[np.float64]
 VectorOf = Callable[[str], FloatArray | None]
 

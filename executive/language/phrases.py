@@ -13,8 +13,6 @@ from executive.language.nouns import NounKind
 from executive.language.tokens import Token
 from skills.api import Thing
 
-__all__ = ["Phrase", "noun_phrases"]
-
 _LEFT: Final = frozenset(
     {"det", "amod", "compound", "nummod", "poss", "nmod", "predet", "quantmod", "advmod", "case", "npadvmod", "punct"}
 )

@@ -14,18 +14,6 @@ from typing import Any, Final
 from executive.words.mission import QuestionPolicy
 from skills.files.errors import listing
 
-__all__ = [
-    "ABLE",
-    "Answerer",
-    "ClarifyingQuestion",
-    "RefusalError",
-    "RefusalKind",
-    "Slot",
-    "answer_by",
-    "chosen",
-    "with_answer",
-]
-
 ABLE: Final = "I can fetch, take, put and find things, go to places, wait and charge"
 ALIKE_SOUND: Final = 0.2
 _LONG_WORD: Final = re.compile(r"(\S{40})\S{20,}")

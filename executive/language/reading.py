@@ -40,8 +40,6 @@ from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.tokens import Token
 
-__all__ = ["split_items"]
-
 _SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
 _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
 _HAVING: Final = frozenset({"with", "containing", "holding"})

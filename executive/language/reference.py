@@ -13,9 +13,6 @@ from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
 from executive.language.roles import THERE, Location
 
-__all__ = ["Memory", "Resolved", "ResolvedAction", "resolve"]
-
-
 _SEVERAL: Final = frozenset({"them", "they", "these", "those"})
 
 

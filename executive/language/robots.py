@@ -23,8 +23,6 @@ from executive.words.knowledge import Knowledge
 from executive.words.robots import display_name, robot_called
 from skills.files.errors import listing
 
-__all__ = ["Whom", "understand_for_robots"]
-
 
 def understand_for_robots(
     sentence: str,

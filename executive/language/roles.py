@@ -11,8 +11,6 @@ from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 
-__all__ = ["HERE", "THERE", "Location", "Roles", "read_roles"]
-
 
 @dataclass(frozen=True)
 class Location:

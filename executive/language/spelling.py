@@ -31,19 +31,6 @@ from executive.words.knowledge import Knowledge
 if TYPE_CHECKING:
     from executive.language.parser import DependencyParser
 
-__all__ = [
-    "Alike",
-    "Corrected",
-    "SoundAlikes",
-    "correct_spelling",
-    "look_alikes",
-    "nearest_by_sound",
-    "sound_distance",
-    "sounds_of",
-    "synonyms_of",
-    "words_for",
-]
-
 Costs = npt.NDArray[np.float64]
 
 ALIKE_SOUND: Final = 0.16

@@ -26,8 +26,6 @@ from executive.words.knowledge import Knowledge
 from executive.words.step import Step
 from skills.files.errors import listing
 
-__all__ = ["Steps", "Trace"]
-
 _MOST_WORDS: Final = 60
 _MOST_CHARACTERS: Final = 800
 

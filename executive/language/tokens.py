@@ -1,8 +1,8 @@
 """Words with their place in the sentence and in the tree of dependencies, known names among them.
 
 The tagger has seen few commands: it reads "sink" in "the bathroom sink" and a name in lower case behind "to" as verbs,
-and "look" in "go to the counter look for the bowl" as a noun. Each repair looks at a word and its neighbours, as in
-Brill, "A simple rule-based part of speech tagger" (1992)."""
+and "look" in "go to the counter look for the bowl" as a noun. `repairs.yaml` has rules for a word and its neighbours,
+as in Brill, "A simple rule-based part of speech tagger" (1992)."""
 
 from __future__ import annotations
 
@@ -10,15 +10,13 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Final
+from typing import Any, Final
 
 from executive.language.lexicon import lexicon, read_table
 from executive.language.nouns import NounKind
 from executive.words.command import is_attribute, may_be_attribute
 from executive.words.knowledge import Knowledge
 from skills.detect.words import plural
-
-__all__ = ["NameTable", "Token", "corrected_parse", "name_table", "parse_with_names", "rephrased", "smoothed"]
 
 
 @dataclass(frozen=True)
@@ -54,171 +52,81 @@ class Token:
         return is_attribute(self.text) or (self.pos in ("ADJ", "ADV") and may_be_attribute(self.text))
 
 
-_AFTER_NOUN: Final = frozenset({"", "ADP", "PUNCT", "CCONJ", "INTJ"})
-_BEGINS_OBJECT: Final = frozenset({"DT", "PRP", "PRP$", "CD"})
-_DEMONSTRATIVES: Final = frozenset({"that", "this", "these", "those"})
-_BEFORE_INFINITIVE: Final = frozenset({"want", "need", "like", "love", "have", "try", "wish", "hope", "plan", "ask"})
-_BEFORE_NOUN: Final = frozenset({"det", "amod", "compound", "nmod", "nummod", "poss"})
-
-
 def corrected_parse(tokens: Iterable[Token]) -> tuple[Token, ...]:
     """The words with their repairs, from left to right."""
     found = list(tokens)
     for at in range(1, len(found)):
-        if found[at].word == "no" and _pos(found, at + 1) not in ("NOUN", "ADJ"):
-            found[at] = replace(found[at], pos="INTJ", tag="UH", relation="intj")
-        elif _contracted(found, at):
-            found[at] = replace(found[at], pos="AUX", tag="VBZ", lemma="be", relation="root")
-        elif _particle_within(found, at):
-            found[at] = replace(found[at], relation="compound", head=at + 1)
-        elif _named_thing(found, at) or _container(found, at) or _noun(found, at):
-            _join_noun(found, at)
-        elif _paired(found, at):
-            found[at] = replace(found[at], pos="NOUN", tag="NN", relation="conj", head=at - 2)
-        elif _name(found, at):
-            found[at] = replace(found[at], pos="PROPN", tag="NNP", relation="obl", head=at - 1)
-        elif _goal(found, at) or _department(found, at):
-            found[at] = replace(found[at], pos="NOUN", tag="NN", relation="obl", head=at - 1)
-        elif found[at].pos == "NOUN" and (found[at - 1].tag, found[at - 1].relation) == ("DT", "mark"):
-            found[at - 1] = replace(found[at - 1], relation="det", head=at)
-        elif _place_one(found, at):
-            found[at] = replace(found[at], pos="NUM", tag="CD", relation="nummod", head=at - 1)
-            found[at - 1] = replace(found[at - 1], relation="obl", head=max(at - 2, 0))
-        elif _shown(found, at):
-            _show(found, at)
-        elif _command(found, at):
-            _part_verb(found, at)
+        rule = next((rule for rule in _repairs() if rule.fits(found, at)), None)
+        if rule is not None:
+            rule.apply(found, at)
     return tuple(found)
 
 
-def _contracted(tokens: Sequence[Token], at: int) -> bool:
-    """Whether "'s" is the verb and no possessive: a preposition follows ("Anna's in the hall")."""
-    behind = tokens[at + 1 : at + 2]
-    return tokens[at].tag == "POS" and tokens[at].word == "'s" and bool(behind) and behind[0].tag in ("IN", "VBG")
+@dataclass(frozen=True)
+class _Repair:
+    """What the words around one must be, by their places from it on, and what they become."""
+
+    where: Mapping[int, Mapping[str, re.Pattern[str]]]
+    then: Mapping[int, Mapping[str, str]]
+    joins: tuple[int, ...]
+    only: re.Pattern[str]
+
+    def fits(self, tokens: Sequence[Token], at: int) -> bool:
+        return all(
+            form.fullmatch(_fact(tokens, at + place, name)) is not None
+            for place, facts in self.where.items()
+            for name, form in facts.items()
+        )
+
+    def apply(self, tokens: list[Token], at: int) -> None:
+        for place, become in self.then.items():
+            head: dict[str, Any] = {"head": max(at + int(become["head"]), 0)} if "head" in become else {}
+            tokens[at + place] = replace(tokens[at + place], **{**become, **head})
+        if self.joins:
+            before, now = (at + place for place in self.joins)
+            for n in range(at - 1):
+                if tokens[n].head == before and self.only.fullmatch(tokens[n].relation):
+                    tokens[n] = replace(tokens[n], head=now)
 
 
-def _particle_within(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a particle stands within the name of a thing ("the washing up liquid")."""
-    article = at > 1 and tokens[at - 2].pos == "DET"
-    gerund = article and tokens[at - 1].word.endswith("ing") and tokens[at].tag == "RP"
-    return gerund and _pos(tokens, at + 1) == "NOUN"
+@cache
+def _repairs() -> tuple[_Repair, ...]:
+    return tuple(
+        _Repair(
+            {int(at): {name: re.compile(form) for name, form in facts.items()} for at, facts in rule["where"].items()},
+            {int(at): become for at, become in rule["then"].items()},
+            tuple(map(int, rule.get("joins", ()))),
+            re.compile(rule.get("only", ".*")),
+        )
+        for rule in read_table("repairs.yaml")
+    )
 
 
-def _named_thing(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a word behind an article that was read as an adverb is the noun ("the brolly")."""
-    adverb = tokens[at].tag == "RB" and tokens[at - 1].tag in ("DT", "PRP$")
-    return adverb and _pos(tokens, at + 1) in _AFTER_NOUN
-
-
-def _container(tokens: Sequence[Token], at: int) -> bool:
-    """Whether "can" behind a noun is no auxiliary: no verb and no subject follows ("the trash can")."""
-    can = tokens[at].word == "can" and tokens[at].tag == "MD"
-    alone = _pos(tokens, at - 1) == "NOUN" and _pos(tokens, at + 1) in _AFTER_NOUN
-    return can and (alone or tokens[at - 1].tag in ("DT", "PRP$"))
-
-
-def _noun(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a verb or a name in lower case behind a noun has nothing to do there, and can be a place or a thing."""
-    token = tokens[at]
-    verb = token.pos == "VERB" and token.tag in ("VB", "VBP") and _pos(tokens, at - 1) == "NOUN"
-    past = token.tag in ("VBD", "VBN") and (token.word,) not in lexicon().fillers
-    verb = verb or (past and token.kind is NounKind.PLACE and tokens[at - 1].pos == "NOUN")
-    verb = verb or (token.pos == "PROPN" and token.text.islower() and _pos(tokens, at - 1) == "NOUN")
-    alone = _pos(tokens, at + 1) in _AFTER_NOUN and not _begins_command(tokens, at)
-    return verb and alone and token.kind in (NounKind.PLACE, NounKind.THING)
-
-
-def _paired(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a verb behind a noun and "and" is the second noun of a pair ("a knife and fork")."""
-    token = tokens[at]
-    verb = token.tag in ("VB", "VBP") and token.pos == "VERB" and (token.word,) not in lexicon().verbs
-    pair = at > 1 and tokens[at - 1].word == "and" and tokens[at - 2].kind is NounKind.THING
-    return verb and pair and token.kind is NounKind.THING and _pos(tokens, at + 1) in _AFTER_NOUN
-
-
-def _name(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a verb behind "to" is somebody's name ("bring it to skyler")."""
-    return tokens[at].pos == "VERB" and tokens[at - 1].word == "to" and tokens[at].kind is NounKind.PERSON
-
-
-def _goal(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a verb behind "to" is a place and no infinitive ("proceed to checkpoint four", "run to park")."""
-    behind_to = tokens[at].pos == "VERB" and tokens[at].tag == "VB" and tokens[at - 1].word == "to" and at > 1
-    if not behind_to or tokens[at - 2].lemma in _BEFORE_INFINITIVE or tokens[at - 2].tag in ("WRB", "JJ"):
-        return False
-    numbered = _pos(tokens, at + 1) == "NUM" and _pos(tokens, at + 2) in _AFTER_NOUN
-    good = tokens[at].kind is NounKind.PLACE or (numbered and tokens[at].kind is NounKind.THING)
-    return good and (numbered or _pos(tokens, at + 1) in _AFTER_NOUN) and (tokens[at].word,) not in lexicon().verbs
-
-
-def _department(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a word in "-ing" behind a preposition is a place ("to Angela in accounting")."""
-    token = tokens[at]
-    place = token.tag == "VBG" and token.kind is NounKind.PLACE and _pos(tokens, at - 1) == "ADP"
-    return place and _pos(tokens, at + 1) in _AFTER_NOUN
-
-
-def _shown(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a verb behind "that" is the noun which is pointed at ("hand me that clamp")."""
-    token, that = tokens[at], tokens[at - 1]
-    verb = token.pos == "VERB" and token.tag in ("VB", "VBP", "VBD") and token.kind is NounKind.THING
-    pointed = that.word in _DEMONSTRATIVES and at > 1 and tokens[at - 2].pos in ("VERB", "PRON", "ADP")
-    return verb and pointed and (token.word,) not in lexicon().verbs and _pos(tokens, at + 1) not in ("PRON", "DET")
-
-
-def _place_one(tokens: Sequence[Token], at: int) -> bool:
-    """Whether "one" is the number of a place without article ("room one"), unlike "the kitchen one"."""
-    before = tokens[max(at - 3, 0) : at]
-    bare = tokens[at].word == "one" and not any(t.pos == "DET" or t.relation in ("det", "poss") for t in before)
-    return bare and before[-1].pos in ("NOUN", "PROPN") and before[-1].kind is NounKind.PLACE
-
-
-def _command(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a noun behind a noun is a known verb before its object ("the counter look for the bowl")."""
-    before = tokens[at - 1]
-    noun = before.pos == "NOUN" or (before.pos == "ADJ" and before.kind in (NounKind.PLACE, NounKind.THING))
-    return tokens[at].pos == "NOUN" and noun and not is_attribute(before.text) and _begins_command(tokens, at)
+def _fact(tokens: Sequence[Token], at: int, name: str) -> str:
+    """A field of a word, or the name of what it is when it is that; empty when it is not, and behind the ends."""
+    if not 0 <= at < len(tokens):
+        return ""
+    if name in _IS:
+        return name if _IS[name](tokens, at) else ""
+    kind = tokens[at].kind
+    return getattr(tokens[at], name) if name != "kind" else "" if kind is None else kind.value
 
 
 def _begins_command(tokens: Sequence[Token], at: int) -> bool:
     """Whether a verb that the robot knows, with its particles, and an object stand here."""
     words = tuple(t.word for t in tokens[at : at + 3])
-    lengths = (n for n in range(len(words), 0, -1) if words[:n] in lexicon().verbs)
-    length = next(lengths, None)
+    length = next((n for n in range(len(words), 0, -1) if words[:n] in lexicon().verbs), None)
     behind = tokens[at + length : at + length + 1] if length is not None else []
-    return bool(behind) and behind[0].tag in _BEGINS_OBJECT
+    return bool(behind) and behind[0].tag in ("DT", "PRP", "PRP$", "CD")
 
 
-def _pos(tokens: Sequence[Token], at: int) -> str:
-    return tokens[at].pos if 0 <= at < len(tokens) else ""
-
-
-def _join_noun(tokens: list[Token], at: int) -> None:
-    """Make a word a noun, to which the noun before it and what depends on that belong."""
-    relation = "compound" if tokens[at - 1].pos == "NOUN" else "det"
-    tokens[at - 1] = replace(tokens[at - 1], head=at, relation=relation)
-    tokens[at] = replace(tokens[at], pos="NOUN", tag="NN", relation="obl")
-    for n in range(at - 1):
-        if tokens[n].head == at - 1:
-            tokens[n] = replace(tokens[n], head=at)
-
-
-def _show(tokens: list[Token], at: int) -> None:
-    """Make a word a noun, or a part of the one behind it, and "that" before it its article."""
-    whole = _pos(tokens, at + 1) == "NOUN"
-    head = at + 1 if whole else at
-    tokens[at - 1] = replace(tokens[at - 1], pos="DET", tag="DT", relation="det", head=head)
-    relation, above = ("compound", head) if whole else ("obj", at - 2)
-    tokens[at] = replace(tokens[at], pos="NOUN", tag="NN", relation=relation, head=above)
-
-
-def _part_verb(tokens: list[Token], at: int) -> None:
-    """Make a word a verb, and the noun before it a noun of its own with what stood before both."""
-    tokens[at] = replace(tokens[at], pos="VERB", tag="VB")
-    tokens[at - 1] = replace(tokens[at - 1], pos="NOUN", tag="NN", relation="obl", head=at)
-    for n in range(at - 1):
-        if tokens[n].head == at and tokens[n].relation in _BEFORE_NOUN:
-            tokens[n] = replace(tokens[n], head=at - 1)
+_IS: Final[Mapping[str, Callable[[Sequence[Token], int], bool]]] = {
+    "verb": lambda tokens, at: (tokens[at].word,) in lexicon().verbs,
+    "filler": lambda tokens, at: (tokens[at].word,) in lexicon().fillers,
+    "attribute": lambda tokens, at: is_attribute(tokens[at].text),
+    "lower": lambda tokens, at: tokens[at].text.islower(),
+    "command": _begins_command,
+}
 
 
 THING: Final = "cup"

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from executive.language.addressees import Whom
     from executive.language.clauses import Clause
 
-__all__ = ["Part", "Status", "Understanding", "ask_until_clear", "meaning", "understand"]
-
 
 class Status(enum.Enum):
     """How understanding a sentence ended."""

@@ -12,8 +12,6 @@ import numpy as np
 from executive.speech.recogniser import speech_module
 from executive.speech.sound import RATE_HZ, Samples, joined
 
-__all__ = ["FRAME", "Endpointer", "PauseRules", "SileroDetector", "SpeechDetector", "Utterance", "load_detector"]
-
 FRAME: Final = 512
 """Samples of one frame: 32 ms."""
 _FRAME_S: Final = FRAME / RATE_HZ

@@ -26,8 +26,6 @@ import numpy.typing as npt
 
 from skills.files.errors import InputError
 
-__all__ = ["Adapter", "LowRank", "ModelFile", "packaged_adapter", "read_adapter", "read_model_file"]
-
 Matrix = npt.NDArray[np.float16]
 
 _UP, _DOWN, _BASE = ".up", ".down", "base"

@@ -20,8 +20,6 @@ from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
 from skills.files.errors import InputError
 
-__all__ = ["Reader", "refuse_alike", "spoken_phrases"]
-
 _GREETINGS: Final = ("Hey", "Hi", "OK")
 _EVERYBODY: Final = ("everyone", "everybody")
 _ARTICLES: Final = ("the", "a", "an", "my", "from the", "to the", "on the", "in the")

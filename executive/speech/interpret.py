@@ -20,8 +20,6 @@ from executive.language.spelling import Alike, SoundAlikes
 from executive.speech.recogniser import Recognition, Transcript
 from executive.words.command import is_attribute
 
-__all__ = ["Candidate", "Interpretation", "Reading", "corrections", "interpret", "opening_as_heard"]
-
 Meaning = TypeVar("Meaning")
 
 

@@ -21,8 +21,6 @@ from executive.speech.sound import RATE_HZ, Loudness, Samples, joined, level_db,
 from executive.words.command import Command
 from skills.files.errors import InputError
 
-__all__ = ["HeardUtterance", "Hearing", "Listener", "Recording", "follow", "microphone_blocks", "together"]
-
 NOBODY_SPOKE: Final = "nobody is heard to speak"
 SILENT: Final = "the recording is silent"
 CLIPPED: Final = "the recording is clipped (too loud for its scale): words may be lost"

@@ -15,16 +15,6 @@ from executive.words.knowledge import Knowledge
 from skills.files.errors import InputError
 from skills.files.outside import read_text
 
-__all__ = [
-    "Recogniser",
-    "Recognition",
-    "Transcript",
-    "Vocabulary",
-    "read_vocabulary",
-    "speech_module",
-    "vocabulary_of_world",
-]
-
 
 @dataclass(frozen=True)
 class Transcript:

@@ -18,8 +18,6 @@ from skills.files.outside import plain_file
 if TYPE_CHECKING:
     from soundfile import SoundFile
 
-__all__ = ["RATE_HZ", "Loudness", "Samples", "joined", "level_db", "read_wav"]
-
 Samples = npt.NDArray[np.float32]
 """Sound of one channel at RATE_HZ; full scale is -1 to 1."""
 

@@ -11,8 +11,6 @@ from typing import Final, Protocol
 
 from skills.files.errors import InputError
 
-__all__ = ["EspeakVoice", "QueuedVoice", "Silence", "Voice", "installed_voice", "queued_voice"]
-
 
 class Voice(Protocol):
     """Says something aloud. It never fails and never waits for the end."""

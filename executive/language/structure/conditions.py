@@ -19,8 +19,6 @@ from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, Do
 from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
 
-__all__ = ["button_condition", "door_condition", "meeting", "suppose", "usual_condition"]
-
 
 def suppose(text: str, state: State, reader: PlainReader) -> Supposed:
     """The condition that `text` tells. Raises RefusalError: it tells none that can be looked at or read."""

@@ -23,19 +23,6 @@ from executive.words.geometry import inside
 from executive.words.knowledge import Knowledge
 from skills.api import Thing
 
-__all__ = [
-    "IT",
-    "PlainReader",
-    "PlainReading",
-    "State",
-    "Supposed",
-    "at_start",
-    "behind_preposition",
-    "contrary",
-    "phrase_of_name",
-    "verb",
-]
-
 _LEFT_OUT: Final = frozenset({"not", "n't", "but", "except", "instead", "rather", "neither", "nor"})
 SEES: Final = "I can see whether something or somebody is somewhere"
 

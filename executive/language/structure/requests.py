@@ -31,25 +31,6 @@ from executive.words.step import Step
 from executive.words.steps import Steps
 from skills.files.errors import listing
 
-__all__ = [
-    "Asked",
-    "Done",
-    "Listener",
-    "Said",
-    "charging_in",
-    "for_everyone",
-    "question_in",
-    "search_everywhere",
-    "search_for",
-    "serves_all",
-    "speech_in",
-    "speech_to",
-    "template",
-    "wait",
-    "wait_in",
-    "without_article",
-]
-
 _WAITING: Final = Patterns("structures.yaml", "waiting", AMOUNTS)
 
 Done = tuple[Steps, State, tuple[str, ...]]

@@ -44,8 +44,6 @@ from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Repeat, Steps, Together, Try
 from skills.files.schema_errors import first_error
 
-__all__ = ["structured"]
-
 
 class Builder(Branches):
     """Puts the steps of one sentence together. Its methods raise RefusalError."""

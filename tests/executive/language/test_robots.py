@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from executive.language.robots import Whom, understand_for_robots
+from executive.language.addressees import Whom
+from executive.language.robots import understand_for_robots
 from executive.language.understand import Status, understand
 
 ROBOTS = ("alice", "bob")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any, Final
+from typing import Final
 
 from executive.language.actions import Action
 from executive.language.items import Chunk, Outside, Predicate, Verb, spoken_words
@@ -234,7 +234,7 @@ def check_ways_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Actio
     """Refuse a way that is to be taken, and relations to the speaker but "to me". Raises RefusalError."""
     for action in actions:
         for place in action.ways:
-            if place.phrase is None or place.phrase.head.lemma not in _relations()["doors"]:
+            if place.phrase is None or place.phrase.head.lemma not in read_table("relations.yaml")["doors"]:
                 raise _refused("go", place.preposition, place.name)
     for clause in clauses:
         act = "go" if isinstance(clause.verb, Verb) and clause.verb.kinds == _GO else "bring"
@@ -251,7 +251,11 @@ def check_relation(act: str, kinds: Sequence[str], location: Location) -> None:
     name = location.phrase
     if name is None:
         return
-    groups = _ON_TOP if "surface" in kinds and name.head.lemma.split()[-1] in _relations()["open_tops"] else ()
+    groups = (
+        _ON_TOP
+        if "surface" in kinds and name.head.lemma.split()[-1] in read_table("relations.yaml")["open_tops"]
+        else ()
+    )
     on_top = any(_in(group, location.preposition) for group in groups)
     if not (on_top or any(_keeps(act, kind, location.preposition) for kind in kinds)):
         raise _refused(act, location.preposition, name.spoken)
@@ -262,17 +266,12 @@ def check_relation(act: str, kinds: Sequence[str], location: Location) -> None:
 
 def _refused(act: str, preposition: str, name: str) -> RefusalError:
     said = f"{preposition} {name}".strip()
-    return RefusalError(f"{_relations()['instead'][act]}, not {said!r}", [said])
+    return RefusalError(f"{read_table('relations.yaml')['instead'][act]}, not {said!r}", [said])
 
 
 def _keeps(act: str, kind: str, preposition: str) -> bool:
-    return any(_in(group, preposition) for group in _relations()["kept"][act][kind])
+    return any(_in(group, preposition) for group in read_table("relations.yaml")["kept"][act][kind])
 
 
 def _in(group: str, preposition: str) -> bool:
-    return preposition in _relations()["groups"][group]
-
-
-@cache
-def _relations() -> Mapping[str, Any]:
-    return read_table("relations.yaml")
+    return preposition in read_table("relations.yaml")["groups"][group]

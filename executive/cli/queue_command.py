@@ -224,7 +224,7 @@ def serve(
     as_json: AS_JSON = False,
 ) -> None:
     """Wait for triggers and run what is queued, until Ctrl-C: at times, on a full battery, calls and messages."""
-    from executive.app.listeners import CallAddress, Listeners
+    from executive.app.queue_server import CallAddress, Listeners
     from executive.app.runs import MissionRuns, QueueServer, resumable_line
     from executive.cli.screen import ConsoleScreen
 

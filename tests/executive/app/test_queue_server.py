@@ -7,9 +7,9 @@ import threading
 
 import pytest
 
-from executive.app import listeners as listeners_module
-from executive.app.listeners import CallAddress, CallToken, Listeners, TriggerCalls, call_token
+from executive.app import queue_server as listeners_module
 from executive.app.prepare import prepare
+from executive.app.queue_server import CallAddress, CallToken, Listeners, TriggerCalls, call_token
 from executive.mission.request import Request
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing import MOST_WAITING, StandingMissions
@@ -339,7 +339,7 @@ def test_a_message_that_cannot_be_used_is_told_and_raises_nothing(calls, stand, 
     stand("topic mqtt:home/door")
     calls.heard("mqtt", "home/door", b"open!")
     calls.heard("mqtt", "elsewhere", b"")
-    monkeypatch.setattr("executive.app.listeners.values_in_json", lambda text: 1 / 0)
+    monkeypatch.setattr("executive.app.queue_server.values_in_json", lambda text: 1 / 0)
     calls.heard("mqtt", "home/door", b"")
     assert [line.split(";")[0] for line in lines] == [
         "topic mqtt:home/door: the values are no JSON object",

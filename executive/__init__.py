@@ -74,12 +74,12 @@ def run_mission(request: Request, *, control: Control | None = None) -> RunRepor
         InputError: it is not understood, or what `check` finds speaks against it.
     """
     from executive.app.feasibility import refuse_impossible
+    from executive.app.mission_run import run_request
     from executive.app.prepare import prepare
-    from executive.app.simulated import run_simulated
 
     prepared = prepare(request)
     refuse_impossible(prepared)
-    return run_simulated(prepared, control=control).report
+    return run_request(prepared, control=control).report
 
 
 def evaluate(scenario: Path, *, out: Path, jobs: int = 2) -> Sequence[Case]:

@@ -3,20 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from executive.app.artifacts import Artifacts
-from executive.app.durable import Durable
 from executive.app.report import RefereeReport
 from executive.record.profile import Profile
 from executive.run.outcome import RobotResult
 from executive.run.visitor import RunEntry
+from executive.store.journal import StoreJournal
 from executive.tree.compiler import CompiledTree
-from skills.robot import Clock
+from skills.robot import Clock, Pose2D
 
 if TYPE_CHECKING:
     from executive.app.goal_conditions import Share
+
+
+@dataclass(frozen=True)
+class Durable:
+    """What a run needs to be taken up later, or to take up an earlier one.
+
+    `plant` is the name of the file in which the plant keeps its state for the mission `label`. With `take_up` it
+    begins from what was kept for `take_up_label` (None: for any). `journals` are those of the robots by their names,
+    `poses` where each last believed to be.
+    """
+
+    plant: Path
+    journals: Mapping[str, StoreJournal]
+    label: str
+    take_up: bool = False
+    take_up_label: str | None = None
+    poses: Mapping[str, Pose2D] = field(default_factory=dict)
+    log: str = "log.mcap"
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What could not be kept."""
+        return tuple(dict.fromkeys(trouble for each in self.journals.values() for trouble in each.troubles))
 
 
 class Scene(Protocol):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -17,7 +18,7 @@ from executive.app.fleet import (
     missions_json,
     missions_message,
 )
-from executive.app.mission_run import open_log, run_watched
+from executive.app.mission_run import log_map, run_watched
 from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.report import VERDICTS
@@ -26,6 +27,7 @@ from executive.app.robots import placed_robots
 from executive.app.signals import ended_by_signals
 from executive.app.simulated import SimulatedBackend, compile_first
 from executive.app.worlds import knowledge_of, open_world
+from executive.record.event_log import EventLog
 from executive.record.reader import Event, read_events
 from executive.run.visitor import RunSettings
 from executive.store.given import GivenMissions
@@ -56,8 +58,12 @@ def run_fleet(
     """
     backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
     limit_s = TIME_LIMIT_S * max(1, len(dispatch.missions)) if time_limit_s is None else time_limit_s
-    with open_log(out / "log.mcap", backend, first, page, apart=True) as log:
+    with closing(EventLog(out / "log.mcap", backend.clock, apart=True)) as log:
         dispatch.log = log
+        if page is not None:
+            page.serve(log, backend.show_live())
+        if first is not None:
+            log_map(log, first.world, first.knowledge)
         with ended_by_signals(dispatch.stop):
             result = run_watched(
                 dispatch,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import ctypes
 import gc
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -14,19 +14,20 @@ from typing import Any, Final
 from py_trees.behaviour import Behaviour
 
 from executive.app.artifacts import Artifacts, draw_answer
-from executive.app.backend import Backend
-from executive.app.durable import Durable, mission_events
+from executive.app.backend import Backend, Durable
 from executive.app.goal_conditions import Share
-from executive.app.page_view import PageView, log_map
+from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.report import RefereeReport, RobotReport, RunReport
 from executive.app.report_file import EndedTree, with_findings, write_report
 from executive.app.signals import cancelled_by_signals
+from executive.app.simulated import SimulatedBackend, compile_first
 from executive.mission.request import Request
-from executive.record.announce import announce
+from executive.record.announce import announce, map_message
 from executive.record.event_log import EventLog
 from executive.record.profile import Profile
-from executive.record.schemas import CONTROL, WORK
+from executive.record.reader import Event, read_events
+from executive.record.schemas import CONTROL, MAP, RUN, WORK
 from executive.record.work import CountedDetector
 from executive.run.control import Control
 from executive.run.outcome import RobotResult, RunResult
@@ -37,14 +38,31 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.context import RunContext
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.nodes.skill import ERROR_TOPIC, SkillLeaf
+from executive.words.knowledge import Knowledge
+from plant.worlds.world import World
 from skills.api import PlanningError, Publish, Worker
+from skills.estimate.grid_map import load_grid_map
 from skills.faults.faulty_robot import FaultyRobot, with_faults
 from skills.faults.words import Fault, parse_fault
+from skills.files.errors import InputError
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path
 from skills.robot import Pose2D, Robot
 
-__all__ = ["Finished", "entry_for", "open_log", "return_memory", "robot_report", "run_request", "run_watched"]
+__all__ = [
+    "Finished",
+    "entry_for",
+    "log_map",
+    "log_name",
+    "mission_events",
+    "return_memory",
+    "robot_report",
+    "run_request",
+    "run_watched",
+    "spoken_classes",
+]
+
+_MOST_STARTS: Final = 1000
 
 
 @dataclass(frozen=True)
@@ -57,7 +75,7 @@ class Finished:
 
 def run_request(
     prepared: Prepared,
-    backend: Backend,
+    backend: Backend | None = None,
     *,
     visitors: Sequence[RunVisitor] = (),
     control: Control | None = None,
@@ -67,35 +85,44 @@ def run_request(
 ) -> Finished:
     """Run a request on a backend and write log, tree, report and what that has recorded into its folder.
 
-    The log and the other `visitors` watch it; through `control` the run is held, cancelled, and so on; `page` shows it;
-    with `durable` another process can take it up, or this one takes up another's; `profile` times the subsystems.
-    Raises InputError when the world cannot be used.
+    Without a backend it runs in the plant. The log and the other `visitors` watch it; through `control` the run is
+    held, cancelled, and so on; `page` shows it; with `durable` another process can take it up, or this one takes up
+    another's; `profile` times the subsystems. Raises InputError when the world cannot be used.
     """
-    out, clock = prepared.request.out, backend.clock
-    scenario = prepared.request.scenario
+    request, scenario, settings = prepared.request, prepared.request.scenario, _settings(prepared.request)
+    out, world, kinds = request.out, prepared.world, {name: robot.kind for name, robot in prepared.robots.items()}
+    backend = backend or _in_the_plant(prepared)
     entries = [entry_for(each, backend, durable) for each in prepared.all]
-    spare = _spare(prepared, backend)
+    idle = kinds.keys() - {entry.tree.robot_name for entry in entries}
+    spare = [backend.entry(replace(prepared.tree, robot_name=name), None) for name in kinds if name in idle]
     path, artifacts = out / ("log.mcap" if durable is None else durable.log), Artifacts()
-    with open_log(path, backend, prepared, page, apart=prepared.several) as log:
-        world, seed = prepared.world.name, prepared.request.seed
-        kinds = {name: robot.kind for name, robot in prepared.robots.items()} if prepared.several else {}
+    with closing(EventLog(path, backend.clock, apart=prepared.several)) as log:
+        if page is not None:
+            page.serve(log, backend.show_live())
+        log_map(log, world, prepared.knowledge)
         for each in prepared.all:
-            lines = scenario.lines()
-            announce(log, clock, each.tree, each.knowledge, world=world, seed=seed, scenario=lines, robots=kinds)
+            announce(
+                log,
+                backend.clock,
+                each.tree,
+                each.knowledge,
+                world=world.name,
+                seed=request.seed,
+                scenario=scenario.lines(),
+                robots=kinds if prepared.several else {},
+            )
         journals = () if durable is None else durable.journals.values()
         watching = [artifacts, log, *journals, *visitors, *([] if page is None else [page])]
         if scenario:
             watching.append(DisturbanceLog(log, entries[0].robot, backend.happened))
         if profile is not None:
             watching.append(RunProfile(profile, backend, (artifacts, log), journals))
-        result = run_watched(
-            entries, backend, watching, settings=_settings(prepared.request), control=control, spare=spare
-        )
+        result = run_watched(entries, backend, watching, settings=settings, control=control, spare=spare)
         if durable is not None:
             _keep(durable, log, prepared.tree.robot_name)
         counts = dict(sorted(Counter({**result.work, **backend.work(), "bytes_logged": log.bytes}).items()))
         log(WORK, counts)
-    events = mission_events(log.path)
+    events = mission_events(path)
     artifacts.recall(events)
     finished, ended = _judged(prepared, backend, result, log)
     report = with_findings(replace(finished.report, work=counts), prepared.knowledge, result, artifacts, events)
@@ -107,20 +134,30 @@ def run_request(
     return replace(finished, report=report)
 
 
-@contextmanager
-def open_log(
-    path: Path, backend: Backend, first: Prepared | None, page: PageView | None, *, apart: bool
-) -> Iterator[EventLog]:
-    """The log of a run, which a page serves from its beginning, and which begins with the map that `first` knows."""
-    log = EventLog(path, backend.clock, apart=apart)
-    try:
-        if page is not None:
-            page.serve(log, backend.show_live())
-        if first is not None:
-            log_map(log, first)
-        yield log
-    finally:
-        log.close()
+def _in_the_plant(prepared: Prepared) -> Backend:
+    """The plant of a request's world."""
+    compile_first()
+    request = prepared.request
+    return SimulatedBackend(
+        prepared.world,
+        prepared.robots,
+        seed=request.seed,
+        record=request.record,
+        variation=request.variation,
+        spared=spoken_classes(prepared),
+    )
+
+
+def spoken_classes(prepared: Prepared) -> frozenset[str]:
+    """The classes of the objects that a mission speaks of; clutter is of none of them."""
+    named = {each.name for command in prepared.tree.commands for each in (command.item, command.object) if each}
+    known = prepared.knowledge
+    return frozenset(one for name in named for one in known.classes(known.thing(name) or name))
+
+
+def log_map(log: EventLog, world: World, knowledge: Knowledge) -> None:
+    """Write the map into the log, so that the log stands alone."""
+    log(MAP, map_message(load_grid_map(world.scan_map_path), knowledge, world=world.name))
 
 
 def run_watched(
@@ -158,13 +195,6 @@ def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> 
     )
 
 
-def _spare(prepared: Prepared, backend: Backend) -> Sequence[RunEntry]:
-    """The robots of a request that have nothing to do in it."""
-    busy = {each.tree.robot_name for each in prepared.all}
-    names = [name for name in prepared.robots if name not in busy]
-    return [backend.entry(replace(prepared.tree, robot_name=name), None) for name in names]
-
-
 def _settings(request: Request) -> RunSettings:
     """The settings of a run: seed, time of day, and time limit."""
     usual = RunSettings(seed=request.seed)
@@ -184,6 +214,31 @@ def _keep(durable: Durable, log: EventLog, robot_name: str) -> None:
     next(iter(durable.journals.values())).keep_world()
     for trouble in durable.troubles:
         log(ERROR_TOPIC, {"node": robot_name, "what": "keep the mission's state", "traceback": trouble})
+
+
+def log_name(start: int) -> str:
+    """The name of the log of a mission's first start, second start, and so on."""
+    return "log.mcap" if start == 1 else f"log-{start}.mcap"
+
+
+def mission_events(log: Path) -> tuple[Event, ...]:
+    """The events of a log, after those of the earlier starts of the mission, as far as their logs can still be read.
+
+    Raises InputError: the log itself cannot be read.
+    """
+
+    def facts(events: Sequence[Event]) -> object:
+        """What a log says at its beginning: the commands, the world, the seed."""
+        return next((event.data for event in events if event.topic == RUN), None)
+
+    events, before = read_events(log), list[Event]()
+    for name in (log_name(start) for start in range(1, _MOST_STARTS)):
+        if name == log.name:
+            break
+        with suppress(InputError):
+            earlier = read_events(log.with_name(name))
+            before += earlier if facts(earlier) == facts(events) else ()
+    return (*before, *events)
 
 
 def _judged(

@@ -16,16 +16,13 @@ from executive.app.talk import Talk, load_ahead
 from executive.conversation import ReplyKind
 from executive.mission.parameters import given_values
 from executive.mission.request import Request
-from executive.record.announce import map_message
 from executive.record.event_log import EventLog
-from executive.record.schemas import MAP
 from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
 from executive.store.missions import MissionStore
 from executive.view.actions import Action, RefusedError, asked_json, control_actions, robot_of, text_of
 from executive.view.feed import Feed
 from executive.view.watch import ControlWatch, ProgressWatch
-from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -161,9 +158,3 @@ def scene_actions(scene: Scene) -> Mapping[str, Action]:
         return "the camera follows the robot" if wanted else "the camera shows the whole world"
 
     return {"ease": ease, "follow": follow}
-
-
-def log_map(log: EventLog, prepared: Prepared) -> None:
-    """Write the map into the log, so that the log stands alone."""
-    grid = load_grid_map(prepared.world.scan_map_path)
-    log(MAP, map_message(grid, prepared.knowledge, world=prepared.world.name))

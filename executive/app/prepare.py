@@ -9,7 +9,7 @@ from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
 
 from executive.app.mission_files import mission_file
-from executive.app.prepared import Prepared, compiled_request, together
+from executive.app.prepared import Prepared, together
 from executive.app.robots import PlacedRobot, knowledge_for, only_robot, placed_robots
 from executive.app.worlds import knowledge_of, open_world, refuse_blocked, with_map
 from executive.language.parser import load_parser
@@ -164,7 +164,7 @@ class Setting:
         name, robots = mission.robot_name, self.robots
         if not robots:
             robots = {name: only_robot(name, world, start=request.start, stack=request.stack, seed=request.seed)}
-        return Prepared(compiled_request(request, tree), mission, world, self.knowledge, tree, robots, meant)
+        return Prepared(request, mission, world, self.knowledge, tree, robots, meant).with_tree(tree)
 
 
 def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:

@@ -20,7 +20,7 @@ from skills.robot import Pose2D
 if TYPE_CHECKING:
     from executive.language.understand import Understanding
 
-__all__ = ["Prepared", "compiled_request", "together"]
+__all__ = ["Prepared", "together"]
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,14 @@ class Prepared:
     def with_mission(self, mission: Mission) -> Prepared:
         """Another mission in the place of the robot's own. Raises InputError: it cannot be carried out."""
         tree = compile_mission(mission, knowledge=self.knowledge, registry=installed_skills())
-        request = compiled_request(self.request, tree)
-        return replace(self, request=request, mission=mission, tree=tree, meant=None)
+        return replace(self, mission=mission, meant=None).with_tree(tree)
+
+    def with_tree(self, tree: CompiledTree) -> Prepared:
+        """With a tree: the request gets its name and commands, and a fingerprint that trees of equal nodes share."""
+        nodes = "\n".join(f"{node.kind} {node.path_id}" for node in tree.root.walk())
+        fingerprint = hashlib.sha256(nodes.encode()).hexdigest()[:16]
+        named = replace(self.request, name=tree.mission_name, commands=lines_of_steps(tree.steps), fingerprint=fingerprint)
+        return replace(self, request=named, tree=tree)
 
     @property
     def several(self) -> bool:
@@ -72,15 +78,3 @@ def together(every: Sequence[Prepared]) -> Prepared:
     commands = tuple(command for each in every for command in each.request.commands)
     prints = "+".join(each.request.fingerprint for each in every)
     return replace(every[0], request=replace(first, commands=commands, fingerprint=prints), others=tuple(every[1:]))
-
-
-def compiled_request(request: Request, tree: CompiledTree) -> Request:
-    """The request with the name, the commands and the fingerprint of its tree."""
-    commands = lines_of_steps(tree.steps)
-    return replace(request, name=tree.mission_name, commands=commands, fingerprint=_fingerprint(tree))
-
-
-def _fingerprint(tree: CompiledTree) -> str:
-    """Equal for trees of the same nodes."""
-    nodes = "\n".join(f"{node.kind} {node.path_id}" for node in tree.root.walk())
-    return hashlib.sha256(nodes.encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""What a server of the queue listens to besides the clock: HTTP calls, and the messages that plug-ins hear.
+"""The server of a queue: it runs what is queued, and listens to the clock, HTTP calls and messages of plug-ins.
 
 A port is open, and a plug-in started, only while a standing mission waits for it.
 """
@@ -10,18 +10,20 @@ import re
 import secrets
 import stat
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from executive.app.feasibility import refuse_impossible
 from executive.app.prepare import prepare
+from executive.app.runs import Ended, Runner, broken_off, next_queued, run_in_turn
 from executive.mission.parameters import values_in_json
 from executive.mission.request import Request
 from executive.store.database import STORE_FILE
-from executive.store.missions import MissionStore, StoredMission
+from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.standing import StandingMission, StandingMissions, TooManyError
 from executive.store.trigger_source import TriggerSource, trigger_source
 from executive.store.triggers import OnCall, OnTopic, Trigger
@@ -30,12 +32,120 @@ from executive.view.calls import CallError, CallServer
 from skills.files.errors import InputError
 from skills.files.plugins import PluginDefect, run_in_thread
 
-__all__ = ["CallAddress", "CallToken", "Listeners", "TriggerCalls", "call_token"]
+__all__ = [
+    "MOST_STARTS",
+    "CallAddress",
+    "CallToken",
+    "Listeners",
+    "QueueServer",
+    "TriggerCalls",
+    "Waiting",
+    "call_token",
+]
 
 LIMIT_S: Final = 10.0
 """A plug-in may take so long to start, and to stop."""
 _SEE: Final = "see the documentation of that package"
 _HOST: Final = re.compile(r"[A-Za-z0-9.:%_-]{1,253}")
+
+
+MOST_STARTS: Final = 3
+"""A mission that has been started so often is not taken up by itself: what ends the process would end it for ever."""
+
+
+class Waiting(Protocol):
+    """Waits for the next thing to do; `executive.store.wakeup.WakeupPipe` is one."""
+
+    def wait(self, until: datetime | None) -> None:
+        """Block until somebody calls `wake` or, at the latest, a moment comes."""
+
+    def wake(self) -> None:
+        """End the wait, from any thread or signal handler."""
+
+
+class QueueServer:
+    """Serves one store, which this process has claimed.
+
+    When it is stopped while a mission runs, that is cancelled, and `errand resume` goes on with it. What is queued
+    stays queued.
+    """
+
+    def __init__(
+        self,
+        missions: MissionStore,
+        standing: StandingMissions,
+        waiting: Waiting,
+        runner: Runner,
+        *,
+        follow: Callable[[Iterable[Trigger]], None],
+        tell: Callable[[str], None],
+    ) -> None:
+        """`follow` has the other listeners hear what the standing missions wait for; `tell` shows a line."""
+        self._missions, self._standing, self._waiting, self._runner = missions, standing, waiting, runner
+        self._follow, self._tell = follow, tell
+        self._refused = ""
+        self.stopped: str | None = None
+
+    def stop(self, reason: str) -> None:
+        """Serve no longer; from any thread and from signal handlers."""
+        self.stopped = self.stopped or reason
+        self._runner.cancel(reason)
+        self._waiting.wake()
+
+    def serve(self, *, end: datetime | None = None, until_idle: bool = False) -> list[Ended]:
+        """Serve until it is stopped, until a moment (no mission begins after it), or until nothing is queued.
+
+        Raises:
+            InputError: a listener cannot be opened at the beginning, or the store cannot be used any more.
+        """
+        serving_since = self._missions.now()
+        self._follow(each.trigger for each in self._standing.missions())
+        broken = self._missions.missions(MissionState.RUNNING)
+        left = next((each for each in broken if not each.queued), None)
+        if left is not None:
+            raise broken_off(self._missions, left)
+        aside = [
+            self._runner.set_aside(each, f"it was started {each.starts} times and broken off")
+            for each in broken
+            if each.starts >= MOST_STARTS
+        ]
+        again = [each for each in broken if each.starts < MOST_STARTS]
+        coming = self._next_missions(again, serving_since, end=end, until_idle=until_idle)
+        return [*aside, *run_in_turn(coming, self._runner, until_cancelled=False)]
+
+    def _next_missions(
+        self, again: Sequence[StoredMission], serving_since: datetime, *, end: datetime | None, until_idle: bool
+    ) -> Iterator[StoredMission]:
+        """The missions that go on `again`, and then those that are queued, or that triggers queue."""
+        now = self._missions.now
+        for each in again:
+            if self.stopped is None:
+                yield each
+        waiting_since = now() if again else serving_since
+        while self.stopped is None:
+            self._follow_again()
+            fired = self._standing.fire_due(waiting_since=waiting_since, serving_since=serving_since)
+            for each in fired:
+                self._tell(f"Mission {each.id} is queued: {each.request.name} ({each.why})")
+            if end is not None and now() >= end:
+                return
+            mission = next_queued(self._missions)
+            if mission is not None:
+                yield mission
+                waiting_since = now()
+            elif until_idle:
+                return
+            else:
+                self._waiting.wait(min(filter(None, (self._standing.due_next(), end)), default=None))
+
+    def _follow_again(self) -> None:
+        """Standing missions may have come or gone. What cannot be listened to is told once; the rest goes on."""
+        try:
+            self._follow(each.trigger for each in self._standing.missions())
+        except InputError as error:
+            if str(error) != self._refused:
+                self._tell(f"errand: {error}")
+            self._refused = str(error)
 
 
 @dataclass(frozen=True)

@@ -3,48 +3,57 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, replace
-from datetime import datetime
-from functools import partial
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from executive.app.durable import Durable, new_run, next_run, plant_file, same_world, take_up
-from executive.app.mission_run import Finished, return_memory
-from executive.app.prepare import prepare
+from executive.app.backend import Durable
+from executive.app.mission_run import Finished, log_name, return_memory, run_request
+from executive.app.page_view import PageView
+from executive.app.prepare import Setting, prepare
 from executive.app.prepared import Prepared
 from executive.app.report import RunReport
 from executive.app.signals import HUNG_UP
-from executive.app.simulated import run_simulated
 from executive.language.questions import Answerer
+from executive.record.profile import Profile
 from executive.run.control import Control
+from executive.run.visitor import RunVisitor
 from executive.store.database import STORE_FILE, StoreError
+from executive.store.journal import StoreJournal
+from executive.store.memory import Recollection
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.store.standing import StandingMissions
-from executive.store.triggers import Trigger
+from executive.store.resuming import ended_tree, resumed_tree
 from executive.words.slug import slug
 from skills.files.errors import InputError, disk_is_full
 
 __all__ = [
-    "MOST_STARTS",
     "Ended",
     "MissionRuns",
-    "QueueServer",
     "Runner",
     "Screen",
-    "Waiting",
+    "Watching",
     "broken_off",
+    "new_run",
+    "next_queued",
     "note_run",
     "queued_missions",
     "resumable_line",
     "run_in_turn",
 ]
 
-MOST_STARTS: Final = 3
-"""A mission that has been started so often is not taken up by itself: what ends the process would end it for ever."""
 _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCELLED, MissionState.ERROR)
+
+
+@dataclass(frozen=True)
+class Watching:
+    """What controls a run and who watches it, as `run_request` takes them."""
+
+    control: Control
+    visitors: Sequence[RunVisitor] = ()
+    page: PageView | None = None
+    profile: Profile | None = None
 
 
 class Screen(Protocol):
@@ -53,11 +62,11 @@ class Screen(Protocol):
     def tell(self, line: str, *, title: bool = False) -> None:
         """Show a line."""
 
-    def control(self, prepared: Prepared) -> Control:
-        """The control of the next run, before it is shown."""
+    def watching(self, prepared: Prepared) -> AbstractContextManager[Watching]:
+        """Show a run from before its beginning to its end."""
 
-    def show(self, prepared: Prepared, control: Control, start: Callable[..., Finished]) -> Finished:
-        """Show a run, which `start` begins with this control and those who watch it."""
+    def conclude(self, finished: Finished) -> None:
+        """Show how a run ended."""
 
     def name_files(self, out: Path) -> None:
         """Name what a run has left in its folder."""
@@ -123,11 +132,12 @@ def queued_missions(missions: MissionStore) -> Iterator[StoredMission]:
     broken = missions.missions(MissionState.RUNNING)
     if broken:
         raise broken_off(missions, broken[-1])
-    while (mission := _next_queued(missions)) is not None:
+    while (mission := next_queued(missions)) is not None:
         yield mission
 
 
-def _next_queued(missions: MissionStore) -> StoredMission | None:
+def next_queued(missions: MissionStore) -> StoredMission | None:
+    """The mission whose turn it is."""
     return next((each for each in missions.missions(MissionState.QUEUED) if each.queued), None)
 
 
@@ -145,21 +155,10 @@ class MissionRuns:
         ask: Answerer | None = None,
         run: Callable[..., Finished] | None = None,
     ) -> None:
-        """`ask` is who is asked what a file leaves open; `run` runs what is prepared, in the place of
-        `run_simulated`."""
-        self._missions, self._screen, self._ask, self._run_prepared = missions, screen, ask, run or run_simulated
+        """`ask` is who is asked what a file leaves open; `run` runs what is prepared, in the place of `run_request`."""
+        self._missions, self._screen, self._ask, self._run_prepared = missions, screen, ask, run or run_request
         self._control: Control | None = None
         self._cancelled: str | None = None
-
-    def add(self, prepared: Prepared) -> StoredMission:
-        """Keep what is to be run at once. What was broken off is given up: it could not be taken up afterwards."""
-        mission = self._missions.add(prepared.request.from_anywhere(), queued=False)
-        for broken in self._missions.missions(MissionState.RUNNING):
-            self._missions.finish(
-                broken.id, MissionState.CANCELLED, f"broken off, and given up for mission {mission.id}"
-            )
-            self._screen.tell(f"Mission {broken.id} ({broken.request.name}) had been broken off; it is given up.")
-        return mission
 
     def run(self, mission: StoredMission, prepared: Prepared | None = None) -> Ended:
         """Run a mission from its beginning, or go on with one that was broken off or cancelled, to its end.
@@ -172,6 +171,8 @@ class MissionRuns:
             InputError: it is none of a queue, and its file, its world or the plant's state cannot be used.
         """
         if not mission.queued:
+            if mission.state is MissionState.QUEUED:
+                self._give_up_broken_off(mission)
             return self._run(mission, prepared)
         try:
             return self._run(mission, prepared)
@@ -188,6 +189,14 @@ class MissionRuns:
             return_memory()
         return self.set_aside(mission, cause)
 
+    def _give_up_broken_off(self, mission: StoredMission) -> None:
+        """Give up what was broken off for a mission that is run at once: it could not be taken up afterwards."""
+        for broken in self._missions.missions(MissionState.RUNNING):
+            self._missions.finish(
+                broken.id, MissionState.CANCELLED, f"broken off, and given up for mission {mission.id}"
+            )
+            self._screen.tell(f"Mission {broken.id} ({broken.request.name}) had been broken off; it is given up.")
+
     def set_aside(self, mission: StoredMission, cause: str) -> Ended:
         """End a mission that cannot be run with its cause."""
         self._missions.finish(mission.id, MissionState.ERROR, cause)
@@ -203,33 +212,39 @@ class MissionRuns:
             self._control.cancel(reason)
 
     def _run(self, mission: StoredMission, prepared: Prepared | None) -> Ended:
-        name, begun = mission.request.name, mission.state is not MissionState.QUEUED
-        taken = (
-            take_up(self._missions, mission, ask=self._ask) if begun and self._missions.has_steps(mission.id) else None
-        )
-        if taken is not None:
+        name, begun, taken = mission.request.name, mission.state is not MissionState.QUEUED, None
+        if begun and self._missions.has_steps(mission.id):
+            taken = take_up(self._missions, mission, ask=self._ask)
             self._screen.tell(f"Mission {mission.id} ({name}) goes on.")
-            prepared, durable = _in_its_folder(mission, taken.prepared), taken.durable
-        else:
-            if begun:
-                self._screen.tell(f"Mission {mission.id} ({name}) had not begun; it begins now.")
-            prepared, durable = self._begin(mission, prepared)
-        report = self._show(mission, prepared, durable)
-        past = None if taken is None else taken.told
+            prepared = _in_its_folder(mission, taken.prepared)
+        elif begun:
+            self._screen.tell(f"Mission {mission.id} ({name}) had not begun; it begins now.")
+        if prepared is None:
+            prepared = _in_its_folder(mission, prepare(mission.request, ask=self._ask))
+            self._screen.tell(f"Mission {mission.id}: {name}", title=True)
+        with note_run(self._missions, mission) as ended:
+            before = self._before(mission) if mission.queued and taken is None else None
+            durable = new_run(self._missions, mission, prepared, before) if taken is None else taken.durable
+            with self._screen.watching(prepared) as by, self._cancelling(by.control):
+                finished = self._run_prepared(prepared, durable=durable, **vars(by))
+            self._screen.conclude(finished)
+            ended(finished.report)
+        report, past = finished.report, None if taken is None else taken.told
         if past is not None:
             self._screen.tell("\n  ".join(["What became of its past:", *past]))
         self._screen.name_files(prepared.request.out)
         return Ended(mission.id, report.outcome, report.achieved, report.message, report, past)
 
-    def _begin(self, mission: StoredMission, prepared: Prepared | None) -> tuple[Prepared, Durable]:
-        """A mission from its beginning. Raises InputError: its file, its world or the plant's state cannot be used."""
-        if prepared is None:
-            prepared = _in_its_folder(mission, prepare(mission.request, ask=self._ask))
-            self._screen.tell(f"Mission {mission.id}: {mission.request.name}", title=True)
-        before = self._before(mission) if mission.queued else None
-        if before is None:
-            return prepared, new_run(self._missions, mission, prepared)
-        return prepared, next_run(self._missions, mission, prepared, before)
+    @contextmanager
+    def _cancelling(self, control: Control) -> Iterator[None]:
+        """Have `cancel` cancel the run of this control, also where it came before."""
+        self._control = control
+        if self._cancelled is not None:
+            control.cancel(self._cancelled)
+        try:
+            yield
+        finally:
+            self._control = None
 
     def _before(self, mission: StoredMission) -> StoredMission | None:
         """The mission that left the world in which this one begins; None when it begins in a fresh one."""
@@ -239,20 +254,6 @@ class MissionRuns:
             return None
         plant = plant_file(self._missions)
         return last if plant.with_name(f"{plant.name}.a").exists() else None
-
-    def _show(self, mission: StoredMission, prepared: Prepared, durable: Durable) -> RunReport:
-        """Run a mission, shown; its report, which is noted in the store."""
-        control = self._control = self._screen.control(prepared)
-        if self._cancelled is not None:
-            control.cancel(self._cancelled)
-        try:
-            with note_run(self._missions, mission) as ended:
-                start = partial(self._run_prepared, prepared, durable=durable)
-                report = self._screen.show(prepared, control, start).report
-                ended(report)
-        finally:
-            self._control = None
-        return report
 
 
 @contextmanager
@@ -299,6 +300,108 @@ def _traceback_file(missions: MissionStore, mission: StoredMission) -> Path:
     return file
 
 
+def plant_file(store: MissionStore) -> Path:
+    """Where the plant of a store's missions keeps its state; nobody but the plant reads it."""
+    return store.path.with_suffix(".plant")
+
+
+def new_run(
+    store: MissionStore, mission: StoredMission, prepared: Prepared, before: StoredMission | None = None
+) -> Durable:
+    """A mission that begins in a fresh world, or in the one that the mission `before` has left."""
+    journals, label = _journals(store, mission, prepared), str(mission.id)
+    starts = {name: robot.start for name, robot in prepared.robots.items()} if before is None else before.poses
+    if prepared.request.robots:
+        store.place(mission.id, starts)
+    if before is None:
+        return Durable(plant_file(store), journals, label)
+    return Durable(plant_file(store), journals, label, take_up=True, poses=before.poses)
+
+
+def _journals(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Mapping[str, StoreJournal]:
+    """The journals of a mission's robots; what takes the place of one's part by a correction is kept in its stead."""
+    bare = replace(prepared, request=replace(mission.request, sentence=None, file=None, text=None))
+    return {
+        each.mission.robot_name: store.journal(mission.id, _part_of(each)).replaceable(
+            each.tree, lambda tree: bare.with_tree(tree).request
+        )
+        for each in prepared.all
+    }
+
+
+def _part_of(prepared: Prepared) -> str | None:
+    """The robot under whose name the store keeps a part of a mission; None for the only robot of a run."""
+    return prepared.mission.robot_name if prepared.request.robots else None
+
+
+def same_world(one: StoredMission, other: StoredMission) -> bool:
+    """Whether two missions are to be done by the same robots in one world."""
+    a, b = one.request, other.request
+    same = (a.world, a.world_name, a.seed, frozenset(a.robots)) == (b.world, b.world_name, b.seed, frozenset(b.robots))
+    return same and (a.robots or a.robot == b.robot) and (a.scenario, a.variation) == (b.scenario, b.variation)
+
+
+@dataclass(frozen=True)
+class TakenUp:
+    """A mission that was broken off, ready to go on; a recollection for each robot."""
+
+    prepared: Prepared
+    durable: Durable
+    recollections: Sequence[Recollection]
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What became of its past so far."""
+        return tuple(line for each in self.recollections for line in each.told)
+
+
+def take_up(store: MissionStore, mission: StoredMission, *, ask: Answerer | None = None) -> TakenUp:
+    """All that is needed to go on with a mission, each robot from where it was; `ask` is that of `prepare`.
+
+    Raises:
+        InputError: what the store knows of it cannot be read, or its tree is no longer the one that was begun.
+    """
+    prepared = prepare(mission.request, ask=ask)
+    if prepared.request.fingerprint != mission.request.fingerprint:
+        raise _other_version(store, mission)
+    every = [_with_replacement(store, mission, each) for each in prepared.all]
+    memories = [store.memory(mission.id, _part_of(each)) for each in every]
+    resumed = [
+        (ended_tree(each.tree, memory) if prepared.request.robots else None) or resumed_tree(each.tree, memory)
+        for each, memory in zip(every, memories, strict=True)
+    ]
+    journals = _journals(store, mission, prepared)
+    for each, (tree, recollection) in zip(every, resumed, strict=True):
+        journals[each.mission.robot_name].remembering(recollection, tree)
+    names = [each.mission.robot_name for each in every]
+    poses = {name: memory.pose for name, memory in zip(names, memories, strict=True) if memory.pose is not None}
+    label, log = str(mission.id), log_name(mission.starts + 1)
+    durable = Durable(plant_file(store), journals, label, True, label, poses, log)
+    first, *others = (replace(each, tree=tree) for each, (tree, _) in zip(every, resumed, strict=True))
+    together = replace(first, request=prepared.request, others=tuple(others))
+    return TakenUp(together, durable, [recollection for _, recollection in resumed])
+
+
+def _with_replacement(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Prepared:
+    """What a robot is to do, or what has taken its place by a correction. Raises InputError: its tree is another."""
+    name = prepared.mission.robot_name
+    other = mission.instead.get(name)
+    if other is None:
+        return prepared
+    asked = replace(prepared.request, name=other.name, commands=other.commands, robot=name)
+    instead = Setting(asked, prepared.world, prepared.knowledge, prepared.robots).mission_of_commands()
+    own = replace(prepared, request=asked).with_mission(instead)
+    if own.request.fingerprint != other.fingerprint:
+        raise _other_version(store, mission)
+    return replace(prepared, mission=own.mission, tree=own.tree)
+
+
+def _other_version(store: MissionStore, mission: StoredMission) -> InputError:
+    hint = f"go back to the version that began it, or `errand queue remove {mission.id}` and give it again"
+    what = f"mission {mission.id} was begun with another version of errand, of the world or of the skills"
+    return InputError(what, hint=hint, file=store.path)
+
+
 def broken_off(missions: MissionStore, mission: StoredMission) -> InputError:
     """Why nothing else is run before a mission that was broken off."""
     what = f"mission {mission.id} ({mission.request.name}) was broken off"
@@ -313,98 +416,3 @@ def resumable_line(missions: MissionStore) -> str | None:
     last = begun[-1]
     what = f"Mission {last.id} ({last.request.name}) was cancelled"
     return f"{what}; `errand resume --store {missions.path}` goes on with it{' and then with the queue' * last.queued}."
-
-
-class Waiting(Protocol):
-    """Waits for the next thing to do; `executive.store.wakeup.WakeupPipe` is one."""
-
-    def wait(self, until: datetime | None) -> None:
-        """Block until somebody calls `wake` or, at the latest, a moment comes."""
-
-    def wake(self) -> None:
-        """End the wait, from any thread or signal handler."""
-
-
-class QueueServer:
-    """Serves one store, which this process has claimed.
-
-    When it is stopped while a mission runs, that is cancelled, and `errand resume` goes on with it. What is queued
-    stays queued.
-    """
-
-    def __init__(
-        self,
-        missions: MissionStore,
-        standing: StandingMissions,
-        waiting: Waiting,
-        runner: Runner,
-        *,
-        follow: Callable[[Iterable[Trigger]], None],
-        tell: Callable[[str], None],
-    ) -> None:
-        """`follow` has the other listeners hear what the standing missions wait for; `tell` shows a line."""
-        self._missions, self._standing, self._waiting, self._runner = missions, standing, waiting, runner
-        self._follow, self._tell = follow, tell
-        self._refused = ""
-        self.stopped: str | None = None
-
-    def stop(self, reason: str) -> None:
-        """Serve no longer; from any thread and from signal handlers."""
-        self.stopped = self.stopped or reason
-        self._runner.cancel(reason)
-        self._waiting.wake()
-
-    def serve(self, *, end: datetime | None = None, until_idle: bool = False) -> list[Ended]:
-        """Serve until it is stopped, until a moment (no mission begins after it), or until nothing is queued.
-
-        Raises:
-            InputError: a listener cannot be opened at the beginning, or the store cannot be used any more.
-        """
-        serving_since = self._missions.now()
-        self._follow(each.trigger for each in self._standing.missions())
-        broken = self._missions.missions(MissionState.RUNNING)
-        left = next((each for each in broken if not each.queued), None)
-        if left is not None:
-            raise broken_off(self._missions, left)
-        aside = [
-            self._runner.set_aside(each, f"it was started {each.starts} times and broken off")
-            for each in broken
-            if each.starts >= MOST_STARTS
-        ]
-        again = [each for each in broken if each.starts < MOST_STARTS]
-        coming = self._next_missions(again, serving_since, end=end, until_idle=until_idle)
-        return [*aside, *run_in_turn(coming, self._runner, until_cancelled=False)]
-
-    def _next_missions(
-        self, again: Sequence[StoredMission], serving_since: datetime, *, end: datetime | None, until_idle: bool
-    ) -> Iterator[StoredMission]:
-        """The missions that go on `again`, and then those that are queued, or that triggers queue."""
-        now = self._missions.now
-        for each in again:
-            if self.stopped is None:
-                yield each
-        waiting_since = now() if again else serving_since
-        while self.stopped is None:
-            self._follow_again()
-            fired = self._standing.fire_due(waiting_since=waiting_since, serving_since=serving_since)
-            for each in fired:
-                self._tell(f"Mission {each.id} is queued: {each.request.name} ({each.why})")
-            if end is not None and now() >= end:
-                return
-            mission = _next_queued(self._missions)
-            if mission is not None:
-                yield mission
-                waiting_since = now()
-            elif until_idle:
-                return
-            else:
-                self._waiting.wait(min(filter(None, (self._standing.due_next(), end)), default=None))
-
-    def _follow_again(self) -> None:
-        """Standing missions may have come or gone. What cannot be listened to is told once; the rest goes on."""
-        try:
-            self._follow(each.trigger for each in self._standing.missions())
-        except InputError as error:
-            if str(error) != self._refused:
-                self._tell(f"errand: {error}")
-            self._refused = str(error)

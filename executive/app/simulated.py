@@ -11,23 +11,18 @@ from pathlib import Path
 from typing import Final
 
 from executive.app.artifacts import Artifacts, draw_artifacts
-from executive.app.backend import Scene
-from executive.app.durable import Durable
+from executive.app.backend import Durable, Scene
 from executive.app.goal_conditions import Share, verdict_of
-from executive.app.mission_run import Finished, run_request
-from executive.app.page_view import PageView
-from executive.app.prepared import Prepared
 from executive.app.report import RefereeReport
 from executive.app.robots import PlacedRobot, shared_detector
 from executive.record.profile import Profile
-from executive.run.control import Control
 from executive.run.outcome import RobotResult
-from executive.run.visitor import RunEntry, RunVisitor
+from executive.run.visitor import RunEntry
 from executive.run.worker import WorkThread
 from executive.tree.compiler import CompiledTree
 from executive.words.variation import NO_VARIATION, Variation
 from plant.pipeline import Pipeline
-from plant.referee import Referee, Verdict
+from plant.referee import Referee
 from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
 from plant.worlds.world import World, WorldError
@@ -37,7 +32,7 @@ from skills.navigate.lattice import search
 from skills.robot import Clock, Pose2D
 from skills.stack import RobotStack, default_stack
 
-__all__ = ["SimulatedBackend", "compile_first", "judge", "run_entry", "run_simulated", "simulate"]
+__all__ = ["SimulatedBackend", "compile_first", "run_entry", "simulate"]
 
 _LOG: Final = logging.getLogger(__name__)
 
@@ -83,13 +78,13 @@ class SimulatedBackend:
         if robot is None:
             hint = f"known: {', '.join(self._robots)}"
             raise InputError(f"there is no robot '{tree.robot_name}' in {self._world.name}", hint=hint)
-        driven = self._pipeline.robots[tree.robot_name]
-        if durable is None:
-            return replace(run_entry(self._simulation, self._world, tree, robot.stack, told=robot.told), robot=driven)
-        told, believed = robot.told and not durable.take_up, durable.poses.get(tree.robot_name)
+        told, believed = robot.told, None
+        if durable is not None:
+            told, believed = robot.told and not durable.take_up, durable.poses.get(tree.robot_name)
         entry = run_entry(self._simulation, self._world, tree, robot.stack, believed=believed, told=told)
-        durable.journals[tree.robot_name].keep_world = self._keeping(durable)
-        return replace(entry, robot=driven)
+        if durable is not None:
+            durable.journals[tree.robot_name].keep_world = self._keeping(durable)
+        return replace(entry, robot=self._pipeline.robots[tree.robot_name])
 
     def _keeping(self, durable: Durable) -> Callable[[], None]:
         """Keeps the plant's state, which the first robot to be had takes up where `durable` says so.
@@ -138,7 +133,7 @@ class SimulatedBackend:
         self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
     ) -> RefereeReport:
         """What the plant's referee saw."""
-        verdict = judge(self._settled(), tree, result, before=before, since_s=since_s)
+        verdict = verdict_of(tree, result, self._settled().referee.judge, before=before, since_s=since_s)
         return RefereeReport(**asdict(verdict), events=self._simulation.referee.events)
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
@@ -148,44 +143,6 @@ class SimulatedBackend:
         self._settled().save_recording(out / "recording.html")
         draw_artifacts(artifacts, self._simulation, sorted(self._robots), out)
         return out / "recording.html"
-
-
-def run_simulated(
-    prepared: Prepared,
-    *,
-    visitors: Sequence[RunVisitor] = (),
-    control: Control | None = None,
-    page: PageView | None = None,
-    durable: Durable | None = None,
-    profile: Profile | None = None,
-) -> Finished:
-    """Run a request in the plant, as `run_request` does. Raises InputError: the world cannot be used."""
-    compile_first()
-    request = prepared.request
-    backend = SimulatedBackend(
-        prepared.world,
-        prepared.robots,
-        seed=request.seed,
-        record=request.record,
-        variation=request.variation,
-        spared=spoken_classes(prepared),
-    )
-    return run_request(
-        prepared,
-        backend,
-        visitors=visitors,
-        control=control,
-        page=page,
-        durable=durable,
-        profile=profile,
-    )
-
-
-def spoken_classes(prepared: Prepared) -> frozenset[str]:
-    """The classes of the objects that a mission speaks of; clutter is of none of them."""
-    named = {each.name for command in prepared.tree.commands for each in (command.item, command.object) if each}
-    known = prepared.knowledge
-    return frozenset(one for name in named for one in known.classes(known.thing(name) or name))
 
 
 def compile_first(cache: Path | None = None) -> None:
@@ -246,12 +203,9 @@ def run_entry(
     is not `told` where it stands either, it looks everywhere.
 
     Raises:
-        InputError: there is no such robot, or the world's maps or the detector's model cannot be read.
+        InputError: the world's maps or the detector's model cannot be read.
     """
     stack = stack or default_stack()
-    if tree.robot_name not in simulation.robots:
-        known = ", ".join(simulation.robots)
-        raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", hint=f"known: {known}")
     seen_from_m = simulation.robots[tree.robot_name].capabilities().lidar_height_m
     scan_map, keepout_map = load_grid_map(world.scan_map_seen_from(seen_from_m)), load_grid_map(world.keepout_map_path)
     start = believed or (simulation.starts[tree.robot_name] if told else None)
@@ -267,15 +221,3 @@ def run_entry(
         detector=shared_detector(stack),
         stack=stack,
     )
-
-
-def judge(
-    simulation: Simulation,
-    tree: CompiledTree,
-    result: RobotResult,
-    *,
-    before: Sequence[Share] = (),
-    since_s: float = 0.0,
-) -> Verdict:
-    """What the referee says of the mission's goal conditions, those included that other robots fulfilled `before`."""
-    return verdict_of(tree, result, simulation.referee.judge, before=before, since_s=since_s)

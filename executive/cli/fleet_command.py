@@ -8,12 +8,12 @@ from typing import Annotated, Any
 
 import typer
 
-from executive.app.durable import STORE as STORE_NAME
 from executive.app.report import VERDICTS
 from executive.cli.options import AS_JSON, QUIET, VIEW, VIEW_FOR, VIEW_PORT, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, refusals, show_table
 from executive.mission.request import Request
 from executive.store.given import GivenMissions
+from executive.store.missions import STORE as STORE_NAME
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.words.robots import robot_called
 from skills.files.errors import InputError

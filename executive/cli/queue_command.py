@@ -10,7 +10,6 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from executive.app.durable import STORE as STORE_NAME
 from executive.app.prepare import prepare
 from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
@@ -19,6 +18,7 @@ from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
+from executive.store.missions import STORE as STORE_NAME
 from executive.store.missions import MissionState, MissionStore, StoredMission, utc_now
 from executive.store.standing import StandingMission, StandingMissions
 from executive.store.trigger_source import refuse_missing_source
@@ -224,8 +224,8 @@ def serve(
     as_json: AS_JSON = False,
 ) -> None:
     """Wait for triggers and run what is queued, until Ctrl-C: at times, on a full battery, calls and messages."""
-    from executive.app.queue_server import CallAddress, Listeners
-    from executive.app.runs import MissionRuns, QueueServer, resumable_line
+    from executive.app.queue_server import CallAddress, Listeners, QueueServer
+    from executive.app.runs import MissionRuns, resumable_line
     from executive.cli.screen import ConsoleScreen
 
     console = console_for(as_json)

@@ -37,7 +37,6 @@ def run(
     """Run a sentence or a mission file in the simulated world."""
     with refusals():
         refuse_unaddressed(request)
-    from executive.app.durable import STORE as STORE_NAME
     from executive.app.feasibility import refuse_impossible
     from executive.app.page_view import PageView, queueing
     from executive.app.prepare import prepare
@@ -45,6 +44,7 @@ def run(
     from executive.cli.listen_command import hear_request
     from executive.cli.screen import ConsoleScreen, voice_for
     from executive.record.profile import Profile, lines
+    from executive.store.missions import STORE as STORE_NAME
     from executive.store.missions import MissionStore
 
     console = console_for(as_json)
@@ -65,8 +65,8 @@ def run(
         page = page_of if view or view_for is not None else None
         screen = ConsoleScreen(console, quiet=quiet, whole_tree=whole_tree, voice=voice, page=page, profile=timing)
         with MissionStore(kept_in) as missions, missions.claimed():
-            runs = MissionRuns(missions, screen)
-            ended = runs.run(runs.add(prepared), prepared)
+            mission = missions.add(prepared.request.from_anywhere(), queued=False)
+            ended = MissionRuns(missions, screen).run(mission, prepared)
     if timing is not None:
         for line in lines(timing.table()):
             console.print(line, markup=False)

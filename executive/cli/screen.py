@@ -7,19 +7,18 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from py_trees.common import Status
 from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
-from executive.app.durable import STORE
 from executive.app.mission_run import Finished
 from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
+from executive.app.runs import Watching
 from executive.app.talk import Talk, load_ahead
 from executive.cli.keys import HELP, Keys, keys_pressed, prompt_lines
 from executive.language.parser import load_parser
@@ -28,6 +27,7 @@ from executive.record.schemas import SPEECH
 from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
 from executive.speech.voice import Silence, Voice, queued_voice
+from executive.store.missions import STORE
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.snapshot import NodeState, Snapshot
@@ -35,13 +35,6 @@ from executive.view.styles import Styles, style_of
 from executive.view.text import printable, to_rich
 
 SILENCE: Final = Silence()
-
-
-class Start(Protocol):
-    """Runs a mission to its end."""
-
-    def __call__(self, *, control: Control, visitors: Sequence[RunVisitor] = ()) -> Finished:
-        """Run it."""
 
 
 @contextmanager
@@ -75,55 +68,6 @@ class HeardSpeech(RunVisitor):
         return message
 
 
-def control_for(console: Console, *, quiet: bool) -> Control:
-    """The control of a run without a page: attended where somebody sits at a terminal."""
-    attended = console.is_terminal and sys.stdin.isatty() and not quiet
-    return Control(attended=attended, pace=1.0 if attended else None)
-
-
-def show_run(
-    start: Start,
-    prepared: Prepared,
-    console: Console,
-    *,
-    control: Control,
-    quiet: bool,
-    whole_tree: bool = False,
-    talk: Talk | None = None,
-    voice: Voice = SILENCE,
-) -> Finished:
-    """Run it, shown on the console and controlled from there; `talk` is one that goes on elsewhere, too.
-
-    What the robot says is written there, and said by the `voice`.
-    With `whole_tree` all its nodes are shown in the end.
-    """
-    for told in dict.fromkeys(note for each in prepared.all for note in each.mission.notes):
-        console.print(f"{told}.", markup=False)
-    for line in (*prepared.request.scenario.lines(), *prepared.request.variation.lines()):
-        console.print(f"Scenario: {line}", markup=False)
-    for each in prepared.all:
-        to = f"{each.mission.robot_name}: " if prepared.request.robots else ""
-        for command in each.mission.commands:
-            console.print(f"{to}{command}", markup=False)
-    elsewhere, talk = talk is not None, talk or Talk(prepared, control)
-    talk.set_missions()
-    speech = HeardSpeech(console, voice, quiet)
-    if quiet:
-        if not elsewhere:
-            load_parser().release()  # nobody speaks to the run
-        finished = start(control=control, visitors=(speech, talk) if elsewhere else (speech,))
-    else:
-        with live_view(console, control, say=lambda text: talk.hear(text).text) as view:
-            if control.attended and not elsewhere:
-                load_ahead()
-            finished = start(control=control, visitors=(speech, view, talk))
-    if whole_tree:
-        console.print(to_rich(finished.tree, collapsed=False))
-    for line in finished.report.lines():
-        console.print(line)
-    return finished
-
-
 class ConsoleScreen:
     """Shows runs on the console, and has them controlled from there (`executive.app.runs.Screen`).
 
@@ -149,26 +93,40 @@ class ConsoleScreen:
         """Show a line."""
         self._console.print(line, markup=False, style="bold" if title else None)
 
-    def control(self, prepared: Prepared) -> Control:
-        """The control of a run: its page's, else the console's."""
-        if self._page is None:
-            return control_for(self._console, quiet=self._quiet)
-        self.shown_page = self._page(prepared)
-        return self.shown_page.control
+    @contextmanager
+    def watching(self, prepared: Prepared) -> Iterator[Watching]:
+        """Show what is run, the tree while it runs and what the robot says; the console controls it, or the page."""
+        for told in dict.fromkeys(note for each in prepared.all for note in each.mission.notes):
+            self.tell(f"{told}.")
+        for line in (*prepared.request.scenario.lines(), *prepared.request.variation.lines()):
+            self.tell(f"Scenario: {line}")
+        for each in prepared.all:
+            to = f"{each.mission.robot_name}: " if prepared.request.robots else ""
+            for command in each.mission.commands:
+                self.tell(f"{to}{command}")
+        page = self.shown_page = None if self._page is None else self._page(prepared)
+        attended = self._console.is_terminal and sys.stdin.isatty() and not self._quiet
+        control = Control(attended=attended, pace=1.0 if attended else None) if page is None else page.control
+        speech = HeardSpeech(self._console, self._voice, self._quiet)
+        if self._quiet and page is None:  # nobody speaks to the run
+            load_parser().release()
+            yield Watching(control, (speech,), page, self._profile)
+            return
+        talk = Talk(prepared, control) if page is None or page.talk is None else page.talk
+        talk.set_missions()
+        shown = live_view(self._console, control, say=lambda text: talk.hear(text).text)
+        with nullcontext() if self._quiet else shown as view:
+            if control.attended and page is None:
+                load_ahead()
+            visitors = (speech, talk) if view is None else (speech, view, talk)
+            yield Watching(control, visitors, page, self._profile)
 
-    def show(self, prepared: Prepared, control: Control, start: Callable[..., Finished]) -> Finished:
-        """Show a run from its beginning to its end."""
-        page = self.shown_page
-        return show_run(
-            partial(start, page=page, profile=self._profile),
-            prepared,
-            self._console,
-            control=control,
-            quiet=self._quiet,
-            whole_tree=self._whole_tree,
-            talk=None if page is None else page.talk,
-            voice=self._voice,
-        )
+    def conclude(self, finished: Finished) -> None:
+        """Show the verdicts and the figures, after the whole tree where that is wanted."""
+        if self._whole_tree:
+            self._console.print(to_rich(finished.tree, collapsed=False))
+        for line in finished.report.lines():
+            self._console.print(line)
 
     def name_files(self, out: Path) -> None:
         """Name what was left in a folder, but for what the store keeps there."""

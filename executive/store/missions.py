@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Final
 
 from executive.mission.request import Request
 from executive.store.database import STORE_FILE, Database
@@ -16,6 +17,9 @@ from executive.store.memory import Memory, StepRecord
 from executive.store.values import form, from_text
 from skills.files.errors import InputError, listing
 from skills.robot import Pose2D
+
+STORE: Final = "missions.sqlite"
+"""The name of a store's file unless another is given."""
 
 
 def utc_now() -> datetime:

@@ -22,12 +22,12 @@ from typing import Any
 
 import numpy as np
 
-from executive.app.durable import STORE, new_run
+from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
-from executive.app.simulated import run_simulated
+from executive.app.runs import new_run
 from executive.mission.request import Request
 from executive.run.visitor import Progress, RunVisitor
-from executive.store.missions import MissionStore
+from executive.store.missions import STORE, MissionStore
 
 MISSION = """name: long round
 world: {world}
@@ -122,7 +122,7 @@ def run(
     with MissionStore(out / STORE) as store:
         mission = store.add(prepared.request.from_anywhere(), queued=False)
         store.begin(mission.id)
-        finished = run_simulated(prepared, visitors=[watch], durable=new_run(store, mission, prepared))
+        finished = run_request(prepared, visitors=[watch], durable=new_run(store, mission, prepared))
     return summary(watch.reports, finished.report.outcome, out)
 
 

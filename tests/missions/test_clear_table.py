@@ -7,8 +7,8 @@ import shutil
 import pytest
 import yaml
 
+from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
-from executive.app.simulated import run_simulated
 from executive.mission.request import Request
 from plant.worlds.world import WORLDS_FOLDER
 
@@ -38,7 +38,7 @@ def test_three_objects_are_moved_and_nothing_is_left(world, tmp_path):
         out=tmp_path / "out",
         record=False,
     )
-    report = run_simulated(prepare(request)).report
+    report = run_request(prepare(request)).report
     assert report.achieved, (report.message, report.referee.why)
     assert report.referee.success, report.referee.why
     assert report.referee.drops == 0

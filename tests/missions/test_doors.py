@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
-from executive.app.simulated import run_simulated
 from executive.mission.request import Request
 from skills.robot import Pose2D
 
@@ -21,7 +21,7 @@ steps:
 @pytest.mark.nightly
 def test_a_door_that_is_open_is_found_so(tmp_path):
     (tmp_path / "look.yaml").write_text(LOOK)
-    report = run_simulated(prepare(Request(file=tmp_path / "look.yaml", seed=1, out=tmp_path, record=False))).report
+    report = run_request(prepare(Request(file=tmp_path / "look.yaml", seed=1, out=tmp_path, record=False))).report
     assert "the door between hall and kitchen is open" in report.message, report.message
     assert report.referee.collisions == 0
 
@@ -36,6 +36,6 @@ def test_a_door_that_bars_the_way_to_where_it_is_looked_at_is_found_closed(tmp_p
         out=tmp_path,
         record=False,
     )
-    report = run_simulated(prepare(request)).report
+    report = run_request(prepare(request)).report
     assert "the door between hall and bathroom is closed" in report.message, report.message
     assert report.referee.collisions == 0

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from executive.app.checker import Checker
+from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
-from executive.app.simulated import run_simulated
 from executive.mission.request import Request
 
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -30,7 +30,7 @@ NIGHTLY = pytest.mark.nightly
 )
 def test_it_is_achieved_and_takes_about_as_long_as_estimated(name, seed, tmp_path):
     file = MISSIONS / f"{name}.yaml"
-    report = run_simulated(prepare(Request(file=file, seed=seed, out=tmp_path, record=False))).report
+    report = run_request(prepare(Request(file=file, seed=seed, out=tmp_path, record=False))).report
     assert report.achieved, (report.message, report.referee.why)
     assert report.referee.collisions == 0
     if "skipped" not in report.message:
@@ -63,7 +63,7 @@ def test_what_it_decides_is_right_and_it_says_so(name, tmp_path):
     seed, said = DECIDING[name]
     file = MISSIONS / f"{name}.yaml"
     request = Request(file=file, seed=seed, out=tmp_path, record=False, time_of_day="08:29")
-    report = run_simulated(prepare(request)).report
+    report = run_request(prepare(request)).report
     assert report.outcome == "success", report.message
     assert report.referee.success, report.referee.why
     assert (report.referee.collisions, report.referee.drops) == (0, 0)

@@ -9,7 +9,8 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform
 
-from executive.app.simulated import judge, run_entry
+from executive.app.goal_conditions import verdict_of
+from executive.app.simulated import run_entry
 from executive.app.worlds import knowledge_of
 from executive.run.outcome import Outcome
 from executive.run.runner import run
@@ -69,7 +70,7 @@ def test_the_beer_before_it_is_moved_aside_and_the_coke_is_taken(shelf):
             settings=RunSettings(seed=SEED),
         ).worst
     assert result.outcome is Outcome.SUCCESS, result.message
-    verdict = judge(plant, tree, result)
+    verdict = verdict_of(tree, result, plant.referee.judge)
     assert verdict.success, verdict.why
     assert verdict.drops == 0
     assert "the coke is behind the beer" in said

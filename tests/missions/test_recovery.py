@@ -10,7 +10,8 @@ import pytest
 from py_trees.common import Status
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from executive.app.simulated import judge, run_entry
+from executive.app.goal_conditions import verdict_of
+from executive.app.simulated import run_entry
 from executive.app.worlds import knowledge_of, open_world
 from executive.run.outcome import Outcome
 from executive.run.runner import run
@@ -74,7 +75,7 @@ class FlatMission:
             settings=RunSettings(seed=self.seed),
             visitors=[OnMessage(self._publish), *([] if observer is None else [OnTick(observer)])],
         ).worst
-        return result, judge(self.simulation, self.tree, result)
+        return result, verdict_of(self.tree, result, self.simulation.referee.judge)
 
     def ended(self, part: str) -> list[str]:
         """How the nodes with `part` in their path ids ended, in order."""

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
-from executive.app.simulated import run_simulated
 from executive.mission.request import Request
 
 MISSION = Path(__file__).parents[2] / "missions" / "go_to_pose.yaml"
@@ -20,6 +20,6 @@ def test_it_finds_out_where_it_is_and_then_does_the_mission(localiser, tmp_path)
     stack = tmp_path / "stack.yaml"
     stack.write_text(f"localiser: {{use: {localiser}}}\n", encoding="utf-8")
     request = Request(file=MISSION, seed=3, out=tmp_path, record=False, stack=stack, start="unknown")
-    report = run_simulated(prepare(request)).report
+    report = run_request(prepare(request)).report
     assert report.achieved, (report.message, report.referee.why)
     assert report.referee.collisions == 0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
-from executive.app.simulated import run_simulated
 from executive.mission.request import Request
 
 pytestmark = [pytest.mark.mission, pytest.mark.nightly]
@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.mission, pytest.mark.nightly]
 @pytest.mark.parametrize(("world", "room"), [("shop", "office"), ("lab", "server room")])
 def test_the_robot_goes_to_a_far_room_and_touches_nothing(world, room, tmp_path):
     request = Request(sentence=f"go to the {room}", world=world, seed=1, out=tmp_path, record=False)
-    report = run_simulated(prepare(request)).report
+    report = run_request(prepare(request)).report
     assert report.achieved, (report.message, report.referee.why)
     assert report.referee.success, report.referee.why
     assert report.referee.collisions == 0

@@ -23,10 +23,9 @@ from numpy.typing import NDArray
 from executive.app.evaluate.outcome import Evidence, RunOutcome, Standing
 from executive.app.evaluate.runs import RunSpec
 from executive.app.feasibility import refuse_impossible
-from executive.app.mission_run import return_memory
+from executive.app.mission_run import return_memory, run_request
 from executive.app.prepare import prepare
 from executive.app.report import RefereeReport, RunReport
-from executive.app.simulated import run_simulated
 from executive.mission.request import Request
 from executive.record.reader import Event, read_events
 from executive.record.schemas import TRANSITIONS, TREE
@@ -62,7 +61,7 @@ def _ran(spec: RunSpec, folder: Path, checked: bool) -> RunOutcome:
         prepared = prepare(replace(_with_files(spec, folder), out=folder / "out", record=False), ask=None)
         if checked:
             refuse_impossible(prepared)
-        report = run_simulated(prepared).report
+        report = run_request(prepared).report
     except InputError as error:
         return RunOutcome(spec.id, _report(spec, "refused", REFUSED, str(error)))
     except Exception as error:

@@ -9,8 +9,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.app.artifacts import MOST_BYTES, Artifacts
-from executive.app.durable import mission_events
-from executive.app.mission_run import run_request
+from executive.app.mission_run import mission_events, run_request
 from executive.app.prepare import prepare
 from executive.app.report import ReportedAnswer, ReportedObject, RunReport
 from executive.app.report_file import step_rows

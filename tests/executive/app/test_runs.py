@@ -5,6 +5,7 @@ import json
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -12,8 +13,9 @@ import pytest
 from typer.testing import CliRunner
 
 from executive.app.mission_run import Finished
+from executive.app.queue_server import MOST_STARTS, QueueServer
 from executive.app.report import RefereeReport, RunReport
-from executive.app.runs import MOST_STARTS, Ended, MissionRuns, QueueServer
+from executive.app.runs import Ended, MissionRuns, Watching
 from executive.cli.entry import app
 from executive.mission.request import Request
 from executive.run.control import Control
@@ -268,11 +270,12 @@ class Screen:
     def tell(self, line, *, title=False):
         self.lines.append(line)
 
-    def control(self, prepared):
-        return Control(pace=None)
+    @contextmanager
+    def watching(self, prepared):
+        yield Watching(Control(pace=None))
 
-    def show(self, prepared, control, start):
-        return start(control=control)
+    def conclude(self, finished):
+        self.lines.append(finished.report.message)
 
     def name_files(self, out):
         self.lines.append(f"files in {out.name}")

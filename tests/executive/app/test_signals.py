@@ -33,7 +33,7 @@ RUN = """
     from scripted_backend import ScriptedBackend
     from executive.cli import screen
     from executive.app import prepare as preparing
-    from executive.app.runs import note_run
+    from executive.app.runs import MissionRuns
     from executive.app.mission_run import run_request
     from executive.app.prepare import prepare
     from executive.mission.request import Request
@@ -50,16 +50,12 @@ RUN = """
         (out / "begun").touch()
         time.sleep(0.01)
 
-    def start(*, control, visitors):
+    def run(prepared, *, control, visitors, **_):
         return run_request(prepared, robot, control=control, visitors=[*visitors, OnTick(told)])
 
     with MissionStore(out / "missions.sqlite") as store:
         mission = store.add(prepared.request, queued=False)
-        with note_run(store, mission) as ended:
-            console = Console()
-            control = screen.control_for(console, quiet=False)
-            finished = screen.show_run(start, prepared, console, control=control, quiet=False)
-            ended(finished.report)
+        MissionRuns(store, screen.ConsoleScreen(Console(), quiet=False), run=run).run(mission, prepared)
     (out / "stopped").write_text(next(call for call in reversed(robot.robot.calls) if call in ("stop", "drive")))
 """
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from executive.app.mission_run import spoken_classes
 from executive.app.prepare import prepare
-from executive.app.simulated import spoken_classes
 from executive.mission.request import Request
 from executive.words.variation import Variation
 from plant.worlds.placement import place_people

@@ -55,7 +55,7 @@ def plant(monkeypatch):
     def opened(_):
         yield Here()
 
-    monkeypatch.setattr(evaluation_run, "run_simulated", stand_in)
+    monkeypatch.setattr(evaluation_run, "run_request", stand_in)
     monkeypatch.setattr(cluster.Pool, "opened", opened)
     return stand_in
 

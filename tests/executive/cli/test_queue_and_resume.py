@@ -27,7 +27,7 @@ from executive.words.mission import Mission
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
-RUN_SIMULATED = "executive.app.runs.run_simulated"
+RUN_REQUEST = "executive.app.runs.run_request"
 
 
 class GoneError(BaseException):
@@ -35,7 +35,7 @@ class GoneError(BaseException):
 
 
 class Plant:
-    """Stands in for `run_simulated`: notes one finished leaf, then ends as the test says."""
+    """Stands in for `run_request`: notes one finished leaf, then ends as the test says."""
 
     def __init__(self):
         self.runs = []
@@ -90,7 +90,7 @@ def change(store, **values):
 @pytest.fixture
 def plant(monkeypatch):
     stand_in = Plant()
-    monkeypatch.setattr(RUN_SIMULATED, stand_in)
+    monkeypatch.setattr(RUN_REQUEST, stand_in)
     monkeypatch.setattr("executive.app.prepare.load_parser", lambda: None)  # no step here is a sentence
     return stand_in
 
@@ -200,7 +200,7 @@ def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(erra
         raise GoneError
 
     with monkeypatch.context() as patch, pytest.raises(GoneError):
-        patch.setattr(RUN_SIMULATED, corrected)
+        patch.setattr(RUN_REQUEST, corrected)
         errand("run", mission("first"), "--quiet")
     result = errand("resume", "--quiet")
     assert result.exit_code == 0, result.output
@@ -241,7 +241,7 @@ def test_what_took_the_place_of_one_robots_part_is_resumed_beside_the_others(err
         raise GoneError
 
     with monkeypatch.context() as patch, pytest.raises(GoneError):
-        patch.setattr(RUN_SIMULATED, corrected)
+        patch.setattr(RUN_REQUEST, corrected)
         errand("run", two, "--quiet")
     result = errand("resume", "--quiet")
     assert result.exit_code == 0, result.output
@@ -351,7 +351,7 @@ def test_a_run_that_cannot_begin_leaves_no_mission_behind(errand, mission, monke
     def refuse(*_, **__):
         raise InputError("the world is full")
 
-    monkeypatch.setattr(RUN_SIMULATED, refuse)
+    monkeypatch.setattr(RUN_REQUEST, refuse)
     assert errand("run", mission("alone"), "--quiet").exit_code == 2
     assert states() == []
 
@@ -501,7 +501,7 @@ def test_a_signal_during_a_mission_ends_the_server_and_keeps_the_queue(errand, m
         return Plant.__call__(plant, prepared, **options)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(RUN_SIMULATED, signalled)
+        patch.setattr(RUN_REQUEST, signalled)
         errand("queue", "add", mission("first"))
         errand("queue", "add", mission("second"))
         result = errand("queue", "serve", "--quiet")
@@ -598,7 +598,7 @@ def test_a_defect_in_a_run_sets_its_mission_aside_and_keeps_the_traceback(errand
     errand("queue", "add", mission("first"))
     errand("queue", "add", mission("second"))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(RUN_SIMULATED, broken)
+        patch.setattr(RUN_REQUEST, broken)
         result = errand("queue", "run", "--quiet")
     assert (result.exit_code, states()) == (1, ["error", "success"])
     assert "(ZeroDivisionError: by a plug-in)" in ended(errand)[0][1]
@@ -639,7 +639,7 @@ def test_a_mission_that_could_not_begin_does_not_give_the_next_one_a_fresh_world
     for name in ("first", "second", "third"):
         errand("queue", "add", mission(name))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(RUN_SIMULATED, refuse_second)
+        patch.setattr(RUN_REQUEST, refuse_second)
         errand("queue", "run", "--quiet")
     assert [run[3].take_up for run in plant.runs] == [False, True]
 

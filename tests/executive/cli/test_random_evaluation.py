@@ -34,7 +34,7 @@ def ran(monkeypatch):
     """The prepared missions that were run, with what becomes of them; no plant is built."""
     seen = []
 
-    def run_simulated(prepared):
+    def run_request(prepared):
         request = prepared.request
         seen.append(request)
         EventLog(request.out / "log.mcap", ManualClock()).close()
@@ -47,7 +47,7 @@ def ran(monkeypatch):
     def opened(_):
         yield Here()
 
-    monkeypatch.setattr(evaluation_run, "run_simulated", run_simulated)
+    monkeypatch.setattr(evaluation_run, "run_request", run_request)
     monkeypatch.setattr(cluster.Pool, "opened", opened)
     return seen
 

@@ -43,11 +43,11 @@ def no_plant(monkeypatch):
     """Runs end at once as the test says; no plant is built."""
     ended = {"report": report()}
 
-    def run_simulated(prepared, **_):
+    def run_request(prepared, **_):
         prepared.request.out.mkdir(parents=True, exist_ok=True)
         return Finished(ended["report"], node_view(prepared.tree.root))
 
-    monkeypatch.setattr("executive.app.runs.run_simulated", run_simulated)
+    monkeypatch.setattr("executive.app.runs.run_request", run_request)
     return ended
 
 

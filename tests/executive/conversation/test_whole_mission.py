@@ -2,8 +2,8 @@
 
 import pytest
 
+from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
-from executive.app.simulated import run_simulated
 from executive.app.talk import conversation_of
 from executive.mission.request import Request
 from executive.run.control import Control
@@ -23,7 +23,7 @@ def test_a_corrected_mission_is_fulfilled_as_corrected(tmp_path):
         while said and progress.now_s >= said[0][0]:
             replies.append(conversation.hear(said.pop(0)[1]).text)
 
-    finished = run_simulated(prepared, visitors=[OnTick(observe)], control=control)
+    finished = run_request(prepared, visitors=[OnTick(observe)], control=control)
     assert replies[0] == "I am in the living room"
     assert finished.report.achieved
     assert finished.report.commands == ("Take [Nothing] to [bathroom] and do [Nothing] to [Nothing]",)

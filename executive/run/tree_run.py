@@ -11,7 +11,7 @@ from py_trees.common import Status
 
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.executions import Executions
-from executive.run.findings import Findings, claim, findings_in_words
+from executive.run.history import Findings, claim, findings_in_words
 from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
 from executive.tree.behaviour import Explained, message_of

@@ -18,7 +18,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.run.executions import execution_keys
-from executive.run.findings import finding_keys
+from executive.run.history import finding_keys
 from executive.store.memory import Memory, Recollection, StepRecord
 from executive.tree.behaviour import Explained
 from executive.tree.behaviours.answer import Answer

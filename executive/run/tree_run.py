@@ -10,8 +10,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
-from executive.run.executions import Executions
-from executive.run.history import Findings, claim, findings_in_words
+from executive.run.history import Executions, Findings, claim, findings_in_words
 from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
 from executive.tree.behaviour import Explained, message_of
@@ -49,7 +48,6 @@ class TreeRun:
         self._ended_early = self._suspended = False
         self._endings: list[str] = []
         self._observed = Observed(self.root)
-        self._executions = Executions(tree, self._observed.nodes, context.board, context.clock)
         self._leaves = tuple(node for node in self._observed.nodes if isinstance(node, SkillLeaf))
         buttons = {node.path_id for node in tree.root.walk() if any(buttons_of(node))}
         waits = (node for node in self._observed.nodes if isinstance(node, WaitFor))
@@ -65,6 +63,7 @@ class TreeRun:
         for each in visitors:
             each.mission_begun(self._observed.nodes, context)
         self.show()
+        self._executions = Executions(tree, self._observed.nodes, context.board, context.clock)
 
     @property
     def finished(self) -> bool:
@@ -131,16 +130,20 @@ class TreeRun:
         if due is None:
             self._suspended = False
             if not self._ended_early:
-                self._observed.tick(self.root)
+                self._observed.tick(self.root, self._visited)
             return
         if not self._suspended:
             self._suspended = True
             suspend(self.root, sparing=due)
-        self._observed.tick(due)
+        self._observed.tick(due, self._visited)
         if due.status != Status.RUNNING:
             endings.done()
             if due.status == Status.FAILURE:
                 self._endings.append(f"in the end: {message_of(due)}")
+
+    def _visited(self, node: Behaviour, stopped: bool) -> None:
+        if not any(gate.waiting and gate.node is node for gate in self._gates.values()):
+            self._executions.visited(node, stopped)
 
     def end_early(self) -> None:
         """Stop the tree where it is, and do no more of it than what is always done in the end."""
@@ -261,13 +264,13 @@ class Gate:
 
     def __init__(self, node: Behaviour, closed: Callable[[], bool]) -> None:
         """Stand before `node` from now on."""
-        self._node, self._closed = node, closed
+        self.node, self._closed = node, closed
         self._pass_on: Callable[[], Iterator[Behaviour]] = node.tick
         self.waiting = False
         vars(node)["tick"] = self._tick
 
     def _tick(self) -> Iterator[Behaviour]:
-        node, waited = self._node, self.waiting and self._node.status == Status.RUNNING
+        node, waited = self.node, self.waiting and self.node.status == Status.RUNNING
         self.waiting = False
         if waited:
             node.status = Status.INVALID
@@ -279,9 +282,9 @@ class Gate:
 
     def _wait(self) -> None:
         self.waiting = True
-        self._node.status = Status.RUNNING
-        if isinstance(self._node, Explained):
-            self._node.cause, self._node.message = None, "waits at the breakpoint"
+        self.node.status = Status.RUNNING
+        if isinstance(self.node, Explained):
+            self.node.cause, self.node.message = None, "waits at the breakpoint"
 
 
 _OUTCOMES = {Status.SUCCESS: Outcome.SUCCESS, Status.FAILURE: Outcome.FAILURE}

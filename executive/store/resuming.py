@@ -17,8 +17,7 @@ from typing import Any, Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.run.executions import execution_keys
-from executive.run.history import finding_keys
+from executive.run.history import history_keys
 from executive.store.memory import Memory, Recollection, StepRecord
 from executive.tree.behaviour import Explained
 from executive.tree.behaviours.answer import Answer
@@ -71,10 +70,10 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     if tree.root is not tree.mission:
         root = dataclasses.replace(tree.root, children=(*tree.root.children[:-1], root))
     own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(CompiledTree)}
-    names = tree.robot_name, tree.mission_name
+    keys = history_keys(tree.robot_name, tree.mission_name)
     again = {
-        finding_keys(*names).again: _answered(tree, memory) - over,
-        execution_keys(*names).again: _ended(tree, memory) - over,
+        keys.answered_before: _answered(tree, memory) - over,
+        keys.ended_before: _ended(tree, memory) - over,
     }
     board = {**memory.board, **again}
     return ResumedTree(**{**own, "root": root}, board=board, changes=change.made), recollection

@@ -43,6 +43,8 @@ class Change(NamedTuple):
 
 
 Snapshot = Mapping[str, NodeState]
+Visited = Callable[[Behaviour, bool], None]
+"""Is told of a node that a tick has visited, and whether it was stopped from outside since its last visit."""
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
@@ -61,12 +63,16 @@ class Observed:
         self.states: Snapshot = {node.path_id: state for node, state in named}
         self._index: Mapping[Behaviour, int] = {node: index for index, node in enumerate(self._explained)}
         self._touched: set[Behaviour] = set()
+        self._stopped: set[Behaviour] = set()
         for node in self._index:
-            vars(node)["stop"] = _noted(node, self._touched)
+            vars(node)["stop"] = _noted(node, self._touched, self._stopped)
 
-    def tick(self, node: Behaviour) -> None:
-        """Tick the tree, or a part of it."""
-        self._touched.update(node.tick())
+    def tick(self, node: Behaviour, visited: Visited = lambda node, stopped: None) -> None:
+        """Tick the tree, or a part of it; `visited` is told of each node, after those below it."""
+        for each in node.tick():
+            self._touched.add(each)
+            visited(each, each in self._stopped)
+            self._stopped.discard(each)
 
     def changes(self, *, of_all: bool = False) -> Sequence[Change]:
         """What changed since the last time, in the order of the tree; brings `states` up to date.
@@ -89,13 +95,15 @@ class Observed:
                 yield Change(node.path_id, last, state)
 
 
-def _noted(node: Behaviour, touched: set[Behaviour]) -> Callable[[Status], None]:
-    """The node's `stop`, which adds it to `touched`."""
+def _noted(node: Behaviour, touched: set[Behaviour], stopped: set[Behaviour]) -> Callable[[Status], None]:
+    """The node's `stop`, which adds it to `touched`, and to `stopped` where it is stopped from outside."""
     stop = node.stop
 
     def noted_stop(new_status: Status = Status.INVALID) -> None:
         """As the node's own."""
         touched.add(node)
+        if new_status == Status.INVALID:
+            stopped.add(node)
         stop(new_status)
 
     return noted_stop

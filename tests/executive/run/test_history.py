@@ -6,7 +6,7 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.run.history import Findings, claim, finding_keys
+from executive.run.history import Findings, claim, history_keys
 from executive.run.outcome import Finding, Outcome, Said
 from executive.tree.board import Board
 from skills.api import Cause, Failed, Succeeded
@@ -59,9 +59,9 @@ def test_a_number_that_json_does_not_know_is_told_as_text(findings):
 
 def test_an_answer_given_again_after_a_restart_is_one_finding(clock):
     board = Board("alice")
-    keys = finding_keys("Alice", "patrol")
+    keys = history_keys("Alice", "patrol")
     board.put(keys.findings, (Finding("alice/patrol/1", 4.0, "q", False, "none"),))
-    board.put(keys.again, frozenset({"alice/patrol/1"}))
+    board.put(keys.answered_before, frozenset({"alice/patrol/1"}))
     findings = Findings(clock, board, "Alice", "patrol")
     findings.message("answer", answered("alice/patrol/1", False, "none"))
     assert [one.t_s for one in findings.findings] == [4.0]
@@ -72,9 +72,9 @@ def test_an_answer_given_again_after_a_restart_is_one_finding(clock):
 
 def test_another_answer_after_a_restart_is_a_finding_of_its_own(clock):
     board = Board("alice")
-    keys = finding_keys("Alice", "patrol")
+    keys = history_keys("Alice", "patrol")
     board.put(keys.findings, (Finding("alice/patrol/1", 4.0, "q", False, "none"),))
-    board.put(keys.again, frozenset({"alice/patrol/1"}))
+    board.put(keys.answered_before, frozenset({"alice/patrol/1"}))
     findings = Findings(clock, board, "Alice", "patrol")
     findings.message("answer", answered("alice/patrol/1", True, "there"))
     assert [one.answer for one in findings.findings] == [False, True]

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from executive.run.history import is_speech
+from executive.run.mission_history import is_speech
 from executive.run.outcome import Execution, Outcome, RobotResult
 from executive.tree.board import FromBoard
 from executive.tree.compiler import CompiledTree, StepPart

@@ -10,7 +10,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
-from executive.run.history import Executions, Findings, claim, findings_in_words
+from executive.run.mission_history import Executions, Findings, claim, findings_in_words
 from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
 from executive.tree.behaviour import Explained, message_of

@@ -17,7 +17,7 @@ from typing import Any, Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.run.history import history_keys
+from executive.run.mission_history import history_keys
 from executive.store.memory import Memory, Recollection, StepRecord
 from executive.tree.behaviour import Explained
 from executive.tree.behaviours.answer import Answer

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform
 
-from executive.run.history import is_speech
+from executive.run.mission_history import is_speech
 from executive.run.outcome import RobotResult
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.words.geometry import inside

@@ -6,7 +6,7 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.run.history import Findings, claim, history_keys
+from executive.run.mission_history import Findings, claim, history_keys
 from executive.run.outcome import Finding, Outcome, Said
 from executive.tree.board import Board
 from skills.api import Cause, Failed, Succeeded

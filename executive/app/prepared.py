@@ -63,7 +63,9 @@ class Prepared:
         """With a tree: the request gets its name and commands, and a fingerprint that trees of equal nodes share."""
         nodes = "\n".join(f"{node.kind} {node.path_id}" for node in tree.root.walk())
         fingerprint = hashlib.sha256(nodes.encode()).hexdigest()[:16]
-        named = replace(self.request, name=tree.mission_name, commands=lines_of_steps(tree.steps), fingerprint=fingerprint)
+        named = replace(
+            self.request, name=tree.mission_name, commands=lines_of_steps(tree.steps), fingerprint=fingerprint
+        )
         return replace(self, request=named, tree=tree)
 
     @property

@@ -13,8 +13,8 @@ from py_trees.common import Status
 
 from executive.record.schemas import SPEECH
 from executive.run.outcome import Execution, Finding, Said
-from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.behaviour import Explained
+from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec

@@ -14,11 +14,11 @@ from plant.carried import Carried
 from plant.diagram import TIME_STEP_S, WorldDiagram
 from plant.happenings.doors import Doors
 from plant.happenings.moves import Moves
+from plant.kept import State
 from plant.kinds import RobotBody, SensorOptions
 from plant.people.receivers import Receivers
 from plant.people.walkers import Walkers
 from plant.sleeping import Sleepers
-from plant.snapshot.values import State
 from plant.worlds.placement import Receiving
 from plant.worlds.route import Route
 from plant.worlds.world import DoorRule

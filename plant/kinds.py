@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
     from pydrake.systems.framework import Context
 
+    from plant.kept import State
     from plant.scene import Scene
-    from plant.snapshot.values import State
 
 GROUP = "errand.robots"
 

@@ -15,12 +15,12 @@ from executive.words.variation import NO_VARIATION, Variation, light_called
 from plant.diagram import LooseModel, build_diagram
 from plant.engine import Engine
 from plant.happenings.moves import Moves
+from plant.kept import State
 from plant.live_scene import LiveScene
 from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.snapshot.file import read_snapshot
-from plant.snapshot.values import State
 from plant.snapshot.writer import SnapshotWriter, restore
 from plant.worlds.clutter import place_clutter
 from plant.worlds.lights import render_parameters

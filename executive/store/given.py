@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from executive.store.missions import MissionState, MissionStore
-from executive.store.values import form
+from skills.files.kept_values import form
 
 _FAILED: Final = (MissionState.FAILURE, MissionState.ERROR, MissionState.CANCELLED)
 

@@ -15,9 +15,9 @@ from executive.mission.request import Request
 from executive.run.visitor import Progress, RunVisitor, TickNote
 from executive.store.database import transaction
 from executive.store.memory import Recollection, StepRecord
-from executive.store.values import form, to_text
 from executive.tree.compiler import CompiledTree
 from executive.words.slug import slug
+from skills.files.kept_values import form, to_text
 from skills.geometry import wrap
 from skills.robot import Pose2D
 

@@ -14,8 +14,8 @@ from executive.mission.request import Request
 from executive.store.database import STORE_FILE, Database
 from executive.store.journal import StoreJournal, of_robot, prefix_of
 from executive.store.memory import Memory, StepRecord
-from executive.store.values import form, from_text
 from skills.files.errors import InputError, listing
+from skills.files.kept_values import form, from_text
 from skills.robot import Pose2D
 
 STORE: Final = "missions.sqlite"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from plant.control.joints import ActuatedJoints, Indices
-from plant.snapshot.values import array_of
+from plant.kept import array_of
 from skills.robot import ArmTrajectory, FloatArray
 
 _ARRIVED_RAD = 0.03

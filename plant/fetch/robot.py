@@ -16,8 +16,8 @@ from plant.fetch.capabilities import fetch_capabilities
 from plant.fetch.model import FINGER_GAIN_N_M, FetchModel
 from plant.fetch.sensing import FetchSensors, axle
 from plant.fetch.wheels import WheelServos
+from plant.kept import State
 from plant.models.fetch.description import fetch_facts
-from plant.snapshot.values import State
 from skills.robot import ArmTrajectory, CommandId, CommandState, FloatArray, Lease
 
 _GRIPPER_TOLERANCES = GripperTolerances(arrived=0.002, stall_rate=0.004)

@@ -11,12 +11,12 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from plant.fetch.capabilities import HEAD_CAMERA, head_camera
 from plant.fetch.model import FetchModel
 from plant.fetch.wheels import Axle, WheelOdometer
+from plant.kept import State
 from plant.kinds import SensorOptions
 from plant.models.fetch.description import HAND_LINK, HEAD_JOINTS, HEAD_LINK, LIFT_JOINT, arm_joint_names, fetch_facts
 from plant.sensors.gripper import GripperNoise
 from plant.sensors.lidar import LidarSpec
 from plant.sensors.suite import LidarMount, SensorSuite
-from plant.snapshot.values import State
 from skills.robot import FloatArray
 
 _GRIPPER_MOVES_M_S = 0.004

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from plant.snapshot.values import State
+from plant.kept import State
 from skills.robot import FloatArray, Pose2D, quantities
 
 _MEAN_AHEAD = 0.75

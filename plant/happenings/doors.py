@@ -17,7 +17,7 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, ModelInstanceIndex, PlanarJoint, SpatialInertia, UnitInertia
 from pydrake.systems.framework import Context
 
-from plant.snapshot.values import State
+from plant.kept import State
 from plant.worlds.world import DoorRule
 from skills.robot import FloatArray
 

@@ -12,7 +12,7 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
-from plant.snapshot.values import State
+from plant.kept import State
 from plant.worlds.placement import ATTEMPTS, Placement, candidates, outline_W, polygon_distance
 from plant.worlds.world import MoveRule, Point, SurfaceTop, World
 from skills.robot import FloatArray

@@ -27,7 +27,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from plant.snapshot.values import State
+from plant.kept import State
 from skills.robot import FloatArray, Pose2D, quantities
 
 

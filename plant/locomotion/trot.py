@@ -10,8 +10,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from plant.kept import State
 from plant.models.spot.description import LEGS
-from plant.snapshot.values import State
 from skills.robot import FloatArray
 
 _PAIRS = ((0, 3), (1, 2))  # indices into LEGS: fl with hr, fr with hl

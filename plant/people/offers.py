@@ -12,8 +12,8 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram
+from plant.kept import State
 from plant.sensors.ray_shapes import ShapeKind, shape_row
-from plant.snapshot.values import State
 from skills.robot import FloatArray
 
 LEAST_HEIGHT_M = 0.5

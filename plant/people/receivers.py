@@ -19,8 +19,8 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.framework import Context
 
 from plant.diagram import X_PT_HOME, WorldDiagram
+from plant.kept import State, array_of, transform_state
 from plant.people.offers import Offer, Offers
-from plant.snapshot.values import State, array_of, transform_state
 from plant.worlds.placement import Receiving
 from skills.robot import FloatArray
 

@@ -19,8 +19,8 @@ from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram
+from plant.kept import State
 from plant.people.paths import Ground
-from plant.snapshot.values import State
 from plant.worlds.route import Route
 from plant.worlds.world import Point, WorldError
 from skills.robot import FloatArray

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from pydrake.geometry import GeometryId, PenetrationAsPointPair
 
+from plant.kept import State
 from plant.referee.entities import ROBOT_KINDS, Entity, Kind
-from plant.snapshot.values import State
 
 Pair = tuple[int, int]
 

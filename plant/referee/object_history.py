@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from plant.snapshot.values import State, array_of, transform_of, transform_state
+from plant.kept import State, array_of, transform_of, transform_state
 from skills.robot import FloatArray
 
 LIFT_M = 0.03

@@ -14,13 +14,13 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from executive.words.goal import GoalCondition
+from plant.kept import State, array_of
 from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
 from plant.referee.entities import Entities, Kind
 from plant.referee.judge import judge
 from plant.referee.object_history import Lift, ObjectHistory, ObjectSample
 from plant.referee.truth import TimedPath, Truth, extend, note_stay
 from plant.referee.verdict import Verdict
-from plant.snapshot.values import State, array_of
 from skills.robot import FloatArray
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from plant.snapshot.values import State
+from plant.kept import State
 
 
 class NoisySensor:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from plant.kept import State
 from plant.sensors.noisy import NoisySensor
-from plant.snapshot.values import State
 from skills.robot import Battery, FloatArray, Imu, Joints, Odometry, Pose2D
 
 

@@ -14,6 +14,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
 
 from plant.control.joints import ActuatedJoints, Indices
+from plant.kept import State
 from plant.kinds import RobotBody, SensorOptions
 from plant.scene import RENDERER
 from plant.sensors.camera import Camera
@@ -22,7 +23,6 @@ from plant.sensors.gripper import GripperModel, GripperNoise
 from plant.sensors.lidar import Lidar, LidarSpec
 from plant.sensors.noisy import NoisySensor
 from plant.sensors.proprioception import BatteryModel, BatterySpec, ImuModel, JointModel, OdometryModel
-from plant.snapshot.values import State
 from skills.robot import Battery, FloatArray, FrameTree, Gripper, Image, Imu, Joints, Odometry, Scan
 
 _DOCKED_WITHIN_M = 0.2

@@ -12,10 +12,10 @@ from plant.control.arm import ArmServos
 from plant.control.commands import Part
 from plant.control.gripper import Closing, GripperServo, GripperTolerances, gripper_set_point
 from plant.control.robot import CommandedRobot
+from plant.kept import State
 from plant.locomotion.floating_base import Velocity
 from plant.locomotion.trot import BodyMotion, Trot
 from plant.models.spot.description import spot_facts
-from plant.snapshot.values import State
 from plant.spot.capabilities import nominal_footholds, spot_capabilities
 from plant.spot.model import SpotModel
 from plant.spot.sensing import SpotSensors

@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
+from plant.kept import State, array_of
 from plant.models.spot.description import LEGS, spot_facts
-from plant.snapshot.values import State, array_of
 from plant.spot.model import JointIndex
 from skills.robot import FloatArray
 

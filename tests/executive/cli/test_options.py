@@ -18,7 +18,7 @@ from executive.mission.request import Request
 from executive.store.missions import MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.triggers import OnCall
-from executive.store.values import form
+from skills.files.kept_values import form
 from skills.files.yaml_source import read_yaml
 
 GOLDEN: dict[str, Any] = read_yaml(Path(__file__).with_name("request_options.yaml")).data

@@ -14,7 +14,7 @@ from plant.carried import Carried
 from plant.diagram import TIME_STEP_S, WorldDiagram
 from plant.happenings.doors import Doors
 from plant.happenings.moves import Moves
-from plant.kept import State
+from plant.kept import Kept, State
 from plant.kinds import RobotBody, SensorOptions
 from plant.people.receivers import Receivers
 from plant.people.walkers import Walkers
@@ -31,7 +31,7 @@ HAND_OUTLINE_M, PERSON_OUTLINE_M = 0.15 * _SQUARE, 0.25 * _SQUARE
 """What a door sees of a hand, and of a person."""
 
 
-class Engine:
+class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
     """A Diagram in motion with the robots in it; implements the Clock protocol."""
 
     def __init__(
@@ -174,19 +174,17 @@ class Engine:
         """Call `listener` whenever time has been advanced and all robots have sensed."""
         self._after_advance.append(listener)
 
-    def state(self) -> State:
-        """Time, what the robots keep, how far the people have walked, and what they are about to take."""
-        robots = {name: robot.state() for name, robot in self._robots.items()}
-        people = {"walkers": self.walkers.state(), "receivers": self.receivers.state()}
-        moves = None if self.moves is None else self.moves.state()
-        return {"steps": self._steps, "robots": robots, **people, "doors": self.doors.state(), "moves": moves}
-
     def world_state(self) -> Mapping[str, FloatArray]:
         """Positions and velocities of all that moves."""
         groups = range(self.root_context.num_discrete_state_groups())
         return {str(group): self.root_context.get_discrete_state(group).value() for group in groups}
 
-    def restore(self, state: State, world: Mapping[str, FloatArray]) -> None:
+    def state(self) -> State:
+        """Time, what the robots keep, how far the people have walked, and what they are about to take."""
+        robots = {name: robot.state() for name, robot in self._robots.items()}
+        return {**super().state(), "robots": robots, "moves": None if self.moves is None else self.moves.state()}
+
+    def go_on(self, state: State, world: Mapping[str, FloatArray]) -> None:
         """Go on from such a state; the robots have powered up in it.
 
         Raises:
@@ -195,17 +193,15 @@ class Engine:
         if set(world) != set(self.world_state()):
             raise ValueError("the parts of the world are others")
         self._sleepers.wake_all()
-        self.walkers.restore(state["walkers"])
-        self._steps = state["steps"]
+        self.restore(state)
         self.root_context.SetTime(self.now())
         for group, values in world.items():
             self.root_context.get_mutable_discrete_state(int(group)).SetFromVector(values)
-        self.receivers.restore(state["receivers"])
-        self.doors.restore(state["doors"])
         if self.moves is not None and state["moves"] is not None:
             self.moves.restore(state["moves"])
         for name, robot in self._robots.items():
-            robot.restore(state["robots"][name], self.now())
+            robot.restore(state["robots"][name])
+            robot.power_up(self.now())
         self._command_robots()
         self._simulator.Initialize()
 

@@ -65,10 +65,13 @@ class PlantRobot(Robot, Protocol):
         """Take new sensor readings."""
 
     def state(self) -> State:
-        """What the robot itself keeps."""
+        """What the robot itself keeps: servos and sensors. Commands and leases do not outlive its computer."""
 
-    def restore(self, state: State, now_s: float) -> None:
-        """Power up in such a state."""
+    def restore(self, state: State) -> None:
+        """Have such a state, before it powers up."""
+
+    def power_up(self, now_s: float) -> None:
+        """Begin anew where it stands: nobody has the lease, no command runs; take readings."""
 
 
 @dataclass(frozen=True)

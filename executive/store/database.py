@@ -8,9 +8,12 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Self
+from typing import Any, Final, Self
+
+from pydantic import TypeAdapter
 
 from skills.files.errors import InputError, disk_is_full
 
@@ -162,6 +165,12 @@ class Database:
                     connection.execute(statement)
                 connection.execute(f"PRAGMA application_id = {kind.application_id}")
                 connection.execute(f"PRAGMA user_version = {kind.version}")
+
+
+@cache
+def form(kind: Any) -> TypeAdapter[Any]:
+    """The JSON form of a type that is known, such as a request: writes and reads its values."""
+    return TypeAdapter(kind)
 
 
 @contextmanager

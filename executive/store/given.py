@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from executive.store.database import form
 from executive.store.missions import MissionState, MissionStore
-from skills.files.kept_values import form
 
 _FAILED: Final = (MissionState.FAILURE, MissionState.ERROR, MissionState.CANCELLED)
 

@@ -13,11 +13,11 @@ from py_trees.common import Status
 
 from executive.mission.request import Request
 from executive.run.visitor import Progress, RunVisitor, TickNote
-from executive.store.database import transaction
+from executive.store.database import form, transaction
 from executive.store.memory import Recollection, StepRecord
 from executive.tree.compiler import CompiledTree
 from executive.words.slug import slug
-from skills.files.kept_values import form, to_text
+from skills.files.kept_values import to_text
 from skills.geometry import wrap
 from skills.robot import Pose2D
 

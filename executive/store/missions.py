@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Final
 
 from executive.mission.request import Request
-from executive.store.database import STORE_FILE, Database
+from executive.store.database import STORE_FILE, Database, form
 from executive.store.journal import StoreJournal, of_robot, prefix_of
 from executive.store.memory import Memory, StepRecord
 from skills.files.errors import InputError, listing
-from skills.files.kept_values import form, from_text
+from skills.files.kept_values import from_text
 from skills.robot import Pose2D
 
 STORE: Final = "missions.sqlite"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.control.joints import ActuatedJoints, Indices
-from plant.kept import array_of
+from plant.control.joints import ActuatedJoints
+from plant.kept import Kept
 from skills.robot import ArmTrajectory, FloatArray
 
 _ARRIVED_RAD = 0.03
@@ -13,13 +13,13 @@ _STILL_RAD_S = 0.06
 _TRAJECTORY_START_RAD = 0.25
 
 
-class ArmServos:
+class ArmServos(Kept, keeps=("goal_rad",)):
     """Set points of one arm's joints."""
 
-    def __init__(self, joints: ActuatedJoints, arm: Indices, fastest_rad_s: FloatArray, now_rad: FloatArray) -> None:
-        """`arm` are the arm's joints among all, `fastest_rad_s` (J,) their speed limits; `now_rad` is where all are."""
-        self._lower, self._upper = joints.lower[arm] - 1e-3, joints.upper[arm] + 1e-3
-        self._arm, self._fastest_rad_s = arm, fastest_rad_s
+    def __init__(self, joints: ActuatedJoints, now_rad: FloatArray) -> None:
+        """`now_rad` is where all joints are."""
+        self._arm, self._fastest_rad_s = joints.arm, joints.fastest_arm_rad_s
+        self._lower, self._upper = joints.lower[self._arm] - 1e-3, joints.upper[self._arm] + 1e-3
         self.hold(now_rad)
 
     def hold(self, joints_rad: FloatArray) -> None:
@@ -56,12 +56,6 @@ class ArmServos:
             return False
         off = np.abs(joints_rad[self._arm] - trajectory.positions_rad[-1]).max()
         return bool(off < _ARRIVED_RAD and np.abs(rates_rad_s[self._arm]).max() < _STILL_RAD_S)
-
-    def restore(self, goal_rad: list[float] | None, joints_rad: FloatArray) -> None:
-        """Hold a goal as kept, or where the arm is."""
-        self.hold(joints_rad)
-        if goal_rad is not None:
-            self.goal_rad = array_of(goal_rad)
 
 
 def arm_set_point(trajectory: ArmTrajectory, elapsed_s: float) -> tuple[FloatArray, FloatArray]:

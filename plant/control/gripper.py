@@ -5,6 +5,8 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+from plant.kept import Kept
+
 
 @dataclass(frozen=True)
 class GripperGoal:
@@ -31,7 +33,7 @@ class Closing(enum.Enum):
     BLOCKED = "blocked"
 
 
-class GripperServo:
+class GripperServo(Kept, keeps=("goal", "_before", "_still_s")):
     """The present goal of one gripper, and the one before."""
 
     def __init__(self, opening: float, tolerances: GripperTolerances) -> None:
@@ -58,15 +60,6 @@ class GripperServo:
             self.goal = GripperGoal(opening, self.goal.force_n)
         elif self.goal.opening > opening:
             self.goal = self._before
-
-    def state(self) -> list[float]:
-        """The goal, and for how long the fingers have stood still."""
-        return [self.goal.opening, self.goal.force_n, self._still_s]
-
-    def restore(self, state: list[float]) -> None:
-        """Go on from such a state."""
-        opening, force_n, self._still_s = state
-        self.goal = self._before = GripperGoal(opening, force_n)
 
 
 def gripper_set_point(goal: float, now: float, lead: float) -> float:

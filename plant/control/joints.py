@@ -19,7 +19,11 @@ class ActuatedJoints:
 
     `positions` and `velocities` index the plant's state. In the actuators' desired state positions come first, then
     velocities: a joint's place there is its number here, and `rates_of` gives that of its velocity.
+    Each kind of robot says which are the arm's, and their speed limits (rad/s).
     """
+
+    arm: Indices
+    fastest_arm_rad_s: FloatArray
 
     def __init__(self, plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
         actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices(instance)]

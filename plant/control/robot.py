@@ -1,18 +1,27 @@
-"""What all simulated robots share behind the Robot protocol: sensing, the command book and the lease."""
+"""What all simulated robots share behind the Robot protocol: sensing, arm and gripper, commands and the lease."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
+import numpy as np
+from pydrake.systems.framework import Context
+
+from plant.control.arm import ArmServos
 from plant.control.commands import CommandTable, Part
-from plant.control.gripper import GripperGoal, GripperServo
+from plant.control.gripper import Closing, GripperGoal, GripperServo, GripperTolerances
+from plant.control.joints import ActuatedJoints
+from plant.kept import Kept, State
+from plant.kinds import RobotBody
 from plant.sensors.suite import SensorSuite
 from skills.robot import (
+    ArmTrajectory,
     Battery,
     Capabilities,
     CommandId,
     CommandState,
     CommandStatus,
+    FloatArray,
     Gripper,
     GripperKind,
     Image,
@@ -67,14 +76,22 @@ class LeaseManager:
         return f"lease {lease.number} of {lease.holder!r} no longer counts; the lease is held by {holder!r}"
 
 
-class CommandedRobot(ABC):
-    """A robot that senses, keeps the book of its commands, and obeys who holds its lease."""
+class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
+    """A robot that senses, keeps the book of its commands, and obeys who holds its lease.
 
-    _gripper: GripperServo
+    What it keeps are its servos and sensors; commands and leases do not outlive its computer.
+    """
 
-    def __init__(self, name: str, capabilities: Capabilities, sensors: SensorSuite) -> None:
-        self._name, self._capabilities, self._sensors = name, capabilities, sensors
-        self._commands, self._leases = CommandTable(), LeaseManager(name)
+    def __init__(
+        self, body: RobotBody, index: ActuatedJoints, sensors: SensorSuite, context: Context, gripper: GripperTolerances
+    ) -> None:
+        """Take over the robot as it stands in the plant's `context` at time 0."""
+        self._name, self._capabilities, self._sensors = body.name, body.kind.capabilities(), sensors
+        self._plant, self._instance, self._index, self._context = body.plant, body.instance, index, context
+        joints = self._joints()
+        self._arm = ArmServos(index, joints)
+        self._gripper = GripperServo(max(0.0, self._fingers_at(joints, joints)[0]), gripper)
+        self._commands, self._leases = CommandTable(), LeaseManager(body.name)
         self._now_s = 0.0
 
     # -- know and sense -------------------------------------------------------------------------------------------
@@ -121,6 +138,11 @@ class CommandedRobot(ABC):
         return ()
 
     # -- act ------------------------------------------------------------------------------------------------------
+
+    def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
+        """Follow a joint trajectory; done when its end is reached and the arm is still."""
+        reason = self._arm.refusal(trajectory)
+        return self._commands.refuse(reason) if reason else self._begin(Part.ARM, trajectory, until_s, lease)
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Move the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
@@ -179,16 +201,75 @@ class CommandedRobot(ABC):
         self._now_s = now_s
         self._sensors.update(now_s)
 
+    def control(self, now_s: float, dt_s: float) -> None:
+        """Command all servos for the next dt_s of simulated time, which bear the robot's weight besides."""
+        self._now_s = now_s
+        self._expire()
+        joints, rates = self._joints(), self._rates()
+        self._follow_arm(joints, rates)
+        self._follow_gripper(joints, rates, dt_s)
+        desired = self._desired(joints, rates, dt_s)
+        plant, context, index = self._plant, self._context, self._index
+        desired[index.arm], desired[index.rates_of(index.arm)] = self._arm.goal_rad, self._arm.rate_rad_s
+        gravity = plant.CalcGravityGeneralizedForces(context)[index.velocities]
+        plant.get_desired_state_input_port(self._instance).FixValue(context, desired)
+        feed_forward = np.minimum(np.maximum(-gravity, -index.efforts), index.efforts)
+        plant.get_actuation_input_port(self._instance).FixValue(context, feed_forward)
+
+    def state(self) -> State:
+        """What the robot itself keeps, and whether its arm moves."""
+        return {**super().state(), "arm_moves": self._commands.running(Part.ARM) is not None}
+
+    def restore(self, state: State) -> None:
+        """Have such a state: an arm that was moving holds where it is; the gripper keeps its clamp."""
+        super().restore(state)
+        if state["arm_moves"]:
+            self._arm.hold(self._joints())
+
+    def power_up(self, now_s: float) -> None:
+        """Begin anew where it stands: nobody has the lease, no command runs; take readings."""
+        self._now_s = now_s
+        self._commands, self._leases = CommandTable(), LeaseManager(self._name)
+        self._sensors.power_up(now_s)
+
     # -- for the kinds of robots ----------------------------------------------------------------------------------
 
     @abstractmethod
-    def _hold_still(self, part: Part) -> None:
-        """Make where a moving part is the place where it stays."""
+    def _fingers_at(self, joints: FloatArray, rates: FloatArray) -> tuple[float, float]:
+        """How far the gripper is open, and how fast its fingers move, in the unit of its kind and s."""
 
-    def _forget_commands(self, now_s: float) -> None:
-        """Power up anew: nobody has the lease, no command runs."""
-        self._now_s = now_s
-        self._commands, self._leases = CommandTable(), LeaseManager(self._name)
+    @abstractmethod
+    def _desired(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> FloatArray:
+        """Positions and velocities that all joints but the arm's are to have after dt_s."""
+
+    def _hold_still(self, part: Part) -> None:
+        """Make where a part is the place where it stays; a gripper that clamps something goes on clamping."""
+        if part is Part.ARM:
+            self._arm.hold(self._joints())
+        if part is Part.GRIPPER:
+            opening, rate = self._fingers_at(self._joints(), self._rates())
+            self._gripper.halt(max(0.0, opening), rate)
+
+    def _joints(self) -> FloatArray:
+        """Positions of all joints."""
+        return np.asarray(self._plant.GetPositions(self._context)[self._index.positions])
+
+    def _rates(self) -> FloatArray:
+        """Velocities of all joints."""
+        return np.asarray(self._plant.GetVelocities(self._context)[self._index.velocities])
+
+    def _follow_arm(self, joints: FloatArray, rates: FloatArray) -> None:
+        active = self._commands.running(Part.ARM)
+        trajectory = active.payload if active is not None and isinstance(active.payload, ArmTrajectory) else None
+        elapsed_s = 0.0 if active is None else self._now_s - active.since_s
+        if self._arm.follow(trajectory, elapsed_s, joints, rates):
+            self._commands.finish(Part.ARM, CommandState.DONE)
+
+    def _follow_gripper(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> None:
+        closing = self._gripper.follow(*self._fingers_at(joints, rates), dt_s)
+        if closing is not Closing.MOVING:
+            reason = "" if closing is Closing.ARRIVED else "stopped by an object in the gripper"
+            self._commands.finish(Part.GRIPPER, CommandState.DONE, reason)
 
     def _begin(self, part: Part, payload: object, until_s: float, lease: Lease) -> CommandId:
         refusal = self._leases.refusal(lease)

@@ -11,7 +11,6 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from plant.fetch.capabilities import HEAD_CAMERA, head_camera
 from plant.fetch.model import FetchModel
 from plant.fetch.wheels import Axle, WheelOdometer
-from plant.kept import State
 from plant.kinds import SensorOptions
 from plant.models.fetch.description import HAND_LINK, HEAD_JOINTS, HEAD_LINK, LIFT_JOINT, arm_joint_names, fetch_facts
 from plant.sensors.gripper import GripperNoise
@@ -30,7 +29,7 @@ def axle() -> Axle:
     return Axle(wheel["radius"], wheel["offset"][1])
 
 
-class FetchSensors(SensorSuite):
+class FetchSensors(SensorSuite, keeps=("_odometer",)):
     """All sensors of one Fetch."""
 
     def __init__(self, model: FetchModel, options: SensorOptions) -> None:
@@ -43,7 +42,6 @@ class FetchSensors(SensorSuite):
         super().__init__(
             model,
             self._joints,
-            self._joints.arm,
             options,
             lidar=LidarMount(model.base, RigidTransform(self._p_BaseL), lidar_spec(), 1.0 / facts["lidar"]["rate"]),
             cameras={HEAD_CAMERA: head_camera()},
@@ -85,15 +83,6 @@ class FetchSensors(SensorSuite):
     def _frames_of_links(self) -> Mapping[str, tuple[str, RigidTransform]]:
         X_BH, X_BHead = self._X_BLinks((*arm_joint_names(), *HEAD_JOINTS), (HAND_LINK, HEAD_LINK))
         return {HAND_LINK: ("hand", X_BH), HEAD_LINK: ("head", X_BHead)}
-
-    def state(self) -> State:
-        """What changes from one reading to the next."""
-        return {**super().state(), "odometer": self._odometer.state()}
-
-    def restore(self, state: State, now_s: float) -> None:
-        """Go on from such a state, and take readings."""
-        self._odometer.restore(state["odometer"])
-        super().restore(state, now_s)
 
 
 def lidar_spec() -> LidarSpec:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from plant.kept import State
+from plant.kept import Kept
 from skills.robot import FloatArray, Pose2D, quantities
 
 _MEAN_AHEAD = 0.75
@@ -48,7 +48,7 @@ class Axle:
         return (left_m + right_m) / 2.0, (right_m - left_m) / (2.0 * self.half_track_m)
 
 
-class WheelServos:
+class WheelServos(Kept, keeps=("_speed", "_turn_rate", "_due_rad")):
     """Set points of the wheels for a wanted velocity; at rest they hold the wheels where they are."""
 
     def __init__(self, axle: Axle, now_rad: FloatArray, limits: WheelLimits) -> None:
@@ -69,17 +69,8 @@ class WheelServos:
         self.goal_rad = self._due_rad + _MEAN_AHEAD * self.rate_rad_s * dt_s
         self._due_rad = self._due_rad + self.rate_rad_s * dt_s
 
-    def state(self) -> State:
-        """What is asked of the wheels."""
-        return {"speed": [self._speed, self._turn_rate], "due": self._due_rad.tolist()}
 
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        self._speed, self._turn_rate = state["speed"]
-        self._due_rad = np.array(state["due"])
-
-
-class WheelOdometer:
+class WheelOdometer(Kept, keeps=("pose", "_last_rad")):
     """The base's pose since the beginning, as its wheels' encoders count it: slip goes unnoticed."""
 
     def __init__(self, axle: Axle, now_rad: FloatArray) -> None:
@@ -97,15 +88,6 @@ class WheelOdometer:
             self.pose.y_m + way_m * math.sin(middle),
             math.remainder(self.pose.yaw_rad + turn_rad, math.tau),
         )
-
-    def state(self) -> State:
-        """The pose, and the encoders' last readings."""
-        pose = self.pose
-        return {"pose": [pose.x_m, pose.y_m, pose.yaw_rad], "last": self._last_rad.tolist()}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        self.pose, self._last_rad = Pose2D(*state["pose"]), np.array(state["last"])
 
 
 def _cut(value: float, most: float) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -17,7 +18,7 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, ModelInstanceIndex, PlanarJoint, SpatialInertia, UnitInertia
 from pydrake.systems.framework import Context
 
-from plant.kept import State
+from plant.kept import Kept
 from plant.worlds.world import DoorRule
 from skills.robot import FloatArray
 
@@ -71,7 +72,36 @@ def _pose(door: DoorRule, share: float) -> FloatArray:
     return np.array([x + way_m * math.cos(door.yaw), y + way_m * math.sin(door.yaw), door.yaw])
 
 
-class Doors:
+def slide(
+    plant: MultibodyPlant, context: Context, instance: ModelInstanceIndex, pose: FloatArray, velocity: FloatArray
+) -> None:
+    """Set (x, y, yaw) and their rates, where they are others, of a model that slides on a planar joint."""
+    if np.abs(plant.GetPositions(context, instance) - pose).max() > _MOVED:
+        plant.SetPositions(context, instance, pose)
+    if np.abs(plant.GetVelocities(context, instance) - velocity).max() > _MOVED:
+        plant.SetVelocities(context, instance, velocity)
+
+
+@dataclass
+class _Panel(Kept):
+    """The panel of a door: to which share it closes it, whether it `closes` now, and each share with its time (s).
+
+    The history only tells 0 (open), 1 (closed) and 0.5 (moving).
+    """
+
+    share: float
+    closes: bool
+    history: list[tuple[float, float]]
+
+    def move_to(self, share: float, now_s: float) -> None:
+        """Take a share, and record a change between open, closed and moving."""
+        self.share = share
+        told = share if share in (0.0, 1.0) else 0.5
+        if told != self.history[-1][1]:
+            self.history.append((now_s, told))
+
+
+class Doors(Kept, keeps=("_panels",)):
     """The doors of one plant; `before_step` is to be called before each step. `outlines` may stand in a doorway."""
 
     def __init__(
@@ -86,9 +116,8 @@ class Doors:
         self._plant, self._context, self._outlines, self._tell = plant, context, outlines, tell
         self._doors = {door.name: door for door in doors}
         self._instances = {name: plant.GetModelInstanceByName(name) for name in self._doors}
-        self._shares = {name: _share_closed(door, 0.0) for name, door in self._doors.items()}
-        self._closing = {name: share == 1.0 for name, share in self._shares.items()}
-        self._history: dict[str, list[tuple[float, float]]] = {name: [(0.0, s)] for name, s in self._shares.items()}
+        shares = {name: _share_closed(door, 0.0) for name, door in self._doors.items()}
+        self._panels = {name: _Panel(share, share == 1.0, [(0.0, share)]) for name, share in shares.items()}
 
     @property
     def still(self) -> bool:
@@ -97,31 +126,24 @@ class Doors:
 
     def history(self) -> Mapping[tuple[float, float], Sequence[tuple[float, float]]]:
         """Changes of each door by its position (x, y): time (s) and closed share, 0 open, 1 closed, 0.5 moving."""
-        return {door.at: tuple(self._history[name]) for name, door in self._doors.items()}
+        return {door.at: tuple(self._panels[name].history) for name, door in self._doors.items()}
 
     def before_step(self, now_s: float, dt_s: float) -> None:
         """Put each panel where it is, with the velocity that leads to where it will be after dt_s."""
         for name, door in self._doors.items():
-            closes = _closed_at(door, now_s)
-            if closes != self._closing[name]:
-                self._closing[name] = closes
+            panel, closes = self._panels[name], _closed_at(door, now_s)
+            if closes != panel.closes:
+                panel.closes = closes
                 self._tell(f"the {name} {'closes' if closes else 'opens'}")
-            before, after = self._shares[name], self._next(door, closes, dt_s)
-            self._shares[name] = after
-            self._note(name, now_s)
+            before, after = panel.share, self._next(door, panel, dt_s)
+            panel.move_to(after, now_s)
             pose = _pose(door, before)
-            self._set(self._instances[name], pose, (_pose(door, after) - pose) / dt_s)
+            slide(self._plant, self._context, self._instances[name], pose, (_pose(door, after) - pose) / dt_s)
 
-    def _note(self, name: str, now_s: float) -> None:
-        """Record a change between open, closed and moving."""
-        share = self._shares[name] if self._shares[name] in (0.0, 1.0) else 0.5
-        if share != self._history[name][-1][1]:
-            self._history[name].append((now_s, share))
-
-    def _next(self, door: DoorRule, closes: bool, dt_s: float) -> float:
+    def _next(self, door: DoorRule, panel: _Panel, dt_s: float) -> float:
         """To which share a door is closed after dt_s."""
-        share, step = self._shares[door.name], SPEED_M_S * dt_s / door.width
-        if not closes:
+        share, step = panel.share, SPEED_M_S * dt_s / door.width
+        if not panel.closes:
             return max(0.0, share - step)
         return share if share < 1.0 and self._occupied(door) else min(1.0, share + step)
 
@@ -130,24 +152,3 @@ class Doors:
         half = 0.5 * door.width * np.array([math.cos(door.yaw), math.sin(door.yaw)])
         line = shapely.LineString([np.array(door.at) - half, np.array(door.at) + half])
         return any(shapely.distance(line, shapely.Polygon(each)) < CLEAR_M for each in self._outlines())
-
-    def _set(self, instance: ModelInstanceIndex, pose: FloatArray, velocity: FloatArray) -> None:
-        """Set a panel's (x, y, yaw) and their rates where they are others."""
-        plant, context = self._plant, self._context
-        if np.abs(plant.GetPositions(context, instance) - pose).max() > _MOVED:
-            plant.SetPositions(context, instance, pose)
-        if np.abs(plant.GetVelocities(context, instance) - velocity).max() > _MOVED:
-            plant.SetVelocities(context, instance, velocity)
-
-    def state(self) -> State:
-        """How far each door is closed, whether it closes, and how it was before."""
-        return {
-            name: [self._shares[name], self._closing[name], [list(each) for each in self._history[name]]]
-            for name in self._doors
-        }
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state. Raises KeyError: a door is not in it."""
-        for name in self._doors:
-            self._shares[name], self._closing[name], history = state[name]
-            self._history[name] = [(begun_s, share) for begun_s, share in history]

@@ -12,7 +12,7 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
-from plant.kept import State
+from plant.kept import Kept
 from plant.worlds.placement import ATTEMPTS, Placement, candidates, outline_W, polygon_distance
 from plant.worlds.world import MoveRule, Point, SurfaceTop, World
 from skills.robot import FloatArray
@@ -25,7 +25,7 @@ Hands = Mapping[str, FloatArray]
 """Where the hand of each robot is, (3,) in the world."""
 
 
-class Moves:
+class Moves(Kept, keeps=("_done",)):
     """The moves of one plant; `before_step` is to be called before each step."""
 
     def __init__(
@@ -44,7 +44,7 @@ class Moves:
         self._bodies = {
             name: plant.get_body(plant.GetBodyIndices(plant.GetModelInstanceByName(name))[0]) for name in self._forms
         }
-        self._done: set[int] = set()
+        self._done: frozenset[int] = frozenset()
         self._listeners: list[Callable[[str], None]] = []
 
     def listen(self, listener: Callable[[str], None]) -> None:
@@ -55,7 +55,7 @@ class Moves:
         """Move what is due. `hands_W` gives where the robots' hands are; `holding` are those that hold something."""
         for number, move in enumerate(self._world.moves):
             if number not in self._done and now_s >= move.at:
-                self._done.add(number)
+                self._done |= {number}
                 self._do(number, move, hands_W(), holding)
 
     def _do(self, number: int, move: MoveRule, hands_W: Hands, holding: Sequence[str]) -> None:
@@ -116,14 +116,6 @@ class Moves:
 
     def _place_W(self, name: str) -> FloatArray:
         return np.array(self._plant.EvalBodyPoseInWorld(self._context, self._bodies[name]).translation())
-
-    def state(self) -> State:
-        """Which moves were made."""
-        return {"done": sorted(self._done)}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        self._done = set(state["done"])
 
 
 def _told(move: MoveRule) -> str:

@@ -27,7 +27,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from plant.kept import State
+from plant.kept import Kept
 from skills.robot import FloatArray, Pose2D, quantities
 
 
@@ -63,7 +63,7 @@ _AXES = ("x", "y", "yaw", "height", "pitch")
 _GAINS = {"x": (8e3, 2e3), "y": (8e3, 2e3), "yaw": (2e3, 4e2), "height": (6e4, 3e3), "pitch": (8e3, 4e2)}
 
 
-class FloatingBase:
+class FloatingBase(Kept, keeps=("_velocity", "_target", "_posture")):
     """Bears one robot's body and drives it to a velocity and a posture with limited force and acceleration."""
 
     def __init__(
@@ -125,7 +125,7 @@ class FloatingBase:
         """The height and pitch that are being commanded now, on the way to those wanted."""
         return self._posture
 
-    def state(self, positions: FloatArray) -> list[float]:
+    def pose(self, positions: FloatArray) -> list[float]:
         """(x, y, yaw, height, pitch) out of the plant's positions."""
         values: list[float] = positions[self._places].tolist()
         return values
@@ -171,21 +171,6 @@ class FloatingBase:
         self._target = [*ahead, *self._posture]
         desired = np.array([*self._target, *rates, move[0] / dt_s, move[1] / dt_s])
         self._plant.get_desired_state_input_port(self.instance).FixValue(context, desired)
-
-    def state_kept(self) -> State:
-        """What it asks of its joints."""
-        v = self._velocity
-        return {
-            "velocity": [v.vx, v.vy, v.wz],
-            "target": [*self._target],
-            "posture": [*self._posture],
-        }
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        self._velocity = Velocity(*state["velocity"])
-        self._target = [*state["target"]]
-        self._posture = (state["posture"][0], state["posture"][1])
 
     def _ramp(self, wanted: Velocity, dt_s: float, *, stopping: bool) -> Velocity:
         limits, now = self._limits, self._velocity

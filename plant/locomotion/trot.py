@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from plant.kept import State
+from plant.kept import Kept
 from plant.models.spot.description import LEGS
 from skills.robot import FloatArray
 
@@ -46,7 +46,7 @@ class BodyMotion:
         return self.x_m + (c * self.vx - s * self.vy) * dt_s, self.y_m + (s * self.vx + c * self.vy) * dt_s, yaw
 
 
-class Trot:
+class Trot(Kept, keeps=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_progress_s")):
     """Where the four feet shall be, step by step. Feet are ordered as `LEGS`."""
 
     def __init__(self, nominal_B: FloatArray, parameters: TrotParameters | None = None) -> None:
@@ -78,17 +78,6 @@ class Trot:
         if self._swinging is not None:
             self._swing(motion, dt_s)
         return self._feet_W
-
-    def state(self) -> State:
-        """Where the feet are in their gait."""
-        gait = {"swinging": self._swinging, "next_pair": self._next_pair, "progress_s": self._progress_s}
-        return {"feet_W": _copied(self._feet_W), "lift_W": _copied(self._lift_W), **gait}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        self._feet_W, self._lift_W = _copied(state["feet_W"]), _copied(state["lift_W"])
-        self._swinging, self._next_pair = state["swinging"], state["next_pair"]
-        self._progress_s = state["progress_s"]
 
     def _maybe_lift(self, motion: BodyMotion) -> None:
         moving = math.hypot(motion.vx, motion.vy) > 0.02 or abs(motion.wz) > 0.05

@@ -12,7 +12,7 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram
-from plant.kept import State
+from plant.kept import Kept
 from plant.sensors.ray_shapes import ShapeKind, shape_row
 from skills.robot import FloatArray
 
@@ -24,14 +24,13 @@ _AT_HAND_M = 0.5
 
 @dataclass(frozen=True)
 class Offer:
-    """An object (model name and body) that a robot holds."""
+    """An object that a robot holds."""
 
     robot: str
     thing: str
-    body: RigidBody
 
 
-class Offers:
+class Offers(Kept, keeps=("_still_since_s",)):
     """What the robots of one plant hold out; call `look` regularly."""
 
     def __init__(self, world: WorldDiagram, context: Context) -> None:
@@ -75,12 +74,12 @@ class Offers:
         for name, still_s in self._still_since_s.items():
             away_m = math.dist(self.grip_W(name)[:2], p_WP[:2])
             if still_s <= since_s and away_m <= reach_m and (thing := self._free_in(name)) is not None:
-                return Offer(name, thing, self.loose[thing])
+                return Offer(name, thing)
         return None
 
     def holds(self, offer: Offer) -> bool:
         """Whether an object is still held out, be it that the arm gives way to a pull; what is moved faster is not."""
-        p_WO = self._plant.EvalBodyPoseInWorld(self._context, offer.body).translation()
+        p_WO = self._plant.EvalBodyPoseInWorld(self._context, self.loose[offer.thing]).translation()
         at_hand = float(np.linalg.norm(p_WO - self.grip_W(offer.robot))) < _AT_HAND_M
         return at_hand and self._before_outline(offer.robot) and self._hand_m_s(offer.robot) < MOVES_M_S
 
@@ -103,13 +102,13 @@ class Offers:
 
     def lowest_m(self, offer: Offer) -> float:
         """The height of the lowest point of an object and of the gripper that holds it."""
-        bodies = (offer.body, *self._links[offer.robot])
+        bodies = (self.loose[offer.thing], *self._links[offer.robot])
         return min(z for body in bodies for z in self._lows_m(body))
 
     def place_W(self, offer: Offer) -> FloatArray:
         """The object's centre of mass."""
-        X_WO = self._plant.EvalBodyPoseInWorld(self._context, offer.body)
-        return np.asarray(X_WO @ offer.body.default_com())
+        body = self.loose[offer.thing]
+        return np.asarray(self._plant.EvalBodyPoseInWorld(self._context, body) @ body.default_com())
 
     def _lows_m(self, body: RigidBody) -> Iterator[float]:
         """The lowest height of each shape of a body."""
@@ -148,14 +147,6 @@ class Offers:
         if len(held) != 1 or touching[int(self.loose[held[0]].index())] - links:
             return None
         return held[0]
-
-    def state(self) -> State:
-        """Since when each robot holds something out."""
-        return dict(self._still_since_s)
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        self._still_since_s = dict(state)
 
 
 def _reach_m(kind: ShapeKind, half_m: FloatArray, down: FloatArray) -> float:

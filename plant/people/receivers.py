@@ -19,7 +19,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.framework import Context
 
 from plant.diagram import X_PT_HOME, WorldDiagram
-from plant.kept import State, array_of, transform_state
+from plant.kept import Kept
 from plant.people.offers import Offer, Offers
 from plant.worlds.placement import Receiving
 from skills.robot import FloatArray
@@ -53,7 +53,7 @@ class Phase(enum.Enum):
     RECEIVING = "receiving"
 
 
-class Receiver:
+class Receiver(Kept, keeps=("phase", "offer", "_since_s", "_opening", "_p_HO", "_home", "_X_WT")):
     """One person. Call `look` now and then, and `move_tray` before each step."""
 
     def __init__(self, world: WorldDiagram, context: Context, name: str, receiving: Receiving, offers: Offers) -> None:
@@ -203,29 +203,6 @@ class Receiver:
         if float(np.abs(off).max()) > _MOVED:
             plant.SetFreeBodySpatialVelocity(context, tray, V_WT)
 
-    def state(self) -> State:
-        """What the person does."""
-        taken = None if self.offer is None else [self.offer.robot, self.offer.thing]
-        return {
-            "phase": self.phase.value,
-            "offer": taken,
-            "since_s": self._since_s,
-            "opening": self._opening,
-            "p_HO": self._p_HO.tolist(),
-            "home": self._home,
-            "X_WT": transform_state(self._X_WT),
-        }
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state. Raises KeyError: an object is not there."""
-        self.phase, self._since_s, self._home = Phase(state["phase"]), state["since_s"], state["home"]
-        self._opening, self._p_HO = state["opening"], array_of(state["p_HO"])
-        self._X_WT = RigidTransform(np.array(state["X_WT"]))
-        self.offer = None
-        if state["offer"] is not None:
-            robot, thing = state["offer"]
-            self.offer = Offer(robot, thing, self._offers.loose[thing])
-
 
 def _towards(X: RigidTransform, goal: RigidTransform, dt_s: float) -> tuple[RigidTransform, SpatialVelocity]:
     """The pose after dt_s on the way to a goal, at limited speed, and the velocity that leads there."""
@@ -241,7 +218,7 @@ LOOK_STEPS = 4
 """Everybody looks whether something is held out once in so many steps."""
 
 
-class Receivers:
+class Receivers(Kept, keeps=("_steps", "_offers", "_people")):
     """The people of one plant who receive, by name. `before_step` is to be called before each step."""
 
     def __init__(self, world: WorldDiagram, context: Context, receiving: Mapping[str, Receiving]) -> None:
@@ -283,20 +260,8 @@ class Receivers:
         force_W = person.pull_W(now_s)
         if force_W is None or person.offer is None:
             return None
-        pull = ExternallyAppliedSpatialForce()
-        pull.body_index = person.offer.body.index()
-        pull.p_BoBq_B = person.offer.body.default_com()
+        pull, body = ExternallyAppliedSpatialForce(), self._offers.loose[person.offer.thing]
+        pull.body_index = body.index()
+        pull.p_BoBq_B = body.default_com()
         pull.F_Bq_W = SpatialForce(np.zeros(3), force_W)
         return pull
-
-    def state(self) -> State:
-        """What everybody is about."""
-        people = {name: person.state() for name, person in self._people.items()}
-        return {"steps": self._steps, "offers": self._offers.state(), "people": people}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state; the trays are where the plant has them. Raises KeyError: somebody is not in it."""
-        self._steps = state["steps"]
-        self._offers.restore(state["offers"])
-        for name, person in self._people.items():
-            person.restore(state["people"][name])

@@ -19,7 +19,8 @@ from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram
-from plant.kept import State
+from plant.happenings.doors import slide
+from plant.kept import Kept
 from plant.people.paths import Ground
 from plant.worlds.route import Route
 from plant.worlds.world import Point, WorldError
@@ -43,8 +44,11 @@ class Leg:
         return tuple(lengths)
 
 
-class Walk:
-    """A person on the legs of a route, who looks where they go. Call `advance` once a step."""
+class Walk(Kept, keeps=("_leg", "_way_m", "_wait_s", "_detour", "place_W", "yaw_rad", "heading_rad", "held_s")):
+    """A person on the legs of a route, who looks where they go. Call `advance` once a step.
+
+    `held_s` is for how long they stand for a robot.
+    """
 
     def __init__(
         self, legs: Sequence[Leg], *, at_W: Point, yaw_rad: float, speed_m_s: float, start_s: float, loops: bool
@@ -54,6 +58,7 @@ class Walk:
         self._speed_m_s, self._loops = speed_m_s, loops
         self._leg, self._way_m, self._wait_s = 0, 0.0, start_s
         self._detour: tuple[Leg, tuple[float, ...]] | None = None
+        self.held_s = 0.0
         self.place_W, self.yaw_rad, self.heading_rad = at_W, yaw_rad, yaw_rad
 
     @property
@@ -113,23 +118,6 @@ class Walk:
             off_rad = math.remainder(self.heading_rad - self.yaw_rad, math.tau)
             self.yaw_rad += max(-TURN_RAD_S * dt_s, min(TURN_RAD_S * dt_s, off_rad))
 
-    def state(self) -> State:
-        """How far the person is."""
-        pose = [*self.place_W, self.yaw_rad, self.heading_rad]
-        detour = None if self._detour is None else [[*corner] for corner in self._detour[0].corners_W]
-        return {"leg": self._leg, "way_m": self._way_m, "wait_s": self._wait_s, "pose": pose, "detour": detour}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        self._leg, self._way_m, self._wait_s = state["leg"], state["way_m"], state["wait_s"]
-        self._detour = None
-        if state["detour"] is not None:
-            way_m = self._way_m
-            self.detour(tuple((x, y) for x, y in state["detour"]))
-            self._way_m = way_m
-        x, y, self.yaw_rad, self.heading_rad = state["pose"]
-        self.place_W = (x, y)
-
 
 BODY_KG, BODY_M = 75.0, (0.2, 1.75)
 """Mass, and radius and height of the cylinder that has the body's inertia."""
@@ -141,10 +129,9 @@ PATIENCE_S = 4.0
 """Who has yielded so long looks for a way around the robots, and again after as long."""
 PASS_M = 0.22
 """On a way around, they stop only for what is nearer than this."""
-_MOVED = 1e-9
 
 
-class Walkers:
+class Walkers(Kept, keeps=("_walks",)):
     """The people of one plant who walk, by name. `before_step` is to be called before each step."""
 
     def __init__(self, world: WorldDiagram, context: Context, routes: Mapping[str, Route]) -> None:
@@ -158,7 +145,6 @@ class Walkers:
         for instance in self._instances.values():
             (body,) = (world.plant.get_body(index) for index in world.plant.GetBodyIndices(instance))
             body.SetSpatialInertiaInBodyFrame(context, inertia)
-        self._held_s = dict.fromkeys(routes, 0.0)
         self._walks: dict[str, Walk] = {}
         self._ground: Ground | None = None
         if routes:
@@ -191,28 +177,21 @@ class Walkers:
             elif walk.walks and self._held(name, walk):
                 self._wait(name, walk, dt_s)
             else:
-                self._held_s[name] = 0.0
+                walk.held_s = 0.0
                 walk.advance(dt_s)
             after = (*walk.place_W, walk.yaw_rad)
-            self._set(name, np.array(before), (np.array(after) - before) / dt_s)
+            velocity = (np.array(after) - before) / dt_s
+            slide(self._plant, self._context, self._instances[name], np.array(before), velocity)
 
     def _wait(self, name: str, walk: Walk, dt_s: float) -> None:
         """Stand for a robot; after a while, look for a way around."""
-        self._held_s[name] += dt_s
-        if self._held_s[name] < PATIENCE_S or self._ground is None:
+        walk.held_s += dt_s
+        if walk.held_s < PATIENCE_S or self._ground is None:
             return
-        self._held_s[name] = 0.0
+        walk.held_s = 0.0
         with contextlib.suppress(WorldError):
             around = self._ground.around(self._outlines_W(walk))
             walk.detour(around.way(walk.place_W, walk.next_stop_W, who=name))
-
-    def _set(self, name: str, pose: FloatArray, velocity: FloatArray) -> None:
-        """Set the body's (x, y, yaw) and their rates where they are others."""
-        plant, instance = self._plant, self._instances[name]
-        if np.abs(plant.GetPositions(self._context, instance) - pose).max() > _MOVED:
-            plant.SetPositions(self._context, instance, pose)
-        if np.abs(plant.GetVelocities(self._context, instance) - velocity).max() > _MOVED:
-            plant.SetVelocities(self._context, instance, velocity)
 
     def _held(self, name: str, walk: Walk) -> bool:
         """Whether somebody who is on the way stands for a robot."""
@@ -236,16 +215,6 @@ class Walkers:
             return False
         bearing_rad = math.remainder(math.atan2(offset[1], offset[0]) - walk.heading_rad, math.tau)
         return abs(bearing_rad) < AHEAD_RAD
-
-    def state(self) -> State:
-        """How far everybody is."""
-        return {name: {**walk.state(), "held_s": self._held_s[name]} for name, walk in self._walks.items()}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state. Raises KeyError: somebody is not in it."""
-        for name, walk in self._walks.items():
-            walk.restore(state[name])
-            self._held_s[name] = state[name]["held_s"]
 
 
 def _walk(name: str, route: Route, ground: Ground) -> Walk:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pydrake.geometry import GeometryId, PenetrationAsPointPair
 
-from plant.kept import State
+from plant.kept import Kept
 from plant.referee.entities import ROBOT_KINDS, Entity, Kind
 
 Pair = tuple[int, int]
@@ -48,7 +48,7 @@ class Collision:
     other_robot: str | None = None
 
 
-class CollisionCounter:
+class CollisionCounter(Kept, keeps=("_last_touched_s", "collisions")):
     """Counts rising edges of contact between robots and scenery, persons or other robots.
 
     A pair that parts for less than `debounce_s` is still the same bump. What touches at first does not count. With a
@@ -74,21 +74,6 @@ class CollisionCounter:
             if time_s - self._last_touched_s.get(counted, float("-inf")) > self._debounce_s:
                 self.collisions.append(self._collision(time_s, pair, speeds_m_s))
             self._last_touched_s[counted] = time_s
-
-    def state(self) -> State:
-        """The record so far."""
-        touched = None if self._last_touched_s is None else [[*pair, t] for pair, t in self._last_touched_s.items()]
-        bumps = [
-            [bump.time_s, bump.robot, bump.part.value, bump.sentence, bump.person, bump.walked_in, bump.other_robot]
-            for bump in self.collisions
-        ]
-        return {"touched": touched, "bumps": bumps}
-
-    def restore(self, state: State) -> None:
-        """Go on with such a record."""
-        touched = state["touched"]
-        self._last_touched_s = None if touched is None else {(a, b): time_s for a, b, time_s in touched}
-        self.collisions = [Collision(at_s, robot, Kind(part), *told) for at_s, robot, part, *told in state["bumps"]]
 
     def _counted_as(self, pair: Pair) -> Pair:
         """The pair itself; with a person or another robot, one that stands for the whole robot."""

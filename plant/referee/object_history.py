@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from plant.kept import State, array_of, transform_of, transform_state
+from plant.kept import Kept
 from skills.robot import FloatArray
 
 LIFT_M = 0.03
@@ -22,11 +21,6 @@ FLICKER_S = 0.15
 SETTLE_S = 1.0
 SET_DOWN_S = 0.3
 """What stood on the floor so shortly before the gripper left it was set down."""
-_PLAIN = (
-    *("events", "dropped_s", "touches", "speed_m_s", "_grip_s", "_grip_robot", "_grip_z_m", "_supported_s"),
-    *("_still_since_s", "_carried", "_left_z_m", "_dropped", "_tray_s", "_tray_of", "_by_others"),
-    "_set_down_s",
-)
 
 
 @dataclass(frozen=True)
@@ -45,17 +39,6 @@ class ObjectSample:
     on_floor: bool
     tray_of: str | None = None
 
-    def state(self) -> list[Any]:
-        """The sample as plain values."""
-        X_WH = transform_state(self.X_WH)
-        return [self.time_s, self.p_WO.tolist(), self.gripper, X_WH, self.supported, self.on_floor, self.tray_of]
-
-    @staticmethod
-    def of(state: list[Any]) -> ObjectSample:
-        """The sample of such values."""
-        time_s, p_WO, gripper, X_WH, *rest = state
-        return ObjectSample(time_s, array_of(p_WO), gripper, transform_of(X_WH), *rest)
-
 
 @dataclass(frozen=True)
 class Lift:
@@ -67,7 +50,7 @@ class Lift:
 
 
 @dataclass(eq=False)
-class ObjectHistory:
+class ObjectHistory(Kept):
     """The record of one object; `take` is called with every sample.
 
     `rests_W` are the places where it rested, `rested_s` since when; at `dropped_s` it was dropped.
@@ -232,25 +215,6 @@ class ObjectHistory:
         self.rests_W.append(p_WO)
         self.rested_s.append(time_s)
         self.events.append(f"Somebody moved the {self.name} at {time_s:.2f} s.")
-
-    def state(self) -> State:
-        """The history so far."""
-        return {
-            "lifts": [[lift.time_s, lift.robot, lift.from_W.tolist()] for lift in self.lifts],
-            "rests_W": [p_W.tolist() for p_W in self.rests_W],
-            "rested_s": list(self.rested_s),
-            "last": None if self._last is None else self._last.state(),
-            **{name: getattr(self, name) for name in _PLAIN},
-        }
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        self.lifts = [Lift(time_s, robot, array_of(from_W)) for time_s, robot, from_W in state["lifts"]]
-        self.rests_W = [array_of(p_W) for p_W in state["rests_W"]]
-        self.rested_s = list(state["rested_s"])
-        self._last = None if state["last"] is None else ObjectSample.of(state["last"])
-        for name in _PLAIN:
-            setattr(self, name, state[name])
 
     def forget_past(self) -> None:
         """Start over for another mission: what is held keeps how it came there, all else counts from where it is."""

@@ -14,7 +14,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from executive.words.goal import GoalCondition
-from plant.kept import State, array_of
+from plant.kept import Kept, State
 from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
 from plant.referee.entities import Entities, Kind
 from plant.referee.judge import judge
@@ -34,8 +34,11 @@ BEFORE_SAMPLES = 3
 DoorHistories = Callable[[], Mapping[tuple[float, float], Sequence[tuple[float, float]]]]
 
 
-class Referee:
-    """Watches one plant. `observe` at about 20 Hz while it runs, `judge` whenever wanted."""
+class Referee(Kept, keeps=("_counter", "_histories", "_given", "_now_s", "_bases", "_persons")):
+    """Watches one plant. `observe` at about 20 Hz while it runs, `judge` whenever wanted.
+
+    Its state is the whole record, without the paths; of people, only where they are.
+    """
 
     def __init__(
         self,
@@ -134,29 +137,11 @@ class Referee:
         )
         return judge(conditions, truth, bumps=self._counter.collisions)
 
-    def state(self) -> State:
-        """The whole record, without the paths; of people, only where they are."""
-        return {
-            "bumps": self._counter.state(),
-            "histories": {name: history.state() for name, history in self._histories.items()},
-            "given": [[*pair, *stay] for pair, stays in self._given.items() for stay in stays],
-            "now_s": self._now_s,
-            "bases": {name: p_W.tolist() for name, p_W in self._bases.items()},
-            "persons": {name: p_W.tolist() for name, p_W in self._persons.items()},
-        }
-
-    def restore(self, state: State, paths: Mapping[str, FloatArray]) -> None:
+    def go_on(self, state: State, paths: Mapping[str, FloatArray]) -> None:
         """Go on with such a record; paths are arrays (N, 4) of `points`. Raises ValueError: they have no times."""
         if any(path.shape[1:] != (PATH_VALUES,) for path in paths.values()):
             raise ValueError("paths without times")
-        self._counter.restore(state["bumps"])
-        for name, history in self._histories.items():
-            history.restore(state["histories"][name])
-        self._given, self._now_s = {}, state["now_s"]
-        for name, person, *stay in state["given"]:
-            self._given.setdefault((name, person), []).append((stay[0], stay[1]))
-        self._bases = {name: array_of(p_W) for name, p_W in state["bases"].items()}
-        self._persons = {name: array_of(p_W) for name, p_W in state["persons"].items()}
+        self.restore(state)
         self._paths = {name: list(path) for name, path in paths.items()}
         self._person_paths = {name: [np.append(p_W, self._now_s)] for name, p_W in self._persons.items()}
 

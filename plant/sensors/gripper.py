@@ -28,10 +28,8 @@ class GripperNoise:
     holding_after_s: float = 0.15
 
 
-class GripperModel(NoisySensor):
+class GripperModel(NoisySensor, keeps=("_holding", "_changing_since_s")):
     """The gripper of one robot."""
-
-    kept = ("holding", "changing_since_s")
 
     def __init__(self, rng: np.random.Generator, noise: GripperNoise | None = None) -> None:
         """Start empty. A share of the force error is systematic and drawn here."""

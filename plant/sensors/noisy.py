@@ -1,28 +1,26 @@
-"""What all sensors share: noise from a generator of their own, and a state that can be kept."""
+"""What all sensors share: noise from a generator of their own, which is kept with what they add to it."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from plant.kept import State
+from plant.kept import Kept
 
 
-class NoisySensor:
-    """A sensor of one robot. `kept` names what changes from one reading to the next, beside the noise."""
-
-    kept: ClassVar[tuple[str, ...]] = ()
+class NoisySensor(Kept, keeps=("noise",)):
+    """A sensor of one robot."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
 
-    def state(self) -> State:
-        """What changes from one reading to the next."""
-        return {"rng": dict(self._rng.bit_generator.state), **{name: getattr(self, f"_{name}") for name in self.kept}}
+    @property
+    def noise(self) -> Mapping[str, Any]:
+        """The state of the generator."""
+        return self._rng.bit_generator.state
 
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        self._rng.bit_generator.state = state["rng"]
-        for name in self.kept:
-            setattr(self, f"_{name}", state[name])
+    @noise.setter
+    def noise(self, state: Mapping[str, Any]) -> None:
+        self._rng.bit_generator.state = state

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.kept import State
 from plant.sensors.noisy import NoisySensor
 from skills.robot import Battery, FloatArray, Imu, Joints, Odometry, Pose2D
 
@@ -60,10 +59,8 @@ class ImuNoise:
     accelerometer_m_s2: float = 0.05
 
 
-class ImuModel(NoisySensor):
+class ImuModel(NoisySensor, keeps=("_last",)):
     """The IMU of one robot; acceleration comes from the change of velocity between two updates."""
-
-    kept = ("last",)
 
     def __init__(self, rng: np.random.Generator, noise: ImuNoise | None = None) -> None:
         """Draw this run's biases."""
@@ -107,10 +104,8 @@ class BatterySpec:
     charge_s: float = 300.0
 
 
-class BatteryModel(NoisySensor):
+class BatteryModel(NoisySensor, keeps=("_charge", "_stamp_s")):
     """The battery of one robot."""
-
-    kept = ("charge", "stamp_s")
 
     def __init__(self, rng: np.random.Generator, charge: float = 1.0, spec: BatterySpec | None = None) -> None:
         """Start with a charge from 0 to 1. Raises ValueError for another."""
@@ -169,7 +164,7 @@ class _Last:
     estimate: Pose2D
 
 
-class OdometryModel(NoisySensor):
+class OdometryModel(NoisySensor, keeps=("_last",)):
     """Odometry of one robot. `odom` (O) lies on the floor under the body at the first update."""
 
     def __init__(self, rng: np.random.Generator, noise: OdometryNoise | None = None) -> None:
@@ -193,17 +188,6 @@ class OdometryModel(NoisySensor):
             estimate = self._last.estimate
         self._last = _Last(stamp_s, true, estimate)
         return Odometry(stamp_s, self._lifted(estimate, X_WB), self._velocity(true.yaw_rad, w_WB_W, v_WB_W))
-
-    def state(self) -> State:
-        """What changes from one reading to the next."""
-        last = self._last and [self._last.stamp_s, *_numbers(self._last.true), *_numbers(self._last.estimate)]
-        return {**super().state(), "last": last}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        super().restore(state)
-        last = state["last"]
-        self._last = last and _Last(last[0], Pose2D(*last[1:4]), Pose2D(*last[4:]))
 
     def _step(self, last: _Last, true: Pose2D, dt_s: float) -> Pose2D:
         """The next estimate: the true motion since the last, in the body's frame, with errors."""
@@ -237,10 +221,6 @@ class OdometryModel(NoisySensor):
             self._noise.turn_rate_rad_s,
         )
         return vx + float(noise[0]), vy + float(noise[1]), float(w_WB_W[2]) + float(noise[2])
-
-
-def _numbers(pose: Pose2D) -> tuple[float, float, float]:
-    return pose.x_m, pose.y_m, pose.yaw_rad
 
 
 def _turned(x: float, y: float, angle_rad: float) -> tuple[float, float]:

@@ -13,15 +13,14 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
 
-from plant.control.joints import ActuatedJoints, Indices
-from plant.kept import State
+from plant.control.joints import ActuatedJoints
+from plant.kept import Kept
 from plant.kinds import RobotBody, SensorOptions
 from plant.scene import RENDERER
 from plant.sensors.camera import Camera
 from plant.sensors.camera_spec import CameraSpec
 from plant.sensors.gripper import GripperModel, GripperNoise
 from plant.sensors.lidar import Lidar, LidarSpec
-from plant.sensors.noisy import NoisySensor
 from plant.sensors.proprioception import BatteryModel, BatterySpec, ImuModel, JointModel, OdometryModel
 from skills.robot import Battery, FloatArray, FrameTree, Gripper, Image, Imu, Joints, Odometry, Scan
 
@@ -39,7 +38,11 @@ class LidarMount:
     period_s: float
 
 
-class SensorSuite(ABC):
+class SensorSuite(
+    Kept,
+    ABC,
+    keeps=("_odometry_model", "_imu_model", "_joint_model", "_gripper_model", "_battery_model", "_lidar", "_cameras"),
+):
     """All sensors of one robot. Pictures are taken when asked for; `update` takes the readings, which are attributes.
 
     A kind of robot says how its gripper reads, and where the frames are that its encoders know of.
@@ -49,7 +52,6 @@ class SensorSuite(ABC):
         self,
         body: RobotBody,
         joints: ActuatedJoints,
-        arm: Indices,
         options: SensorOptions,
         *,
         lidar: LidarMount,
@@ -57,8 +59,8 @@ class SensorSuite(ABC):
         runtime_s: float,
         gripper_noise: GripperNoise | None = None,
     ) -> None:
-        """`arm` are the arm's joints among all; cameras sit on links of the body."""
-        self._body, self._index, self._arm = body, joints, arm
+        """Cameras sit on links of the body."""
+        self._body, self._index = body, joints
         self._dock, self._scene, self._context = options.dock, options.scene, options.context
         self._kinematics = body.plant.CreateDefaultContext()
         rngs = _generators(options.seed, body.name)
@@ -82,14 +84,18 @@ class SensorSuite(ABC):
             name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER, work=options.work)
             for name, spec in cameras.items()
         }
-        self._scan: Scan | None = None
-        self._revolution: Callable[[], Scan] | None = None
-        self._scanned_s = -math.inf
-        self.update(0.0)
+        self.power_up(0.0)
 
     def _link_frame(self, link: str) -> FrameId:
         plant = self._body.plant
         return plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(link, self._body.instance).index())
+
+    def power_up(self, now_s: float) -> None:
+        """Take the first readings."""
+        self._scan: Scan | None = None
+        self._revolution: Callable[[], Scan] | None = None
+        self._scanned_s = -math.inf
+        self.update(now_s)
 
     def update(self, now_s: float) -> None:
         """Take new readings of all but the cameras."""
@@ -106,7 +112,7 @@ class SensorSuite(ABC):
         efforts = self._efforts(positions, rates)
         self.joints: Joints = self._joint_model.update(now_s, positions, rates, efforts)
         self.gripper: Gripper = self._gripper_model.update(now_s, *self._gripper_feels(positions, rates, efforts))
-        load = min(1.0, float(np.linalg.norm(v_WB)) + float(np.abs(rates[self._arm]).sum()) / 4.0)
+        load = min(1.0, float(np.linalg.norm(v_WB)) + float(np.abs(rates[self._index.arm]).sum()) / 4.0)
         self.battery: Battery = self._battery_model.update(now_s, load, docked=self._docked(X_WB, v_WB))
         if now_s - self._scanned_s >= self._lidar_period_s - 1e-6:
             self._scanned_s = now_s
@@ -152,28 +158,6 @@ class SensorSuite(ABC):
         p_WB = X_WB.translation()
         off_m = math.hypot(p_WB[0] - self._dock.x_m, p_WB[1] - self._dock.y_m)
         return off_m < _DOCKED_WITHIN_M and float(np.linalg.norm(v_WB[:2])) < _STILL_M_S
-
-    def state(self) -> State:
-        """What changes from one reading to the next; the readings themselves are taken anew."""
-        return {name: part.state() for name, part in self._parts().items()}
-
-    def restore(self, state: State, now_s: float) -> None:
-        """Go on from such a state, and take readings."""
-        for name, part in self._parts().items():
-            part.restore(state[name])
-        self._scan, self._scanned_s = None, -math.inf
-        self.update(now_s)
-
-    def _parts(self) -> Mapping[str, NoisySensor]:
-        return {
-            "odometry": self._odometry_model,
-            "imu": self._imu_model,
-            "joints": self._joint_model,
-            "gripper": self._gripper_model,
-            "battery": self._battery_model,
-            "lidar": self._lidar,
-            **{f"camera {name}": camera for name, camera in self._cameras.items()},
-        }
 
     def image(self, source: str, *, visual: bool, depth: bool) -> Image:
         """Render a picture, its depth, or both, as all was at the last `update`.

@@ -86,8 +86,8 @@ def restore(snapshot: Snapshot, engine: Engine, referee: Referee, facts: Mapping
         told = snapshot.values["paths"]
         rows = snapshot.rows[told["from"] :]
         paths = {robot: rows[rows[:, 0] == number, 1:] for number, robot in enumerate(told["robots"])}
-        engine.restore(snapshot.values["engine"], world)
-        referee.restore(snapshot.values["referee"], paths)
+        engine.go_on(snapshot.values["engine"], world)
+        referee.go_on(snapshot.values["referee"], paths)
     except (KeyError, TypeError, ValueError) as error:
         what = f"the plant's state was written by another version ({error!r})"
         raise SnapshotError(f"{what}; run the mission again") from error

@@ -76,6 +76,7 @@ def simplified_obj(text: str, cell_m: float = _CELL_M) -> str:
     return "\n".join(out) + "\n"
 
 
+_MAX_ARM_RATE_RAD_S = 4.0
 _LEG_GAINS = (600.0, 12.0)
 _ARM_GAINS = {
     "arm_sh0": (900.0, 45.0),
@@ -173,12 +174,12 @@ class SpotModel:
 
 
 class JointIndex(ActuatedJoints):
-    """Spot's joints: the numbers of arm, gripper and legs (4, 3), and where their velocities stand when desired."""
+    """Spot's joints: the numbers of arm, gripper and legs (4, 3)."""
 
     def __init__(self, plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
         super().__init__(plant, instance)
         self.arm = self.numbers(arm_joint_names())
+        self.fastest_arm_rad_s = np.full(len(self.arm), _MAX_ARM_RATE_RAD_S)
         self.gripper = self.names.index(GRIPPER_JOINT)
         self.legs = np.array([self.numbers(leg_joint_names(leg)) for leg in LEGS])
-        self.arm_rates, self.leg_rates = self.rates_of(self.arm), self.rates_of(self.legs)
         self.gripper_gain = _ARM_GAINS[GRIPPER_JOINT][0]

@@ -28,7 +28,6 @@ class SpotSensors(SensorSuite):
         super().__init__(
             model,
             self._joints,
-            self._joints.arm,
             options,
             lidar=LidarMount(model.body, self._X_BL_mounted, LidarSpec(), _LIDAR_PERIOD_S),
             cameras=load_cameras(CAMERAS),

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from plant.kept import State, array_of
+from plant.kept import Kept
 from plant.models.spot.description import LEGS, spot_facts
 from plant.spot.model import JointIndex
 from skills.robot import FloatArray
@@ -90,7 +90,7 @@ def _wrap(angle_rad: float) -> float:
 _MAX_LEG_RATE_RAD_S = 20.0
 
 
-class LegServos:
+class LegServos(Kept, keeps=("_last",)):
     """Joint set points that put the feet where the gait wants them under the body's pose."""
 
     def __init__(self, index: JointIndex, rest_rad: FloatArray) -> None:
@@ -110,14 +110,6 @@ class LegServos:
         rates = np.minimum(np.maximum((joints - self._last) / dt_s, -_MAX_LEG_RATE_RAD_S), _MAX_LEG_RATE_RAD_S)
         self._last = joints
         return joints, rates
-
-    def state(self) -> State:
-        """The last set points."""
-        return {"last": self._last.tolist()}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        self._last = array_of(state["last"])
 
     def _solve(self, foot: int, p_BFoot: Sequence[float]) -> tuple[float, float, float]:
         try:

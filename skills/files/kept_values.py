@@ -1,4 +1,4 @@
-"""Blackboard values as JSON text and back: plain values, tuples, enums, arrays, transforms and frozen dataclasses.
+"""Values as JSON and back: plain values, tuples, enums, arrays, transforms and frozen dataclasses.
 
 Each value that is no plain JSON carries its kind, so that it comes back equal and of the same type. A class is looked
 up among the modules that are loaded; nothing is imported and nothing is called but a dataclass's constructor.
@@ -11,25 +11,17 @@ import enum
 import json
 import sys
 from collections.abc import Callable, Mapping
-from functools import cache
 from typing import Any, Final
 
 import numpy as np
-from pydantic import TypeAdapter
 from pydrake.math import RigidTransform
 
 _KIND: Final = "$kind"
 
 
-@cache
-def form(kind: Any) -> TypeAdapter[Any]:
-    """The JSON form of a type that is known, such as a request: writes and reads its values."""
-    return TypeAdapter(kind)
-
-
 def to_text(value: Any) -> str:
     """The value as JSON text. Raises TypeError: it, or a part of it, is of no kind that can be kept."""
-    return json.dumps(_packed(value), separators=(",", ":"))
+    return json.dumps(packed(value), separators=(",", ":"))
 
 
 def from_text(text: str) -> Any:
@@ -38,12 +30,13 @@ def from_text(text: str) -> Any:
     Raises ValueError: the text is damaged, or names a class that there is no more.
     """
     try:
-        return _unpacked(json.loads(text))
+        return unpacked(json.loads(text))
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"no value can be read from {text[:80]!r} ({error})") from error
 
 
-def _packed(value: Any) -> Any:
+def packed(value: Any) -> Any:
+    """The value as JSON has it. Raises TypeError: it, or a part of it, is of no kind that can be kept."""
     if value is None or (isinstance(value, bool | int | float | str) and not isinstance(value, enum.Enum)):
         return value
     for kind, (fits, pack, _) in _KINDS.items():
@@ -52,7 +45,8 @@ def _packed(value: Any) -> Any:
     raise TypeError(f"a {type(value).__name__} cannot be kept in the store")
 
 
-def _unpacked(value: Any) -> Any:
+def unpacked(value: Any) -> Any:
+    """The value that `packed` made. Raises ValueError, KeyError, TypeError or AttributeError: it made none such."""
     if not isinstance(value, dict):
         if isinstance(value, list):
             raise ValueError("a bare list is no stored value")
@@ -78,7 +72,7 @@ def _class_name(value: Any) -> str:
 
 
 def _pack_dataclass(value: Any) -> dict[str, Any]:
-    fields = {field.name: _packed(getattr(value, field.name)) for field in dataclasses.fields(value) if field.init}
+    fields = {field.name: packed(getattr(value, field.name)) for field in dataclasses.fields(value) if field.init}
     return {"class": _class_name(value), "fields": fields}
 
 
@@ -87,7 +81,7 @@ def _unpack_dataclass(packed: Mapping[str, Any]) -> Any:
     if not dataclasses.is_dataclass(found):
         raise ValueError(f"{packed['class']} is no dataclass")
     make: Any = found
-    return make(**{name: _unpacked(item) for name, item in packed["fields"].items()})
+    return make(**{name: unpacked(item) for name, item in packed["fields"].items()})
 
 
 def _unpack_enum(packed: Mapping[str, Any]) -> Any:
@@ -126,13 +120,13 @@ _KINDS: Final[Mapping[str, _Kind]] = {
     "dataclass": (_is_kept_dataclass, _pack_dataclass, _unpack_dataclass),
     "tuple": (
         lambda v: isinstance(v, tuple),
-        lambda v: {"items": [*map(_packed, v)]},
-        lambda p: tuple(map(_unpacked, p["items"])),
+        lambda v: {"items": [*map(packed, v)]},
+        lambda p: tuple(map(unpacked, p["items"])),
     ),
     "list": (
         lambda v: isinstance(v, list),
-        lambda v: {"items": [*map(_packed, v)]},
-        lambda p: [*map(_unpacked, p["items"])],
+        lambda v: {"items": [*map(packed, v)]},
+        lambda p: [*map(unpacked, p["items"])],
     ),
     "set": (
         lambda v: isinstance(v, frozenset),
@@ -141,7 +135,7 @@ _KINDS: Final[Mapping[str, _Kind]] = {
     ),
     "map": (
         lambda v: isinstance(v, Mapping),
-        lambda v: {"items": [[_packed(key), _packed(item)] for key, item in v.items()]},
-        lambda p: {_unpacked(key): _unpacked(item) for key, item in p["items"]},
+        lambda v: {"items": [[packed(key), packed(item)] for key, item in v.items()]},
+        lambda p: {unpacked(key): unpacked(item) for key, item in p["items"]},
     ),
 }

@@ -11,9 +11,8 @@ from typing import Final
 from executive.app.evaluate.outcome import Evidence, RunOutcome
 from executive.app.evaluate.runs import Evaluation, RunSpec
 from executive.app.report import RunReport
-from executive.store.database import Database, FileKind
+from executive.store.database import Database, FileKind, form
 from skills.files.errors import InputError
-from skills.files.kept_values import form
 
 __all__ = ["ResultsFile"]
 

@@ -15,10 +15,10 @@ from executive.app.evaluate.runs import RunSpec
 from executive.cli.entry import loaded
 from executive.cli.options import StartCommand, request_arguments, takes_request
 from executive.mission.request import Request
+from executive.store.database import form
 from executive.store.missions import MissionStore
 from executive.store.standing import StandingMissions
 from executive.store.triggers import OnCall
-from skills.files.kept_values import form
 from skills.files.yaml_source import read_yaml
 
 GOLDEN: dict[str, Any] = read_yaml(Path(__file__).with_name("request_options.yaml")).data

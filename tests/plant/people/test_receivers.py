@@ -15,6 +15,7 @@ from plant.referee import Referee
 from plant.spot.kind import SPOT
 from plant.worlds.placement import Placement, Receiving
 from plant.worlds.route import Route, Stop
+from skills.files.kept_values import packed, unpacked
 from skills.robot import ArmTrajectory, Pose2D
 
 FLOOR = """<sdf version="1.9"><model name="floor"><link name="floor">
@@ -148,8 +149,7 @@ def test_a_gripper_that_holds_on_is_pulled_at_again_after_a_pause(tmp_path):
 def test_the_person_pulls_again_when_the_object_only_slides_in_the_gripper(tmp_path):
     hall = Hall(tmp_path).until(Phase.PULLING)
     state = hall.kim.state()
-    x, y, z = state["p_HO"]
-    hall.kim.restore({**state, "p_HO": [x + 0.011, y, z]})  # as if it had moved 11 mm in the hand
+    hall.kim.restore({**state, "_p_HO": packed(unpacked(state["_p_HO"]) + [0.011, 0.0, 0.0])})  # as if it had moved 11 mm in the hand
     hall.until(Phase.RECEIVING).until(Phase.PULLING)
     assert hall.robot.gripper().holding
 
@@ -203,7 +203,7 @@ def test_a_state_taken_up_again_goes_on_as_before(tmp_path):
     hall = Hall(tmp_path).until(Phase.PULLING)
     state, world = hall.engine.state(), {name: each.copy() for name, each in hall.engine.world_state().items()}
     hall.engine.advance(1.0)
-    hall.engine.restore(state, world)
+    hall.engine.go_on(state, world)
     assert hall.kim.phase is Phase.PULLING
     assert hall.kim.state() == state["receivers"]["people"]["Kim"]
     hall.lease = hall.robot.acquire_lease("again")
@@ -217,7 +217,6 @@ def test_a_state_taken_up_again_goes_on_as_before(tmp_path):
 def test_what_creeps_in_the_hand_before_anybody_pulls_is_not_let_go_of(tmp_path, moved_m, let_go):
     hall = Hall(tmp_path).until(Phase.BRINGING)
     state = hall.kim.state()
-    x, y, z = state["p_HO"]
-    hall.kim.restore({**state, "p_HO": [x + moved_m, y, z]})
+    hall.kim.restore({**state, "_p_HO": packed(unpacked(state["_p_HO"]) + [moved_m, 0.0, 0.0])})
     hall.engine.advance(0.3)
     assert (hall.kim.phase is Phase.RECEIVING) is let_go

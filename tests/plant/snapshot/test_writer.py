@@ -35,7 +35,7 @@ class Plant:
                 path += [np.array([self.now_s, n, 0.0, self.now_s]) for n in range(20)]
             yield
 
-    def restore(self, state, arrays):
+    def go_on(self, state, arrays):
         self.restored = arrays
 
 

@@ -28,7 +28,7 @@ def lease(spot):
 def truth(engine):
     """(x, y, yaw, height, pitch) of the floating base."""
     model = engine.world.robots["Alice"]
-    return np.array(model.floating_base.state(engine.world.plant.GetPositions(engine.context)))
+    return np.array(model.floating_base.pose(engine.world.plant.GetPositions(engine.context)))
 
 
 def arm_to(spot, offset_rad, seconds):

@@ -20,8 +20,7 @@ from plant.live_scene import LiveScene
 from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
-from plant.snapshot.file import read_snapshot
-from plant.snapshot.writer import SnapshotWriter, restore
+from plant.snapshot import SnapshotWriter, read_snapshot, restore
 from plant.worlds.clutter import place_clutter
 from plant.worlds.lights import render_parameters
 from plant.worlds.placement import Placement, place_objects, place_people

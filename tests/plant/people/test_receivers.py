@@ -149,7 +149,9 @@ def test_a_gripper_that_holds_on_is_pulled_at_again_after_a_pause(tmp_path):
 def test_the_person_pulls_again_when_the_object_only_slides_in_the_gripper(tmp_path):
     hall = Hall(tmp_path).until(Phase.PULLING)
     state = hall.kim.state()
-    hall.kim.restore({**state, "_p_HO": packed(unpacked(state["_p_HO"]) + [0.011, 0.0, 0.0])})  # as if it had moved 11 mm in the hand
+    hall.kim.restore(
+        {**state, "_p_HO": packed(unpacked(state["_p_HO"]) + [0.011, 0.0, 0.0])}
+    )  # as if it had moved 11 mm in the hand
     hall.until(Phase.RECEIVING).until(Phase.PULLING)
     assert hall.robot.gripper().holding
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from plant.simulation import Simulation
-from plant.snapshot.file import SnapshotError, read_snapshot
-from plant.snapshot.writer import SnapshotWriter
+from plant.snapshot import SnapshotError, SnapshotWriter, read_snapshot
 from plant.worlds.world import load_world
 from skills.robot import LeaseError
 

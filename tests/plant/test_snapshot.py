@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from plant.snapshot.file import SnapshotError, SnapshotFile, encoded, read_snapshot
+from plant.snapshot import SnapshotError, SnapshotFile, encoded, read_snapshot
 
 
 @pytest.fixture

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from plant.snapshot.file import read_snapshot
-from plant.snapshot.writer import SnapshotWriter, restore
+from plant.snapshot import SnapshotWriter, read_snapshot, restore
 
 FACTS = {"world": "flat"}
 MOST_BYTES_PER_MINUTE = 500_000

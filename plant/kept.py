@@ -25,24 +25,26 @@ class Kept:
 
     def state(self) -> State:
         """What changes from step to step, as values of JSON."""
-        return {name: _state(getattr(self, name)) for name in self._kept_names()}
+        return {key: _state(getattr(self, name)) for key, name in self._kept_names().items()}
 
     def restore(self, state: State) -> None:
         """Go on from such a state. Raises KeyError: a part of it is missing."""
-        for name in self._kept_names():
+        for key, name in self._kept_names().items():
             value = getattr(self, name)
             if isinstance(value, Kept):
-                value.restore(state[name])
+                value.restore(state[key])
             elif _holds_parts(value):
-                for key, part in value.items():
-                    part.restore(state[name][key])
+                for each, part in value.items():
+                    part.restore(state[key][each])
             else:
-                setattr(self, name, unpacked(state[name]))
+                setattr(self, name, unpacked(state[key]))
 
-    def _kept_names(self) -> tuple[str, ...]:
-        if dataclasses.is_dataclass(self) and not self._keeps:
-            return tuple(field.name for field in dataclasses.fields(self))
-        return self._keeps
+    def _kept_names(self) -> dict[str, str]:
+        """The names of the attributes, by those that they have in the state."""
+        names = self._keeps
+        if dataclasses.is_dataclass(self) and not names:
+            names = tuple(field.name for field in dataclasses.fields(self))
+        return {name.lstrip("_"): name for name in names}
 
 
 def _state(value: Any) -> Any:

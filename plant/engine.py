@@ -20,7 +20,7 @@ from plant.people.receivers import Receivers
 from plant.people.walkers import Walkers
 from plant.sleeping import Sleepers
 from plant.worlds.placement import Receiving
-from plant.worlds.route import Route
+from plant.worlds.route import PointRoute
 from plant.worlds.world import DoorRule
 from skills.robot import FloatArray, Pose2D, Robot
 
@@ -42,7 +42,7 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
         seed: int = 0,
         docks: Mapping[str, Pose2D] = MappingProxyType({}),
         charge: float = 1.0,
-        routes: Mapping[str, Route] = MappingProxyType({}),
+        routes: Mapping[str, PointRoute] = MappingProxyType({}),
         receiving: Mapping[str, Receiving] = MappingProxyType({}),
         doors: Sequence[DoorRule] = (),
     ) -> None:

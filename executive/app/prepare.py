@@ -23,7 +23,7 @@ from executive.words.knowledge import Knowledge, Pose
 from executive.words.mission import DEFAULT_WORLD, Mission, MissionPart, QuestionPolicy
 from executive.words.robots import RobotConfig, robot_called, robots_in
 from executive.words.yaml_steps import steps_from_lines
-from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
+from plant.worlds.world import ObjectRule, World, WorldError
 from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.files.texts import LONGEST_ANSWER, plain_text
 from skills.files.yaml_source import KeyPath, read_yaml
@@ -358,7 +358,7 @@ def _speaker_W(part: Part, robots: Mapping[str, PlacedRobot]) -> Pose2D | None:
 
 def _with_people(loaded: Mission, world: World, knowledge: Knowledge) -> World:
     """The world with the people who walk in a mission's file. Raises InputError."""
-    routes = {name: RouteRule.model_validate(values) for name, values in routes_in(loaded, knowledge).items()}
+    routes = routes_in(loaded, knowledge)
     try:
         return world.with_routes(routes) if routes else world
     except WorldError as error:

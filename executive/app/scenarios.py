@@ -12,8 +12,9 @@ from executive.mission.request import Request
 from executive.mission.scenario import Scenario
 from executive.mission.scenario_file import checked_fault, load_scenario, scenario_of
 from executive.words.knowledge import Knowledge
+from executive.words.mission import Route
 from plant.spot.capabilities import spot_capabilities
-from plant.worlds.world import DoorRule, MoveRule, RouteRule, World, WorldError
+from plant.worlds.world import DoorRule, MoveRule, World, WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.faults.words import random_faults
 from skills.files.errors import InputError
@@ -51,7 +52,7 @@ def with_scenario(request: Request, world: World, knowledge: Knowledge) -> Reque
 def with_events(world: World, scenario: Scenario) -> World:
     """The world in which the scenario's events happen. Raises InputError: it has changed, and they fit no longer."""
     try:
-        walking = world.with_walks({name: RouteRule.model_validate(each) for name, each in scenario.people.items()})
+        walking = world.with_walks({name: Route.model_validate(each) for name, each in scenario.people.items()})
     except WorldError as error:
         raise InputError(str(error), hint="change the scenario's events") from error
     doors = [DoorRule.model_validate(door) for door in scenario.doors]

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from executive.mission.parameters import Given, with_parameters
 from executive.words.knowledge import Corner, Knowledge, knowledge_of_source
-from executive.words.mission import Mission, Stop
+from executive.words.mission import Mission, Route, Stop
 from executive.words.step import Place, Step
 from skills.files.errors import Problems, suggestion
 from skills.files.schema import validate
@@ -64,21 +64,21 @@ def import_folders(mission: Mission) -> tuple[Path, ...]:
     return tuple(folder / each for each in mission.imports or ())
 
 
-def routes_in(mission: Mission, knowledge: Knowledge) -> dict[str, Mapping[str, Any]]:
-    """The routes of a mission's people by name, as values in which every place is a point.
+def routes_in(mission: Mission, knowledge: Knowledge) -> dict[str, Route]:
+    """The routes of a mission's people by name, in which every place is a point.
 
     Raises:
         InputError: a place is not known; with the line in the file.
     """
-    problems, routes = Problems(), dict[str, Mapping[str, Any]]()
+    problems, routes = Problems(), dict[str, Route]()
     for name, route in (mission.people or {}).items():
         stops = []
         for index, waypoint in enumerate(route.waypoints):
             stop = waypoint if isinstance(waypoint, Stop) else Stop(at=waypoint, pause=0.0)
             with problems:
                 path = ("people", name, "waypoints", index)
-                stops.append({"at": _point(mission, path, stop.at, knowledge), "pause": stop.pause})
-        routes[name] = {**route.model_dump(exclude={"waypoints"}), "waypoints": stops}
+                stops.append(Stop(at=_point(mission, path, stop.at, knowledge), pause=stop.pause))
+        routes[name] = route.model_copy(update={"waypoints": tuple(stops)})
     problems.raise_any()
     return routes
 

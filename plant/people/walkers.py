@@ -22,7 +22,7 @@ from plant.diagram import WorldDiagram
 from plant.happenings.doors import slide
 from plant.kept import Kept
 from plant.people.paths import Ground
-from plant.worlds.route import Route
+from plant.worlds.route import PointRoute
 from plant.worlds.world import Point, WorldError
 from skills.robot import FloatArray
 
@@ -134,7 +134,7 @@ PASS_M = 0.22
 class Walkers(Kept, keeps=("_walks",)):
     """The people of one plant who walk, by name. `before_step` is to be called before each step."""
 
-    def __init__(self, world: WorldDiagram, context: Context, routes: Mapping[str, Route]) -> None:
+    def __init__(self, world: WorldDiagram, context: Context, routes: Mapping[str, PointRoute]) -> None:
         """`context` is the plant's. Raises WorldError: a waypoint is in something, or there is no way to it."""
         self._plant, self._context, self._routes = world.plant, context, dict(routes)
         self._robots = [
@@ -217,7 +217,7 @@ class Walkers(Kept, keeps=("_walks",)):
         return abs(bearing_rad) < AHEAD_RAD
 
 
-def _walk(name: str, route: Route, ground: Ground) -> Walk:
+def _walk(name: str, route: PointRoute, ground: Ground) -> Walk:
     """A route with its legs planned. Raises WorldError."""
     stops = [*route.stops, *(route.stops[:1] if route.loops else ())]
     legs = [Leg(ground.way(a.at_W, b.at_W, who=name), b.pause_s) for a, b in itertools.pairwise(stops)]

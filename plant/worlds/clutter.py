@@ -6,9 +6,10 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from executive.words.mission import Route, Stop
 from plant.models.catalogue import load_catalogue
 from plant.worlds.placement import Placement, outline_of, place_one
-from plant.worlds.world import ObjectRule, RouteRule, StopRule, World, WorldError
+from plant.worlds.world import ObjectRule, World, WorldError
 
 PAUSE_S = 4.0
 _CLUTTER_STREAM, _PASSING_STREAM = 11, 12
@@ -55,6 +56,6 @@ def with_passers_by(world: World, count: int, seed: int) -> World:
     for index in range(count):
         rng = np.random.default_rng([seed, _PASSING_STREAM, index])
         chosen = rng.permutation(len(places))[:_STOPS]
-        stops = tuple(StopRule(at=places[int(each)], pause=PAUSE_S) for each in chosen)
-        walks[f"passer-by {index + 1}"] = RouteRule(waypoints=stops, loop=True, start=float(rng.uniform(0.0, 10.0)))
+        stops = tuple(Stop(at=places[int(each)], pause=PAUSE_S) for each in chosen)
+        walks[f"passer-by {index + 1}"] = Route(waypoints=stops, loop=True, start=float(rng.uniform(0.0, 10.0)))
     return world.with_walks(walks) if walks else world

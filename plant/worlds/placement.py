@@ -12,7 +12,7 @@ import shapely
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.models.catalogue import ModelClass, ModelForm, load_catalogue
-from plant.worlds.route import Route, route_of
+from plant.worlds.route import PointRoute, point_route
 from plant.worlds.world import Lengths, ObjectRule, PersonRule, Point, SurfaceTop, World, WorldError
 from skills.robot import FloatArray
 
@@ -42,7 +42,7 @@ class Placement:
     form: ModelForm
     X_WO: RigidTransform
     surface: str | None = None
-    route: Route | None = None
+    route: PointRoute | None = None
     receiving: Receiving | None = None
 
     @property
@@ -135,7 +135,7 @@ def candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> I
 
 
 def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, index: int) -> Placement:
-    route = None if rule.route is None else route_of(rule.route, world.standing)
+    route = None if rule.route is None else point_route(rule.route, world.standing)
     if rule.ranges is not None:
         x, y, yaw = _before_start(world, rule.ranges, np.random.default_rng([seed, _PEOPLE_STREAM, index]))
         route = None if route is None else route.begun_at((x, y), yaw)
@@ -173,7 +173,7 @@ def people_stand_W(world: World) -> FloatArray:
                 x, y = world.start.x_m + distance * np.cos(direction), world.start.y_m + distance * np.sin(direction)
                 places.append((float(x), float(y)))
         elif rule.route is not None:
-            places.append(route_of(rule.route, world.standing).stops[0].at_W)
+            places.append(point_route(rule.route, world.standing).stops[0].at_W)
     return np.array(places).reshape(-1, 2)
 
 

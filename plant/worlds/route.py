@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from plant.worlds.world import Point, RouteRule, StopRule
+from executive.words.mission import Route, Stop
+from plant.worlds.world import Point
 
 
 @dataclass(frozen=True)
-class Stop:
+class PointStop:
     """A waypoint in the world frame, and how long the person stands there (s)."""
 
     at_W: Point
@@ -18,22 +19,22 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Route:
+class PointRoute:
     """Where and how a person walks: m/s, set off at `start_s`, back from the last stop to the first if it `loops`.
 
     A person who `yields` stops for a robot that is close ahead.
     """
 
-    stops: tuple[Stop, ...]
+    stops: tuple[PointStop, ...]
     speed_m_s: float = 1.2
     loops: bool = False
     start_s: float = 0.0
     yields: bool = True
     yaw_rad: float | None = None
 
-    def begun_at(self, at_W: Point, yaw_rad: float) -> Route:
+    def begun_at(self, at_W: Point, yaw_rad: float) -> PointRoute:
         """The same for somebody who stands somewhere at first."""
-        return replace(self, stops=(Stop(at_W), *self.stops), yaw_rad=yaw_rad)
+        return replace(self, stops=(PointStop(at_W), *self.stops), yaw_rad=yaw_rad)
 
     @property
     def first_yaw_rad(self) -> float:
@@ -44,12 +45,8 @@ class Route:
         return math.atan2(y1 - y0, x1 - x0)
 
 
-def route_of(rule: RouteRule, standing: Mapping[str, Point]) -> Route:
-    """The route of a rule whose places are known in `standing`."""
-
-    def stop(waypoint: Point | str | StopRule) -> Stop:
-        at, pause_s = (waypoint.at, waypoint.pause) if isinstance(waypoint, StopRule) else (waypoint, 0.0)
-        return Stop(standing[at] if isinstance(at, str) else at, pause_s)
-
-    stops = tuple(map(stop, rule.waypoints))
-    return Route(stops, rule.speed, rule.loop, rule.start, rule.yields)
+def point_route(route: Route, standing: Mapping[str, Point]) -> PointRoute:
+    """The route whose places are known in `standing`."""
+    stops = (each if isinstance(each, Stop) else Stop(at=each) for each in route.waypoints)
+    points = (PointStop(standing[each.at] if isinstance(each.at, str) else each.at, each.pause) for each in stops)
+    return PointRoute(tuple(points), route.speed, route.loop, route.start, route.yields)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from executive.words.mission import Route, Stop
 from plant.models.catalogue import load_catalogue
 from plant.models.imported import ImportedObject, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
@@ -73,25 +74,6 @@ class ObjectRule(_Strict):
     surfaces: tuple[str, ...] = Field(min_length=1, description="surfaces of knowledge.yaml; the seed chooses one")
 
 
-class StopRule(_Strict):
-    """A waypoint at which a person stands for a while."""
-
-    at: Point | str = Field(description="a point (x, y), or a room or surface of knowledge.yaml")
-    pause: quantities.Delay = Field(default=0.0, description="how long the person stands there, s")
-
-
-class RouteRule(_Strict):
-    """A route on which a person walks, around walls and furniture."""
-
-    waypoints: tuple[Point | str | StopRule, ...] = Field(
-        min_length=1, description="points (x, y), rooms or surfaces, in order; the person begins at the first"
-    )
-    speed: quantities.Speed = Field(default=1.2, description="how fast the person walks, m/s")
-    loop: bool = Field(default=False, description="whether the first waypoint follows the last; else once")
-    start: quantities.Delay = Field(default=0.0, description="when the person sets off, s")
-    yields: bool = Field(default=True, description="whether the person stops for a robot that is close ahead")
-
-
 class PersonRule(_Strict):
     """A person, who walks on a route, or stands before the robot's start pose where three ranges say.
 
@@ -103,7 +85,7 @@ class PersonRule(_Strict):
     distance_m: Distances | None = Field(default=None, description="least and greatest distance from the start pose")
     bearing_rad: Angles | None = Field(default=None, description="least and greatest bearing, seen from the start pose")
     turned_rad: Angles | None = Field(default=None, description="least and greatest turn away from facing the robot")
-    route: RouteRule | None = Field(default=None, description="where the person walks")
+    route: Route | None = Field(default=None, description="where the person walks")
     receives: bool = Field(default=True, description="whether the person takes what is held out to them")
     pull_n: Pull = Field(default=15.0, description="how hard the person pulls at it, N")
     reaction_s: Reaction = Field(default=1.0, description="how long it is held out still before, s")
@@ -241,7 +223,7 @@ class World:
         rooms = [corner for room in self.rooms.values() for corner in room]
         return tuple(rooms) or ((x - reach_m, y - reach_m), (x + reach_m, y + reach_m))
 
-    def with_routes(self, routes: Mapping[str, RouteRule]) -> World:
+    def with_routes(self, routes: Mapping[str, Route]) -> World:
         """The same with people on these routes, by name: others than before, or somebody who is there already.
 
         Raises WorldError: a name is that of an object, or a waypoint is not known.
@@ -255,7 +237,7 @@ class World:
         _check_people(changed, self.standing)
         return replace(self, seed_rules=changed)
 
-    def with_walks(self, walks: Mapping[str, RouteRule]) -> World:
+    def with_walks(self, walks: Mapping[str, Route]) -> World:
         """The same with people who walk: those who stand there already from where they stand, others from the first
         waypoint on.
 
@@ -475,7 +457,7 @@ def _check_people(rules: SeedRules, standing: Mapping[str, Point]) -> None:
         taken.add(name)
     for index, rule in enumerate(rules.people):
         for waypoint in () if rule.route is None else rule.route.waypoints:
-            at = waypoint.at if isinstance(waypoint, StopRule) else waypoint
+            at = waypoint.at if isinstance(waypoint, Stop) else waypoint
             if isinstance(at, str) and at not in standing:
                 close = difflib.get_close_matches(at, standing, n=1)
                 hint = f"did you mean {close[0]!r}?" if close else "give a point (x, y)"

@@ -28,9 +28,9 @@ from executive.app.prepare import prepare
 from executive.app.robots import only_robot
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
+from executive.words.mission import Route
 from plant.worlds.builder.maps import FREE, OCCUPIED, Grid
 from plant.worlds.builder.own import world_from_grid
-from plant.worlds.world import RouteRule
 from skills.robot import Pose2D
 
 CELL_M, HALL_M, DEPTH_M = 0.05, (11.0, 4.4), 1.6
@@ -142,7 +142,7 @@ def run_case(folder: Path, drawn: Case) -> Outcome:
     prepared = prepare(request, ask=None)
     world = prepared.world
     if drawn.what != NOBODY:
-        route = RouteRule(waypoints=(drawn.from_W, drawn.to_W), speed=drawn.speed_m_s, start=86400.0, yields=False)
+        route = Route(waypoints=(drawn.from_W, drawn.to_W), speed=drawn.speed_m_s, start=86400.0, yields=False)
         world = world.with_routes({drawn.what: route})
     name = prepared.mission.robot_name
     backend = SimulatedBackend(

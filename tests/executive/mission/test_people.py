@@ -29,18 +29,18 @@ def loaded(tmp_path, text):
 def test_places_become_points_by_any_of_their_names(tmp_path, flat):
     routes = routes_in(loaded(tmp_path, WALKS), flat)
     counter = flat.place_pose("kitchen counter")
-    assert routes["Robin"] == {
-        "waypoints": [
+    assert routes["Robin"].model_dump() == {
+        "waypoints": (
             {"at": (8.4, 6.9), "pause": 0.0},
             {"at": (4.0, 4.5), "pause": 0.0},
             {"at": (counter.x, counter.y), "pause": 2.0},
-        ],
+        ),
         "speed": 0.9,
         "loop": True,
         "start": 5.0,
         "yields": False,
     }
-    assert (routes["Kim"]["speed"], routes["Kim"]["loop"], routes["Kim"]["yields"]) == (1.2, False, True)
+    assert (routes["Kim"].speed, routes["Kim"].loop, routes["Kim"].yields) == (1.2, False, True)
 
 
 def test_a_mission_without_people_has_no_routes(tmp_path, flat):

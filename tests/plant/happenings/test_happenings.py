@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from executive.words.mission import Route
 from plant.simulation import Simulation
 from plant.worlds.placement import place_people
-from plant.worlds.world import DoorRule, MoveRule, RouteRule, SurfaceTop, WorldError, load_world
+from plant.worlds.world import DoorRule, MoveRule, SurfaceTop, WorldError, load_world
 from skills.robot import Pose2D
 
 FLAT = load_world("flat")
@@ -131,7 +132,7 @@ def test_doors_and_moves_go_on_after_a_restart(tmp_path):
 
 
 def test_somebody_who_stands_sets_off_from_there():
-    world = FLAT.with_walks({"Robin": RouteRule(waypoints=((9.5, 3.0),), start=1.0)})
+    world = FLAT.with_walks({"Robin": Route(waypoints=((9.5, 3.0),), start=1.0)})
     (stands,) = place_people(FLAT, seed=1)
     simulation = Simulation(world, seed=1, visuals=False, starts={"Alice": Pose2D(4.0, 4.5, 0.0)})
     ((x, y),) = simulation.engine.walkers.places_W()
@@ -141,6 +142,6 @@ def test_somebody_who_stands_sets_off_from_there():
 
 
 def test_nobody_walks_twice():
-    route = RouteRule(waypoints=((9.5, 3.0),))
+    route = Route(waypoints=((9.5, 3.0),))
     with pytest.raises(WorldError, match="Robin walks already"):
         FLAT.with_walks({"Robin": route}).with_walks({"Robin": route})

@@ -14,7 +14,7 @@ from plant.people.receivers import Phase
 from plant.referee import Referee
 from plant.spot.kind import SPOT
 from plant.worlds.placement import Placement, Receiving
-from plant.worlds.route import Route, Stop
+from plant.worlds.route import PointRoute, PointStop
 from skills.files.kept_values import packed, unpacked
 from skills.robot import ArmTrajectory, Pose2D
 
@@ -192,7 +192,7 @@ def test_who_does_not_receive_has_no_tray(tmp_path):
 
 
 def test_somebody_who_walks_stops_to_take_it(tmp_path):
-    route = Route((Stop((1.45, 0.0), 4.0), Stop((1.45, 3.0))), speed_m_s=1.0, yields=False)
+    route = PointRoute((PointStop((1.45, 0.0), 4.0), PointStop((1.45, 3.0))), speed_m_s=1.0, yields=False)
     hall = Hall(tmp_path, Receiving(reaction_s=0.5), route=route).until(Phase.BRINGING)
     person = hall.world.plant.GetBodyByName("person")
     stopped_W = hall.place_W(person)

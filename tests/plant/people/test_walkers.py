@@ -12,7 +12,7 @@ from plant.models.catalogue import load_catalogue
 from plant.people.walkers import Leg, Walk
 from plant.referee import Referee
 from plant.spot.kind import SPOT
-from plant.worlds.route import Route, Stop
+from plant.worlds.route import PointRoute, PointStop
 from plant.worlds.world import WorldError
 from skills.robot import Pose2D
 
@@ -123,7 +123,7 @@ class Hall:
 @pytest.fixture
 def hall(tmp_path):
     return lambda *points, robot=START, **options: Hall(
-        tmp_path, Route(tuple(Stop(point) for point in points), **options), robot
+        tmp_path, PointRoute(tuple(PointStop(point) for point in points), **options), robot
     )
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from executive.words.mission import Route
 from plant.worlds.placement import place_objects, place_people
-from plant.worlds.world import WORLDS_FOLDER, RouteRule, World, known_worlds, load_world
+from plant.worlds.world import WORLDS_FOLDER, World, known_worlds, load_world
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
@@ -158,14 +159,14 @@ def test_a_wrong_person_is_refused(copy: Path, people: str, says: str) -> None:
 def test_routes_are_added_and_take_the_place_of_who_stands() -> None:
     world = load_world("flat")
     walking = world.with_routes(
-        {"Robin": RouteRule(waypoints=("kitchen", "office")), "Kim": RouteRule(waypoints=((4.0, 4.5),))}
+        {"Robin": Route(waypoints=("kitchen", "office")), "Kim": Route(waypoints=((4.0, 4.5),))}
     )
     assert [(each.name, each.route is not None) for each in place_people(walking, 1)] == [
         ("Robin", True), ("Kim", True)
     ]  # fmt: skip
     assert [each.name for each in place_people(world, 1)] == ["Robin"]
     with pytest.raises(InputError, match="'hammer' names two"):
-        world.with_routes({"hammer": RouteRule(waypoints=("kitchen",))})
+        world.with_routes({"hammer": Route(waypoints=("kitchen",))})
 
 
 def test_a_lidar_near_the_floor_has_a_map_of_its_own():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, ClassVar
 
 from skills.files.kept_values import packed, unpacked
@@ -39,11 +40,11 @@ class Kept:
             else:
                 setattr(self, name, unpacked(state[key]))
 
-    def _kept_names(self) -> dict[str, str]:
+    @classmethod
+    @cache
+    def _kept_names(cls) -> Mapping[str, str]:
         """The names of the attributes, by those that they have in the state."""
-        names = self._keeps
-        if dataclasses.is_dataclass(self) and not names:
-            names = tuple(field.name for field in dataclasses.fields(self))
+        names = cls._keeps or [field.name for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
         return {name.lstrip("_"): name for name in names}
 
 
@@ -54,4 +55,4 @@ def _state(value: Any) -> Any:
 
 
 def _holds_parts(value: Any) -> bool:
-    return isinstance(value, Mapping) and any(isinstance(part, Kept) for part in value.values())
+    return isinstance(value, dict) and isinstance(next(iter(value.values()), None), Kept)

@@ -71,15 +71,9 @@ def place_people(world: World, seed: int) -> tuple[Placement, ...]:
     """The people: at the beginnings of their routes, or on the floor before the start pose, looking at the robot."""
     catalogue = load_catalogue()
     return tuple(
-        _place_person(world, rule, _form(_model_class(catalogue, rule.model, world), seed, index), seed, index)
+        _place_person(world, rule, _form(catalogue, rule.model, world, seed, index), seed, index)
         for index, rule in enumerate(world.seed_rules.people)
     )
-
-
-def _model_class(catalogue: Mapping[str, ModelClass], name: str, world: World) -> ModelClass:
-    if name not in catalogue:
-        raise WorldError(f"{world.folder / 'objects.yaml'}: no model {name!r}; there are {', '.join(catalogue)}")
-    return catalogue[name]
 
 
 def _model(
@@ -89,12 +83,14 @@ def _model(
     if name in world.imports:
         found = world.imports[name]
         return found.object.class_name, found.object.form(found.folder)
-    return name, _form(_model_class(catalogue, name, world), seed, index)
+    return name, _form(catalogue, name, world, seed, index)
 
 
-def _form(model: ModelClass, seed: int, index: int) -> ModelForm:
-    """The form that an object has at a seed."""
-    forms = tuple(model.forms.values())
+def _form(catalogue: Mapping[str, ModelClass], name: str, world: World, seed: int, index: int) -> ModelForm:
+    """The form of a class that an object has at a seed. Raises WorldError: there is no such class."""
+    if name not in catalogue:
+        raise WorldError(f"{world.folder / 'objects.yaml'}: no model {name!r}; there are {', '.join(catalogue)}")
+    forms = tuple(catalogue[name].forms.values())
     return forms[int(np.random.default_rng([seed, _FORM_STREAM, index]).integers(len(forms)))]
 
 

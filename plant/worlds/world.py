@@ -5,7 +5,6 @@ Only what a plant needs is read of `knowledge.yaml`: the start pose, rooms and s
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -19,7 +18,7 @@ from executive.words.mission import Route, Stop
 from plant.models.catalogue import load_catalogue
 from plant.models.imported import ImportedObject, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
-from skills.files.errors import InputError
+from skills.files.errors import InputError, did_you_mean, suggestion
 from skills.files.outside import is_file
 from skills.files.schema import validate
 from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
@@ -398,8 +397,8 @@ def _find_folder(name_or_path: str | Path) -> Path:
     for folder in (named, Path(name_or_path)):
         if is_file(folder / DIRECTIVES):
             return folder.resolve()
-    close = difflib.get_close_matches(str(name_or_path), known_worlds(), n=1)
-    hint = f" Did you mean {close[0]!r}?" if close else ""
+    close = did_you_mean(str(name_or_path), known_worlds())
+    hint = f" Did you mean {close!r}?" if close else ""
     known = ", ".join(known_worlds())
     raise WorldError(
         f"unknown world {str(name_or_path)!r}.{hint} Known worlds: {known}; or give a folder with a world.dmd.yaml"
@@ -425,9 +424,7 @@ def _check_surfaces(rules: SeedRules, surfaces: dict[str, SurfaceTop]) -> None:
 
 def _refuse_unknown(name: str, surfaces: Mapping[str, SurfaceTop], path: KeyPath) -> None:
     if name not in surfaces:
-        close = difflib.get_close_matches(name, surfaces, n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
-        raise WorldError(f"no surface {name!r} in knowledge.yaml{hint}", path=path)
+        raise WorldError(f"no surface {name!r} in knowledge.yaml; {suggestion(name, surfaces)}", path=path)
 
 
 def _check_models(rules: SeedRules, imports: Mapping[str, Import]) -> None:
@@ -435,8 +432,7 @@ def _check_models(rules: SeedRules, imports: Mapping[str, Import]) -> None:
     known = (*load_catalogue(), *imports)
     for index, rule in enumerate(rules.objects):
         if rule.model not in known:
-            close = difflib.get_close_matches(rule.model, known, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(known)}"
+            hint = suggestion(rule.model, known, f"there are {', '.join(known)}")
             raise WorldError(f"no model {rule.model!r} for {rule.name}; {hint}", path=("objects", index, "model"))
 
 
@@ -459,9 +455,6 @@ def _check_people(rules: SeedRules, standing: Mapping[str, Point]) -> None:
         for waypoint in () if rule.route is None else rule.route.waypoints:
             at = waypoint.at if isinstance(waypoint, Stop) else waypoint
             if isinstance(at, str) and at not in standing:
-                close = difflib.get_close_matches(at, standing, n=1)
-                hint = f"did you mean {close[0]!r}?" if close else "give a point (x, y)"
-                raise WorldError(
-                    f"{rule.name} cannot walk to {at!r}: no place in knowledge.yaml; {hint}",
-                    path=("people", index, "route"),
-                )
+                hint = suggestion(at, standing, "give a point (x, y)")
+                what = f"{rule.name} cannot walk to {at!r}: no place in knowledge.yaml; {hint}"
+                raise WorldError(what, path=("people", index, "route"))

@@ -11,6 +11,8 @@ import enum
 import json
 import sys
 from collections.abc import Callable, Mapping
+from functools import cache
+from types import NoneType
 from typing import Any, Final
 
 import numpy as np
@@ -37,12 +39,20 @@ def from_text(text: str) -> Any:
 
 def packed(value: Any) -> Any:
     """The value as JSON has it. Raises TypeError: it, or a part of it, is of no kind that can be kept."""
-    if value is None or (isinstance(value, bool | int | float | str) and not isinstance(value, enum.Enum)):
-        return value
-    for kind, (fits, pack, _) in _KINDS.items():
-        if fits(value):
-            return {_KIND: kind, **pack(value)}
-    raise TypeError(f"a {type(value).__name__} cannot be kept in the store")
+    of: Any = type(value)
+    kind = _kind_of(of)
+    return value if kind is None else {_KIND: kind, **_KINDS[kind][1](value)}
+
+
+@cache
+def _kind_of(of: Any) -> str | None:
+    """The kind of the values of a type; None for plain ones. Raises TypeError: there is none."""
+    if issubclass(of, bool | int | float | str | NoneType) and not issubclass(of, enum.Enum):
+        return None
+    for kind, (fits, _, _) in _KINDS.items():
+        if fits(of):
+            return kind
+    raise TypeError(f"a {of.__name__} cannot be kept in the store")
 
 
 def unpacked(value: Any) -> Any:
@@ -72,8 +82,10 @@ def _class_name(value: Any) -> str:
 
 
 def _pack_dataclass(value: Any) -> dict[str, Any]:
-    fields = {field.name: packed(getattr(value, field.name)) for field in dataclasses.fields(value) if field.init}
-    return {"class": _class_name(value), "fields": fields}
+    return {
+        "class": _class_name(value),
+        "fields": {name: packed(getattr(value, name)) for name in _fields(type(value))},
+    }
 
 
 def _unpack_dataclass(packed: Mapping[str, Any]) -> Any:
@@ -92,49 +104,47 @@ def _unpack_enum(packed: Mapping[str, Any]) -> Any:
 
 
 def _pack_array(value: Any) -> dict[str, Any]:
-    return {"dtype": str(value.dtype), "shape": list(value.shape), "items": value.ravel().tolist()}
-
-
-def _is_kept_dataclass(value: Any) -> bool:
-    return dataclasses.is_dataclass(value) and not isinstance(value, type)
+    if value.dtype.kind not in "biuf":
+        raise TypeError(f"an array of {value.dtype} cannot be kept in the store")
+    return {"dtype": value.dtype.str, "shape": list(value.shape), "items": value.ravel().tolist()}
 
 
 _Kind = tuple[Callable[[Any], bool], Callable[[Any], dict[str, Any]], Callable[[Mapping[str, Any]], Any]]
 _KINDS: Final[Mapping[str, _Kind]] = {
     "enum": (
-        lambda v: isinstance(v, enum.Enum),
+        lambda of: issubclass(of, enum.Enum),
         lambda v: {"class": _class_name(v), "name": v.name},
         _unpack_enum,
     ),
-    "number": (lambda v: isinstance(v, np.generic), lambda v: {"item": v.item()}, lambda p: p["item"]),
+    "number": (lambda of: issubclass(of, np.generic), lambda v: {"item": v.item()}, lambda p: p["item"]),
     "array": (
-        lambda v: isinstance(v, np.ndarray) and v.dtype.kind in "biuf",
+        lambda of: issubclass(of, np.ndarray),
         _pack_array,
         lambda p: np.array(p["items"], dtype=p["dtype"]).reshape(p["shape"]),
     ),
     "transform": (
-        lambda v: isinstance(v, RigidTransform),
+        lambda of: issubclass(of, RigidTransform),
         lambda v: {"matrix": v.GetAsMatrix34().tolist()},
         lambda p: RigidTransform(np.array(p["matrix"])),
     ),
-    "dataclass": (_is_kept_dataclass, _pack_dataclass, _unpack_dataclass),
+    "dataclass": (dataclasses.is_dataclass, _pack_dataclass, _unpack_dataclass),
     "tuple": (
-        lambda v: isinstance(v, tuple),
+        lambda of: issubclass(of, tuple),
         lambda v: {"items": [*map(packed, v)]},
         lambda p: tuple(map(unpacked, p["items"])),
     ),
     "list": (
-        lambda v: isinstance(v, list),
+        lambda of: issubclass(of, list),
         lambda v: {"items": [*map(packed, v)]},
         lambda p: [*map(unpacked, p["items"])],
     ),
     "set": (
-        lambda v: isinstance(v, frozenset),
+        lambda of: issubclass(of, frozenset),
         lambda v: {"items": sorted(map(to_text, v))},
         lambda p: frozenset(map(from_text, p["items"])),
     ),
     "map": (
-        lambda v: isinstance(v, Mapping),
+        lambda of: issubclass(of, Mapping),
         lambda v: {"items": [[packed(key), packed(item)] for key, item in v.items()]},
         lambda p: {unpacked(key): unpacked(item) for key, item in p["items"]},
     ),

@@ -14,23 +14,23 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2980,
+    "executive/words": 2976,
     "executive/language": 8770,
     "executive/speech": 1620,
-    "executive/mission": 1934,
+    "executive/mission": 1844,
     "executive/tree": 8100,
     "executive/run": 3297,
     "executive/record": 1050,
-    "executive/store": 1867,
+    "executive/store": 1729,
     "executive/conversation": 611,
     "executive/view": 1500,
     "executive/testing": 900,
     "executive/app": 7815,
     "executive/cli": 4279,
-    "skills": 24950,
-    "plant": 12566,
+    "skills": 25092,
+    "plant": 12222,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 554, 117, 38
+MODULES, ONE_IMPORTER, SAME_NAME = 551, 116, 38
 """All modules; those that one other imports; file names that stand more than once."""
 
 

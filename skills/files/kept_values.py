@@ -82,10 +82,8 @@ def _class_name(value: Any) -> str:
 
 
 def _pack_dataclass(value: Any) -> dict[str, Any]:
-    return {
-        "class": _class_name(value),
-        "fields": {name: packed(getattr(value, name)) for name in _fields(type(value))},
-    }
+    fields = {field.name: packed(getattr(value, field.name)) for field in dataclasses.fields(value) if field.init}
+    return {"class": _class_name(value), "fields": fields}
 
 
 def _unpack_dataclass(packed: Mapping[str, Any]) -> Any:

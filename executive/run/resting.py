@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
-from executive.run.robot import RunRobot
+from executive.run.session import RunRobot
 from executive.run.traffic import TrafficTable
-from executive.run.watchdog import VerbHung, Watchdog
-from executive.tree.nodes.skill import ERROR_TOPIC
+from executive.run.watchdog import Watchdog
 from skills.api import Running, SkillContext
 from skills.navigate.giving_way import GivingWay
 from skills.navigate.ports import NavigateInputs
 from skills.navigate.skill import Navigate
-
-__all__ = ["Resting", "SteppingAside"]
 
 _LOOK_S = 0.5
 
@@ -89,7 +85,7 @@ class Resting:
 
     def rest(self, who: RunRobot) -> None:
         """A robot whose lease nobody holds, since its mission is over or it has none; it is sensed for as well."""
-        self._guarded(who, lambda: self._begin(who, who.claim(), own_lease=True))
+        who.attempt("resting", lambda: self._begin(who, who.claim(), own_lease=True))
 
     def leave(self, name: str) -> None:
         """The robot has work again, or the run is over. Idempotent; raises nothing."""
@@ -99,7 +95,7 @@ class Resting:
         self.table.rest(name, idle=False)
         if robot.aside.moved and robot.own_lease:
             self.stepped_aside.add(name)
-        self._guarded(robot.who, robot.aside.end)
+        robot.who.attempt("resting", robot.aside.end)
         if robot.own_lease:
             self.table.release(name)
             robot.who.stop_and_leave()
@@ -114,7 +110,7 @@ class Resting:
         for name, robot in sorted(self._robots.items()):
             step = partial(self._step, robot, hold=held(name))
             with self.watchdog.over_tick(name, self.tick_limit_s):
-                if not self._guarded(robot.who, step):
+                if not robot.who.attempt("resting", step):
                     self.leave(name)
 
     def _begin(self, who: RunRobot, context: SkillContext, *, own_lease: bool) -> None:
@@ -137,13 +133,3 @@ class Resting:
             robot.who.sense()
         else:
             self.table.heard(robot.who.name, context.known_pose())
-
-    def _guarded(self, who: RunRobot, call: Callable[[], None]) -> bool:
-        """Whether the call went well; what it raised goes to the log."""
-        try:
-            call()
-        except (Exception, VerbHung):
-            trace = traceback.format_exc()
-            who.context.publish(ERROR_TOPIC, {"node": who.name, "what": "resting", "traceback": trace})
-            return False
-        return True

@@ -6,20 +6,20 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Final, TypeVar
+from typing import Final
 
 from executive.record.schemas import CONTROL, OUTCOME, RESERVED_PATH
 from executive.run.control import Control, ControlRequests, Event
 from executive.run.outcome import Ending, Outcome, RobotResult, RobotStatus, RunResult, ending_of
 from executive.run.resting import Resting
-from executive.run.robot import RunRobot, RunShared
-from executive.run.session import Session
+from executive.run.session import RunRobot, Session
 from executive.run.visitor import (
     Assigner,
     MissionEnd,
     Progress,
     RunEntry,
     RunSettings,
+    RunShared,
     RunVisitor,
     TickNote,
     Visitors,
@@ -29,13 +29,9 @@ from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
 from skills.api import Cause, Worker
 from skills.files.errors import disk_is_full
-from skills.robot import Clock, Lease
-
-__all__ = ["run"]
+from skills.robot import Clock
 
 _PATHS_PERIOD_S: Final = 0.5
-_NO_LEASE: Final = Lease("", "", 0)
-ResultT = TypeVar("ResultT")
 
 
 def run(
@@ -178,10 +174,10 @@ class _Run:
             return
         self._clock.advance(self._settings.tick_period_s)
         for session in live:
-            self._for(session, session.sense)
+            session.guarded(session.sense)
         self._publish_paths()
-        turn = [session for session in live if session.result is None and self._is_its_turn(session)]
-        free = [session for session in turn if self._for(session, session.may_move)]
+        turn = [session for session in live if session.result is None and session.has_its_turn(self._results)]
+        free = [session for session in turn if session.guarded(session.may_move)]
         self._rest(live, turn, requests.held)
         moving = [session for session in free if not requests.held(session.name)]
         began_wall_s = time.perf_counter()
@@ -196,18 +192,6 @@ class _Run:
         self._recall()
         self._keep_pace(begun_wall_s)
 
-    def _for(self, session: Session, call: Callable[[], ResultT]) -> ResultT | None:
-        """What a call for one robot gives; None where it fails, which ends its mission. Raises OSError: disk full."""
-        try:
-            return call()
-        except (Exception, VerbHung) as stop:
-            if disk_is_full(stop):
-                raise
-            ending = ending_of(stop, self._visitors.publish)
-            session.gone = ending.message
-            session.close(ending)
-            return None
-
     def _poll(self, live: Sequence[Session]) -> ControlRequests:
         """Do what is asked for before time passes."""
         requests = self._control.poll()
@@ -216,7 +200,7 @@ class _Run:
             self._stop(Ending(Outcome.CANCELLED, Cause.CANCELLED, requests.cancel or "cancelled"), requests.insists)
         if requests.of_robots:
             for session in (each for each in live if each.result is None):
-                self._for(session, partial(self._obey, session, requests))
+                session.guarded(partial(self._obey, session, requests))
         under_way = [session for session in live if session.result is None]
         if not under_way:
             return requests
@@ -262,18 +246,6 @@ class _Run:
             for path in self._traffic.news():
                 self._visitors.publish(RESERVED_PATH, path)
 
-    def _is_its_turn(self, session: Session) -> bool:
-        """Whether the robots that a mission waits for are done; it ends when one of them has failed."""
-        for name in session.after:
-            result = self._results.get(name)
-            if result is None:
-                return False
-            if result.outcome is not Outcome.SUCCESS:
-                message = f"{name}, whose part comes first, did not do it: {result.message}"
-                session.close(Ending(Outcome.FAILURE, Cause.PRECONDITION, message))
-                return False
-        return True
-
     def _rest(self, live: Sequence[Session], turn: Sequence[Session], held: Callable[[str], bool]) -> None:
         """Let the robots that wait for others, and those without a mission, clear paths that are reserved."""
         for session in live:
@@ -289,7 +261,7 @@ class _Run:
         changes: list[bool] = []
         for session in moving:
             with self._watchdog.over_tick(session.name, self._settings.tick_limit_s):
-                changed = self._for(session, partial(session.tick, breakpoints))
+                changed = session.guarded(partial(session.tick, breakpoints))
             if changed is not None and session.note is not None:
                 changes.append(changed)
                 notes[session.name] = session.note
@@ -314,7 +286,7 @@ class _Run:
 
     def _look(self, session: Session, *, now: bool = False) -> bool:
         """See how a robot is; whether it still answers."""
-        status = self._for(session, partial(session.status, now=now))
+        status = session.guarded(partial(session.status, now=now))
         if status is None:
             return False
         self._seen[session.name] = status

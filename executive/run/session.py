@@ -1,23 +1,124 @@
-"""One robot in a run: its lease, its missions (others may come in between), and its orderly end."""
+"""One robot in a run: its verbs under the watchdog, its lease, its estimators, its missions, and its orderly end."""
 
 from __future__ import annotations
 
+import math
+import traceback
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Final, TypeVar, cast
 
-from executive.record.schemas import OUTCOME
-from executive.run.outcome import Ending, Outcome, RobotResult
-from executive.run.robot import RunRobot, RunShared
+import numpy as np
+
+from executive.record.schemas import NAVIGATION, OUTCOME, POSE, STATE, stamp
+from executive.record.work import CountedDetector
+from executive.run.guarded_robot import GuardedRobot
+from executive.run.outcome import Ending, Outcome, RobotResult, RobotStatus, ending_of
 from executive.run.tree_run import TreeRun
-from executive.run.visitor import RunEntry, TickNote
+from executive.run.visitor import RunEntry, RunShared, TickNote
+from executive.run.watchdog import VerbHung
 from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree
+from executive.tree.context import RunContext
+from executive.tree.nodes.skill import ERROR_TOPIC
 from executive.tree.plan import start_key
 from executive.tree.snapshot import NodeState, Snapshot
 from executive.words.slug import slug
-from skills.api import Cause
-from skills.robot import Pose2D
+from skills.api import Cause, LayeredView, LocalisationEstimate, ParticleView
+from skills.files.errors import disk_is_full
+from skills.navigate.footprint import Footprint
+from skills.robot import Lease, Pose2D, Robot
 
-LEASE_PATIENCE_S = 60.0
+HOLDER: Final = "errand"
+POSE_PERIOD_S: Final = 0.5
+MOST_PARTICLES: Final = 30
+LEASE_PATIENCE_S: Final = 60.0
+_NO_LEASE: Final = Lease("", "", 0)
+_EPSILON_S: Final = 1e-9
+_NOTHING: Final = np.empty((0, 2))
+ResultT = TypeVar("ResultT")
+
+
+class RunRobot:
+    """One robot, with or without a mission. `context` is what may be done with it, under the lease that it has; `pose`
+    is where it believed to be when it last sensed (None: it did not know).
+    """
+
+    def __init__(self, entry: RunEntry, shared: RunShared) -> None:
+        """Raises what the robot's verbs raise."""
+        self.name: Final = entry.robot.name
+        limits, self._traffic = shared.settings, shared.traffic
+        self.pose: Pose2D | None = None
+        self._guarded = GuardedRobot(
+            entry.robot, shared.watchdog, limit_s=limits.verb_limit_s, image_limit_s=limits.image_limit_s
+        )
+        self._traffic.join(self.name, Footprint.of(self._guarded.capabilities()).discs)
+        self.context = self._context(entry, shared)
+
+    def _context(self, entry: RunEntry, shared: RunShared) -> RunContext:
+        """What the tree of a robot may use, without a lease."""
+        name, control, publish = self.name, shared.control, shared.visitors.publish
+        return RunContext(
+            robot=cast(Robot, self._guarded),
+            lease=_NO_LEASE,
+            clock=shared.clock,
+            worker=shared.worker,
+            localiser=entry.localiser,
+            costmap=entry.costmap,
+            publish=lambda topic, message: publish(topic, {"robot": name, **message}),
+            seed=shared.settings.seed,
+            board=Board(slug(entry.tree.robot_name)),
+            ask=lambda question: control.ask(question, shared.clock, name),
+            stop_pressed=lambda: control.stop_pressed(name),
+            presses=lambda: control.presses,
+            day_began_s=shared.day_began_s,
+            detector=CountedDetector(entry.detector, shared.work),
+            work=shared.work,
+            stack=entry.stack,
+            doors=entry.tree.doors,
+            traffic=shared.traffic.view_of(name),
+        )
+
+    def status(self, *, now: bool = False) -> RobotStatus:
+        """Where the robot is (as it last sensed, or `now`), whether it holds something, and its battery's charge.
+
+        Raises what its verbs raise.
+        """
+        robot, pose = self.context.robot, self.context.known_pose() if now else self.pose
+        return RobotStatus(pose, robot.gripper().holding, robot.battery().charge)
+
+    def sense(self) -> None:
+        """Bring the estimators up to date, and tell the others where the robot believes to be."""
+        context = self.context
+        if estimators := context.leave_others_out:
+            covered_W = self._traffic.covered_W(self.name)
+            for estimator in estimators:
+                estimator.leave_out(covered_W)
+        context.localiser.update(context.robot)
+        estimate = context.localiser.estimate()
+        context.costmap.update(context.robot, estimate)
+        self.pose = context.known_pose()
+        self._traffic.heard(self.name, self.pose)
+
+    def claim(self) -> RunContext:
+        """Claim the lease, which nobody holds; what may be used under it. Raises LeaseError."""
+        self.context = replace(self.context, lease=self._guarded.claim(HOLDER))
+        return self.context
+
+    def stop_and_leave(self) -> None:
+        """Stop the robot and give its lease back. Raises nothing."""
+        context = self.context
+        self.attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
+        self.attempt("return the lease", self._guarded.give_lease_back)
+
+    def attempt(self, what: str, call: Callable[[], object]) -> bool:
+        """Do it, and say whether that went well; a defect goes to the log, since the rest must still happen."""
+        try:
+            call()
+        except (Exception, VerbHung):
+            self.context.publish(ERROR_TOPIC, {"node": self.name, "what": what, "traceback": traceback.format_exc()})
+            return False
+        return True
 
 
 class Session(RunRobot):
@@ -39,7 +140,7 @@ class Session(RunRobot):
         except BaseException:
             self._guarded.give_lease_back()
             raise
-        self.after = entry.after
+        self._after = entry.after
         self._control, self._visitors = shared.control, shared.visitors
         self._given_up: tuple[TreeRun, ...] = ()
         self._held = False
@@ -51,6 +152,9 @@ class Session(RunRobot):
         self.gone: str | None = None
         self.note: TickNote | None = None
         self._asked_at: Pose2D | None = None
+        self._pose_due_s = shared.clock.now()
+        self._matched_s = -math.inf
+        self._navigation: Mapping[str, object] = {}
 
     @property
     def tree(self) -> CompiledTree:
@@ -82,11 +186,42 @@ class Session(RunRobot):
         """The breakpoint that the mission under way waits at."""
         return self._top.waiting_at
 
+    def guarded(self, call: Callable[[], ResultT]) -> ResultT | None:
+        """What a call for this robot gives; None where it fails, which ends its mission. Raises OSError: disk full."""
+        try:
+            return call()
+        except (Exception, VerbHung) as stop:
+            if disk_is_full(stop):
+                raise
+            ending = ending_of(stop, self._visitors.publish)
+            self.gone = ending.message
+            self.close(ending)
+            return None
+
+    def has_its_turn(self, results: Mapping[str, RobotResult]) -> bool:
+        """Whether the robots that the mission waits for are done; it ends when one of them has failed."""
+        for name in self._after:
+            if name not in results:
+                return False
+            if results[name].outcome is not Outcome.SUCCESS:
+                message = f"{name}, whose part comes first, did not do it: {results[name].message}"
+                self.close(Ending(Outcome.FAILURE, Cause.PRECONDITION, message))
+                return False
+        return True
+
     def sense(self) -> None:
-        """Bring the estimators up to date, and log pose and state twice a second."""
+        """Bring the estimators up to date, count a new match of the scan, and log pose and state twice a second."""
         super().sense()
         self._asked_at = self._asked_at or self.pose
-        self.report()
+        context, estimate = self.context, self.context.localiser.estimate()
+        if estimate.stamp_s != self._matched_s:
+            self._matched_s = estimate.stamp_s
+            context.work.count("scan_matches")
+        if context.clock.now() >= self._pose_due_s - _EPSILON_S:
+            self._pose_due_s += POSE_PERIOD_S
+            self._publish_pose(estimate)
+            self._publish_state(estimate)
+            self._publish_navigation()
 
     def may_move(self) -> bool:
         """Whether the lease counts. A lost one suspends the mission until it can be had again.
@@ -129,15 +264,12 @@ class Session(RunRobot):
             if not self.ends:
                 self.close()
         elif self._given_up:
-            self._leave_given_up(run)
+            if not run.ends:
+                run.halt(self.attempt)
+                self._given_up = self._given_up[1:]
         else:
             self._go_on_after_the_top()
         return changed
-
-    def _leave_given_up(self, run: TreeRun) -> None:
-        if not run.ends:
-            run.halt(self.attempt)
-            self._given_up = self._given_up[1:]
 
     def _go_on_after_the_top(self) -> None:
         """Where the mission under way has ended, take up the one before, or begin the next."""
@@ -267,3 +399,50 @@ class Session(RunRobot):
     def _note_result(self, result: RobotResult) -> None:
         self._preempting += (result,)
         self.context.publish(OUTCOME, {**result.message_of_end(), "mission": result.mission})
+
+    def _publish_pose(self, estimate: LocalisationEstimate) -> None:
+        X_WB = self.context.X_WB()
+        p, q = X_WB.translation(), X_WB.rotation().ToQuaternion()
+        flat = Pose2D.from_transform(X_WB)
+        self.context.publish(
+            POSE,
+            {
+                "timestamp": stamp(self.context.clock.now()),
+                "frame_id": "world",
+                "robot": self.name,
+                "pose": {
+                    "position": {"x": p[0], "y": p[1], "z": p[2]},
+                    "orientation": {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()},
+                },
+                "yaw_rad": flat.yaw_rad,
+                "covariance": estimate.covariance.ravel().tolist(),
+            },
+        )
+
+    def _publish_state(self, estimate: LocalisationEstimate) -> None:
+        """What an operator looks at: the gripper, the battery, the speed, and how well the place is known."""
+        robot = self.context.robot
+        self.context.publish(
+            STATE,
+            {
+                "robot": self.name,
+                "holding": robot.gripper().holding,
+                "charge": round(robot.battery().charge, 4),
+                "speed_m_s": round(math.hypot(*robot.odometry().velocity[:2]), 3),
+                "localised": estimate.localised,
+                "localisation_health": round(estimate.health, 3),
+                "position_sigma_m": round(math.sqrt(estimate.covariance[0, 0] + estimate.covariance[1, 1]), 4),
+            },
+        )
+
+    def _publish_navigation(self) -> None:
+        """Where else the robot may be, and what it sees that the map does not have (m); when either is new."""
+        localiser, costmap = self.context.localiser, self.context.costmap
+        particles = localiser.particles_W(MOST_PARTICLES) if isinstance(localiser, ParticleView) else _NOTHING
+        seen = costmap.seen_m() if isinstance(costmap, LayeredView) else _NOTHING
+        columns = np.round(np.concatenate([particles[:, :2].T, seen.T], axis=1), 2)
+        (x, y), count = columns.tolist(), len(particles)
+        new = {"particle_x": x[:count], "particle_y": y[:count], "seen_x": x[count:], "seen_y": y[count:]}
+        if new != self._navigation:
+            self._navigation = new
+            self.context.publish(NAVIGATION, {"robot": self.name, **new})

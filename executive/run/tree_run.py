@@ -29,7 +29,7 @@ from skills.api import Cause
 
 POSE_NOTE_PERIOD_S = 1.0
 
-Attempt = Callable[[str, Callable[[], object]], None]
+Attempt = Callable[[str, Callable[[], object]], bool]
 
 
 class TreeRun:

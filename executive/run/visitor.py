@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from py_trees.behaviour import Behaviour
 
+from executive.record.work import Work
+from executive.run.control import Control
 from executive.run.outcome import RobotResult, RobotStatus, RunResult
-from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S
+from executive.run.traffic import TrafficTable
+from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, Watchdog
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import RunContext
 from executive.tree.snapshot import Change, Snapshot
 from skills.api import Costmap, Detector, Localiser, Worker
 from skills.detection import NO_DETECTOR
-from skills.robot import Pose2D, Robot
+from skills.robot import Clock, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
-
-__all__ = [
-    "Assigner",
-    "MissionEnd",
-    "Progress",
-    "RunEntry",
-    "RunSettings",
-    "RunVisitor",
-    "TickNote",
-    "Visitors",
-]
 
 
 @dataclass(frozen=True)
@@ -172,3 +165,30 @@ class Visitors:
         except Exception:
             if not self.ending:
                 raise
+
+
+@dataclass
+class RunShared:
+    """What all robots of a run share. `day_began_s` is the time of day (s after midnight) at the clock's zero."""
+
+    clock: Clock
+    worker: Worker
+    visitors: Visitors
+    settings: RunSettings
+    control: Control
+    work: Work = field(default_factory=Work)
+    traffic: TrafficTable = field(init=False)
+    watchdog: Watchdog = field(init=False)
+    day_began_s: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        limits, told_s = self.settings, self.settings.time_of_day_s
+        self.traffic = TrafficTable({}, self.clock.now)
+        self.watchdog = Watchdog(min(limits.verb_limit_s, limits.image_limit_s, limits.tick_limit_s))
+        self.day_began_s = (_time_of_day_s() if told_s is None else told_s) - self.clock.now()
+
+
+def _time_of_day_s() -> float:
+    """The time of day on this machine (s after midnight)."""
+    now = time.localtime()
+    return 3600.0 * now.tm_hour + 60.0 * now.tm_min + now.tm_sec

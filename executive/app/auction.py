@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-__all__ = ["Auction", "Award", "Bid", "Round", "award"]
-
 
 @dataclass(frozen=True)
 class Bid:

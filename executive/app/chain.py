@@ -12,8 +12,6 @@ from executive.words.command import Command, Task
 from executive.words.knowledge import Knowledge, SurfaceFacts
 from skills.files.errors import InputError
 
-__all__ = ["Chain", "ChainedMission", "Split", "chained", "soonest", "splits"]
-
 
 @dataclass(frozen=True)
 class Split:

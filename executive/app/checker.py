@@ -17,8 +17,6 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, RoutePlanner
 from skills.files.errors import InputError
 
-__all__ = ["Checked", "Checker"]
-
 MOST_LETTERS: Final = 300
 
 

@@ -43,8 +43,6 @@ from executive.words.knowledge import BatteryFacts, SurfaceFacts
 from skills.files.errors import listing
 from skills.robot import Pose2D
 
-__all__ = ["Dispatch", "silence"]
-
 LEFT_M: Final = 1.5
 """A robot that has come so far has left the table where it put something down for another."""
 

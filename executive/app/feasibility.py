@@ -28,8 +28,6 @@ from skills.perception.class_forms import class_forms
 from skills.robot import Capabilities, Pose2D
 from skills.stack import DEFAULT_FILE, default_component
 
-__all__ = ["RouteCache", "route_cache_of"]
-
 
 class _RoutesOnMap(RoutePlanner):
     """Routes on the robot's map of a world for the robot's footprint; the map is read when the first is asked for.

@@ -41,29 +41,6 @@ from skills.geometry import wrap
 from skills.place.free_spot import spots
 from skills.robot import Pose2D
 
-__all__ = [
-    "EndedMission",
-    "FleetMission",
-    "FleetRobot",
-    "MissionProgress",
-    "Offers",
-    "ProgressJournal",
-    "RobotNow",
-    "bid_for",
-    "charging_missions",
-    "charging_time_s",
-    "fleet_mission",
-    "is_lost",
-    "is_plain",
-    "is_way",
-    "missions_json",
-    "missions_message",
-    "progress_of",
-    "rest_of",
-    "surfaces_of",
-    "with_commands",
-]
-
 URGENT: Final = 0.5
 """At this share of the charge that counts as low, a robot that has something in hand goes to its dock all the same."""
 _TOUCHED: Final = (Status.RUNNING, Status.SUCCESS)

@@ -36,8 +36,6 @@ from executive.words.robots import RobotConfig
 from plant.worlds.world import World
 from skills.files.errors import InputError, Problems
 
-__all__ = ["run_fleet", "simulated_fleet"]
-
 TIME_LIMIT_S: Final = 1200.0
 """For each mission of the queue, on the robots' clock."""
 _OPEN: Final = frozenset({MissionState.QUEUED.value, MissionState.RUNNING.value})

@@ -21,8 +21,6 @@ from executive.words.mission import DEFAULT_WORLD
 from executive.words.robots import RobotConfig
 from skills.estimate.compiled import CompiledFunction
 
-__all__ = ["compile_kernels", "newly_compiled"]
-
 _MISSION: Final = """
 name: warm up
 steps: [{skill: navigate, with: {x: 5.2, y: 4.5, yaw: 3.1416}}]

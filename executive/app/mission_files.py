@@ -13,7 +13,6 @@ from skills.files.yaml_scalars import yaml_of
 if TYPE_CHECKING:
     from skills.teleop.driver import SavedPose
 
-__all__ = ["FOLDER", "mission_file", "shipped_missions"]
 
 FOLDER: Final = Path(__file__).resolve().parents[2] / "missions"
 

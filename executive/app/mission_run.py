@@ -49,19 +49,6 @@ from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path
 from skills.robot import Pose2D, Robot
 
-__all__ = [
-    "Finished",
-    "entry_for",
-    "log_map",
-    "log_name",
-    "mission_events",
-    "return_memory",
-    "robot_report",
-    "run_request",
-    "run_watched",
-    "spoken_classes",
-]
-
 _MOST_STARTS: Final = 1000
 
 

@@ -17,8 +17,6 @@ from skills.perception.detector.network_file import ModelFileError
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector, load_detector
 from skills.robot import Picture
 
-__all__ = ["FOUND_COLOUR", "detector_of", "draw_box", "drawn", "read_picture", "write_picture"]
-
 Colour = tuple[int, int, int]
 
 FOUND_COLOUR: Final = (40, 200, 60)

@@ -32,8 +32,6 @@ from skills.robot import Pose2D
 if TYPE_CHECKING:
     from executive.language.understand import Part, Understanding
 
-__all__ = ["Setting", "prepare", "prepare_alone"]
-
 
 def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
     """Understand a request, and compile it.

@@ -20,8 +20,6 @@ from skills.robot import Pose2D
 if TYPE_CHECKING:
     from executive.language.understand import Understanding
 
-__all__ = ["Prepared", "together"]
-
 
 @dataclass(frozen=True)
 class Prepared:

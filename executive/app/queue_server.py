@@ -32,17 +32,6 @@ from executive.view.calls import CallError, CallServer
 from skills.files.errors import InputError
 from skills.files.plugins import PluginDefect, run_in_thread
 
-__all__ = [
-    "MOST_STARTS",
-    "CallAddress",
-    "CallToken",
-    "Listeners",
-    "QueueServer",
-    "TriggerCalls",
-    "Waiting",
-    "call_token",
-]
-
 LIMIT_S: Final = 10.0
 """A plug-in may take so long to start, and to stop."""
 _SEE: Final = "see the documentation of that package"

@@ -32,21 +32,6 @@ from executive.words.knowledge import Knowledge
 from skills.api import ObjectObservation
 from skills.files.errors import InputError
 
-__all__ = [
-    "REPORT",
-    "EndedTree",
-    "MissionRow",
-    "ReportPage",
-    "ReportPart",
-    "StepRow",
-    "map_of",
-    "part_of",
-    "save_report",
-    "step_rows",
-    "with_findings",
-    "write_report",
-]
-
 REPORT: Final = "report.html"
 TREE: Final = "tree"
 _CAPTIONS: Final = {

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from skills.detection import Detector
     from skills.estimate.grid_map import GridMap
 
-__all__ = ["DEFAULT_KIND", "PlacedRobot", "knowledge_for", "only_robot", "placed_robots", "shared_detector", "stand_at"]
 
 DEFAULT_KIND: Final = "spot"
 TURNING_M: Final = 0.7

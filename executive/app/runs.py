@@ -28,21 +28,6 @@ from executive.store.resuming import ended_tree, resumed_tree
 from executive.words.slug import slug
 from skills.files.errors import InputError, disk_is_full
 
-__all__ = [
-    "Ended",
-    "MissionRuns",
-    "Runner",
-    "Screen",
-    "Watching",
-    "broken_off",
-    "new_run",
-    "next_queued",
-    "note_run",
-    "queued_missions",
-    "resumable_line",
-    "run_in_turn",
-]
-
 _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCELLED, MissionState.ERROR)
 
 

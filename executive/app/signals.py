@@ -12,8 +12,6 @@ from typing import Final
 
 from executive.run.control import Control
 
-__all__ = ["HUNG_UP", "cancelled_by_signals", "ended_by_signals", "interrupted_by_hang_up"]
-
 _OUTPUTS: Final = (1, 2)
 _REASON: Final = "cancelled by {}"
 HUNG_UP: Final = _REASON.format(signal.SIGHUP.name)

@@ -32,8 +32,6 @@ from skills.navigate.lattice import search
 from skills.robot import Clock, Pose2D
 from skills.stack import RobotStack, default_stack
 
-__all__ = ["SimulatedBackend", "compile_first", "run_entry", "simulate"]
-
 _LOG: Final = logging.getLogger(__name__)
 
 

@@ -25,8 +25,6 @@ from executive.tree.registry import installed_skills
 from executive.words.mission import Mission
 from executive.words.step import Step
 
-__all__ = ["Talk", "conversation_of", "load_ahead"]
-
 
 def load_ahead() -> None:
     """Begin to load the parser, in a thread of its own."""

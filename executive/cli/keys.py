@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final, Protocol
 
-from executive.run.control import Control, ControlState, Mode
-from executive.run.questions import OpenQuestion
+from executive.run.control import Control
+from executive.run.control_state import ControlState, Mode, OpenQuestion
 from skills.files.texts import LONGEST_ANSWER
 
 HELP: Final = "space pause/go on · s step · x stop button · c cancel"

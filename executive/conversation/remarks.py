@@ -11,7 +11,8 @@ from py_trees.common import Status
 from executive.conversation.parts import OVER, Reply, Speech, answer, confirmation, refusal
 from executive.language.followups import Remark
 from executive.language.grounding import known_line
-from executive.run.control import Control, ControlState, Mode, RobotMode
+from executive.run.control import Control
+from executive.run.control_state import ControlState, Mode, RobotMode
 from executive.run.visitor import Progress
 from executive.tree.snapshot import NodeState, Snapshot
 from executive.words.geometry import distance_m

@@ -37,7 +37,8 @@ from executive.language.followups import (
 from executive.language.questions import ClarifyingQuestion, with_answer
 from executive.language.reference import Memory
 from executive.language.understand import Status, Understanding
-from executive.run.control import Control, Mode
+from executive.run.control import Control
+from executive.run.control_state import Mode
 from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree
 from executive.words.command import Command, Task

@@ -19,21 +19,29 @@ from __future__ import annotations
 import difflib
 import functools
 import threading
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from types import MappingProxyType
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, Final, ParamSpec, TypeVar
 
-from executive.run.control_state import ControlRequests, ControlState, Event, Mode, Replacement, RobotMode
-from executive.run.questions import QuestionManager
+from executive.run.control_state import (
+    ControlRequests,
+    ControlState,
+    Event,
+    Mode,
+    OpenQuestion,
+    Replacement,
+    RobotMode,
+)
 from executive.tree.compiler import CompiledTree
 from skills.api import Asked, Question
+from skills.files.errors import InputError
+from skills.files.texts import LONGEST_ANSWER, plain_text
 from skills.robot import Clock
-
-__all__ = ["Control", "ControlRequests", "ControlState", "Event", "Mode", "Replacement", "RobotMode"]
 
 P = ParamSpec("P")
 ResultT = TypeVar("ResultT")
+_REASONS: Final = (Mode.STOPPED, Mode.LEASE_LOST, Mode.PAUSED)
+"""The reasons not to move, the strongest first."""
 
 
 def _locked(method: Callable[Concatenate[Control, P], ResultT]) -> Callable[Concatenate[Control, P], ResultT]:
@@ -59,36 +67,33 @@ class Control:
         self.attended = attended
         self.pace = pace
         self._changed = threading.Condition()
-        self._questions = QuestionManager()
+        self._questions: dict[str, PendingAnswer] = {}
         self._version = 0
         self._begun = self._ended = False
         self._requests = self._lasting = ControlRequests()
-        self._pressed: str | None = None
-        self._holds: Mapping[tuple[str, Mode], str] = MappingProxyType({})  # of single robots
-        self._paused: str | None = None
+        self._holds: dict[tuple[str | None, Mode], str] = {}  # why a robot, or all of them (None), stand still
         self._stride: int | None = None  # ticks to go while paused; 0: until a node changes; None: none
         self._at: str | None = None
-        self._lost: Mapping[str, str] = MappingProxyType({})
-        self._missions: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+        self._missions: dict[str, tuple[str, ...]] = {}
         self._known: frozenset[str] = frozenset()
-        self._presses: Mapping[str, int] = MappingProxyType({})
+        self._presses: Mapping[str, int] = {}
         self._buttons: tuple[str, ...] = ()
 
     @property
     @_locked
     def state(self) -> ControlState:
         """The present state."""
-        (mode, reason), asked = self._mode(), self._requests
+        present = self._mode()
         return ControlState(
             self._version,
-            mode,
-            reason,
+            present.mode,
+            present.reason,
             self._at,
-            self._questions.open,
-            asked.breakpoints,
-            self._missions,
+            tuple(each.open for each in self._questions.values()),
+            self._requests.breakpoints,
+            dict(self._missions),
             self._buttons,
-            MappingProxyType({robot: self._robot_mode(robot) for robot in self._missions}),
+            {robot: self._mode(robot) for robot in self._missions},
         )
 
     @_locked
@@ -103,27 +108,21 @@ class Control:
 
         Raises ValueError: no such robot in the run.
         """
-        if robot is not None:
-            self._hold(robot, Mode.PAUSED, "pause", reason)
-            return
-        self._stride = None
-        if self._paused is None:
-            self._paused = reason
-            self._note("pause", reason)
+        if robot is None:
+            self._stride = None
+        self._hold(robot, Mode.PAUSED, "pause", reason)
 
     @_locked
     def resume(self, *, robot: str | None = None) -> None:
         """Continue after a pause, a breakpoint or steps, or after one robot's own pause; the stop button stays."""
-        if robot is not None:
-            self._let_go(robot, Mode.PAUSED, "resume", "the mission goes on")
-        elif self._paused is not None:
-            self._paused = self._at = self._stride = None
-            self._note("resume", "the mission goes on")
+        if robot is None:
+            self._at = self._stride = None
+        self._let_go(robot, Mode.PAUSED, "resume", "the mission goes on")
 
     @_locked
     def toggle_pause(self) -> None:
         """Pause, or resume when paused."""
-        if self._paused is None:
+        if (None, Mode.PAUSED) not in self._holds:
             self.pause()
         else:
             self.resume()
@@ -137,7 +136,7 @@ class Control:
         """
         if ticks is not None and ticks < 1:
             raise ValueError(f"a step of {ticks} ticks: at least 1 is needed")
-        self._paused = self._paused or "stepping"
+        self._holds.setdefault((None, Mode.PAUSED), "stepping")
         self._stride, self._at = ticks or 0, None
         self._note("step", "until a node changes" if ticks is None else f"for {ticks} ticks")
 
@@ -163,7 +162,7 @@ class Control:
         if self._begun and button not in self._buttons:
             known = f"there are: {', '.join(self._buttons)}" if self._buttons else "there are none"
             raise ValueError(f"the run has no button '{button}'; {known}")
-        self._presses = MappingProxyType({**self._presses, button: self._presses.get(button, 0) + 1})
+        self._presses = {**self._presses, button: self._presses.get(button, 0) + 1}
         self._note("button", button)
 
     @property
@@ -178,25 +177,17 @@ class Control:
 
         Raises ValueError: no such robot in the run.
         """
-        if robot is not None:
-            self._hold(robot, Mode.STOPPED, "stop button", reason)
-        elif self._pressed is None:
-            self._pressed = reason
-            self._note("stop button", reason)
+        self._hold(robot, Mode.STOPPED, "stop button", reason)
 
     @_locked
     def release_stop_button(self, *, robot: str | None = None) -> None:
         """Continue as it was when the button was pressed, for all robots or for one."""
-        if robot is not None:
-            self._let_go(robot, Mode.STOPPED, "stop button released", "the stop button is released")
-        elif self._pressed is not None:
-            self._pressed = None
-            self._note("stop button released", "the stop button is released")
+        self._let_go(robot, Mode.STOPPED, "stop button released", "the stop button is released")
 
     @_locked
     def stop_pressed(self, robot: str) -> str | None:
         """Why the stop button is pressed for a robot; None when it is not."""
-        return self._pressed or self._holds.get((robot, Mode.STOPPED))
+        return self._holds.get((None, Mode.STOPPED)) or self._holds.get((robot, Mode.STOPPED))
 
     @_locked
     def set_breakpoint(self, path_id: str) -> None:
@@ -243,8 +234,18 @@ class Control:
     @_locked
     def answer(self, question_id: str, text: str) -> None:
         """Answer an open question. Raises ValueError when it is not open or `text` is none of its options."""
-        self._questions.answer(question_id, text)
-        self._note("answer", f"{question_id}: {text}")
+        pending = self._questions.get(question_id)
+        if pending is None:
+            raise ValueError(f"the question '{question_id[:80]}' is not open (any more)")
+        try:
+            said = plain_text(text, what="the answer", longest=LONGEST_ANSWER)
+        except InputError as error:
+            raise ValueError(str(error)) from error
+        options = pending.open.options
+        said = next((option for option in options if option.lower() == said.strip().lower()), said)
+        if options and said not in options:
+            raise ValueError(f"'{said}' is no answer to '{question_id}'; choose one of: {', '.join(options)}")
+        self._close_question(pending, said, "answer", text)
 
     @_locked
     def begin(self, missions: Mapping[str, CompiledTree]) -> None:
@@ -265,25 +266,24 @@ class Control:
             return
         self._known |= frozenset(tree.path_ids)
         self._buttons = tuple(dict.fromkeys((*self._buttons, *tree.buttons)))
-        stack = (*before, tree.mission_name)
-        self._missions = MappingProxyType({**self._missions, robot_name: stack})
+        self._missions[robot_name] = (*before, tree.mission_name)
         self._bump()
 
     @_locked
     def mission_ended(self, robot_name: str) -> None:
         """A robot's topmost mission is over."""
-        self._missions = MappingProxyType({**self._missions, robot_name: self._missions.get(robot_name, ())[:-1]})
+        self._missions[robot_name] = self._missions.get(robot_name, ())[:-1]
         self._bump()
 
     @_locked
     def poll(self) -> ControlRequests:
         """What is asked for now; new missions and events are handed out once."""
-        if self._requests is self._lasting and self._pressed is None and self._paused is None and not self._holds:
+        if self._requests is self._lasting and not self._holds:
             return self._requests
-        mode, reason = self._mode()
-        held = mode is Mode.STOPPED or (mode is Mode.PAUSED and self._stride is None)
-        holds = {robot: why for (robot, _), why in self._holds.items()}
-        requests = replace(self._requests, hold=reason if held else None, holds=holds)
+        paused = None if self._stride is not None else self._holds.get((None, Mode.PAUSED))
+        hold = self._holds.get((None, Mode.STOPPED), paused)
+        holds = {robot: why for (robot, mode), why in self._holds.items() if robot and mode is not Mode.LEASE_LOST}
+        requests = replace(self._requests, hold=hold, holds=holds)
         self._lasting = ControlRequests(requests.cancel, requests.insists, breakpoints=requests.breakpoints)
         self._requests = self._lasting
         return requests
@@ -300,28 +300,44 @@ class Control:
     @_locked
     def arrived_at(self, path_id: str) -> None:
         """The run stands at a breakpoint."""
-        self._paused, self._at, self._stride = f"at the breakpoint {path_id}", path_id, None
-        self._note("breakpoint", self._paused)
+        self._holds[None, Mode.PAUSED] = why = f"at the breakpoint {path_id}"
+        self._at, self._stride = path_id, None
+        self._note("breakpoint", why)
 
     @_locked
     def lease_lost(self, robot_name: str, why: str | None) -> None:
         """A robot's lease was lost (why), or is there again (None)."""
-        others = {name: reason for name, reason in self._lost.items() if name != robot_name}
-        self._lost = MappingProxyType(others if why is None else {**others, robot_name: why})
+        self._holds.pop((robot_name, Mode.LEASE_LOST), None)
+        if why is not None:
+            self._holds[robot_name, Mode.LEASE_LOST] = why
         self._note("lease lost" if why else "lease back", why or f"{robot_name} has its lease again")
 
     @_locked
     def ask(self, question: Question, clock: Clock, robot: str = "") -> Asked:
         """Put a robot's question to the operator. Raises ValueError when one of that id is open already."""
-        over = functools.partial(self._note, "question over")
-        asked = self._questions.ask(question, clock, self._changed, over, robot)
+        if question.id in self._questions:
+            raise ValueError(f"the question '{question.id}' is open already")
+        opened = OpenQuestion(question, clock.now() + question.limit_s, robot)
+        self._questions[question.id] = asked = PendingAnswer(opened, clock, self._take_default)
         self._note("question", f"{question.id}: {question.text}")
         return asked
 
     @_locked
+    def _take_default(self, pending: PendingAnswer, why: str) -> None:
+        """Nobody answers a question, for a reason: its default is the answer."""
+        if pending.answer is None:
+            self._close_question(pending, pending.open.question.default, "question over", why)
+
+    def _close_question(self, pending: PendingAnswer, answer: str, what: str, message: str) -> None:
+        pending.answer = answer
+        self._questions.pop(pending.open.id, None)
+        self._note(what, f"{pending.open.id}: {message}")
+
+    @_locked
     def held(self, duration_s: float) -> None:
         """The run was held so long (robot's clock); that does not count against the time of questions."""
-        self._questions.postpone(duration_s)
+        for pending in self._questions.values():
+            pending.open = replace(pending.open, until_s=pending.open.until_s + duration_s)
 
     @_locked
     def rest(self, duration_s: float) -> None:
@@ -333,53 +349,42 @@ class Control:
     @_locked
     def slow(self) -> bool:
         """True while simulated time should not run ahead of the people who watch."""
-        held = self._mode()[0] is not Mode.RUNNING or bool(self._holds)
-        return held or (self.attended and bool(self._questions.open))
+        held = self._mode().mode is not Mode.RUNNING or bool(self._holds)
+        return held or (self.attended and bool(self._questions))
 
     @_locked
     def end(self) -> tuple[Event, ...]:
         """The run is over; the events that were not handed out yet."""
         self._ended = True
-        self._questions.close()
+        self._questions.clear()
         events = self._requests.events
         self._ask_for(events=())
         self._bump()
         return events
 
-    def _mode(self) -> tuple[Mode, str]:
-        lost = next(iter(self._lost.values()), None)
-        order: Collection[tuple[bool, Mode, str | None]] = (
-            (self._ended, Mode.ENDED, self._requests.cancel),
-            (self._pressed is not None, Mode.STOPPED, self._pressed),
-            (lost is not None, Mode.LEASE_LOST, lost),
-            (self._paused is not None, Mode.PAUSED, self._paused),
-            (not self._begun, Mode.READY, ""),
-        )
-        return next(((mode, reason or "") for holds, mode, reason in order if holds), (Mode.RUNNING, ""))
+    def _mode(self, robot: str | None = None) -> RobotMode:
+        """What a robot does, or the whole run: the strongest reason not to move counts, its own or that of all."""
+        if self._ended:
+            return RobotMode(Mode.ENDED, self._requests.cancel or "")
+        for mode in _REASONS:
+            whose = (None, robot) if robot or mode is not Mode.LEASE_LOST else (None, *self._missions)
+            for who in whose:
+                if (who, mode) in self._holds:
+                    return RobotMode(mode, self._holds[who, mode])
+        ready = not self._begun or (robot is not None and not self._missions[robot])
+        return RobotMode(Mode.READY if ready else Mode.RUNNING)
 
-    def _robot_mode(self, robot: str) -> RobotMode:
-        """What one robot does: the strongest reason not to move counts, its own or that of all."""
-        run, reason = self._mode()
-        order: Collection[tuple[bool, Mode, str | None]] = (
-            (run in (Mode.ENDED, Mode.STOPPED), run, reason),
-            ((robot, Mode.STOPPED) in self._holds, Mode.STOPPED, self._holds.get((robot, Mode.STOPPED))),
-            (robot in self._lost, Mode.LEASE_LOST, self._lost.get(robot)),
-            (self._paused is not None, Mode.PAUSED, self._paused),
-            ((robot, Mode.PAUSED) in self._holds, Mode.PAUSED, self._holds.get((robot, Mode.PAUSED))),
-            (not self._begun or not self._missions[robot], Mode.READY, ""),
-        )
-        return next((RobotMode(mode, why or "") for holds, mode, why in order if holds), RobotMode(Mode.RUNNING))
-
-    def _hold(self, robot: str, mode: Mode, what: str, reason: str) -> None:
-        self._refuse_stranger(robot)
+    def _hold(self, robot: str | None, mode: Mode, what: str, reason: str) -> None:
+        """Have a robot, or all, stand still. Raises ValueError: no such robot in the run."""
+        if robot is not None:
+            self._refuse_stranger(robot)
         if (robot, mode) not in self._holds:
-            self._holds = MappingProxyType({**self._holds, (robot, mode): reason})
-            self._note(what, f"{robot}: {reason}")
+            self._holds[robot, mode] = reason
+            self._note(what, reason if robot is None else f"{robot}: {reason}")
 
-    def _let_go(self, robot: str, mode: Mode, what: str, message: str) -> None:
-        if (robot, mode) in self._holds:
-            self._holds = MappingProxyType({key: why for key, why in self._holds.items() if key != (robot, mode)})
-            self._note(what, f"{robot}: {message}")
+    def _let_go(self, robot: str | None, mode: Mode, what: str, message: str) -> None:
+        if self._holds.pop((robot, mode), None) is not None:
+            self._note(what, message if robot is None else f"{robot}: {message}")
 
     def _refuse_stranger(self, robot: str) -> None:
         if self._begun and robot not in self._missions:
@@ -408,3 +413,28 @@ class Control:
             near = difflib.get_close_matches(path_id, self._known, n=1)
             hint = f"; did you mean '{near[0]}'?" if near else ""
             raise ValueError(f"the run has no node '{path_id}'{hint}")
+
+
+class PendingAnswer:
+    """A `skills.api.Asked`: done when answered or when its time is over, which makes the default the answer."""
+
+    def __init__(self, opened: OpenQuestion, clock: Clock, take_default: Callable[[PendingAnswer, str], None]) -> None:
+        self.open = opened
+        self.answer: str | None = None
+        self._clock, self._take_default = clock, take_default
+
+    def done(self) -> bool:
+        """True when answered; the default is taken when the time is over."""
+        if self._clock.now() >= self.open.until_s - 1e-9:
+            self._take_default(self, f"nobody answered in time, so '{self.open.question.default}'")
+        return self.answer is not None
+
+    def result(self) -> str:
+        """The answer. Raises RuntimeError before there is one."""
+        if self.answer is None:
+            raise RuntimeError(f"the question '{self.open.id}' is not answered yet")
+        return self.answer
+
+    def withdraw(self) -> None:
+        """Take the question back."""
+        self._take_default(self, "taken back")

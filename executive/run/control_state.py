@@ -6,10 +6,8 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from executive.run.questions import OpenQuestion
 from executive.tree.compiler import CompiledTree
-
-__all__ = ["ControlRequests", "ControlState", "Event", "Mode", "Replacement", "RobotMode"]
+from skills.api import Question
 
 
 class Mode(enum.Enum):
@@ -29,6 +27,25 @@ class RobotMode:
 
     mode: Mode
     reason: str = ""
+
+
+@dataclass(frozen=True)
+class OpenQuestion:
+    """A robot's question and until when it may be answered, on the robot's clock."""
+
+    question: Question
+    until_s: float
+    robot: str = ""
+
+    @property
+    def id(self) -> str:
+        """The question's id."""
+        return self.question.id
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """The answers to choose from; empty when any text will do."""
+        return self.question.options
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,6 @@ from executive.words.slug import slug
 from skills.api import Part
 from skills.robot import Clock
 
-__all__ = ["Executions", "Findings", "claim", "findings_in_words", "history_keys", "is_speech"]
-
 MOST_CHARS: Final = 300
 _DENIALS: Final = ("no ", "not ", "nobody ", "nothing ")
 _ENDED: Final = (Status.SUCCESS, Status.FAILURE)

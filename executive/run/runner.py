@@ -9,7 +9,8 @@ from functools import partial
 from typing import Final
 
 from executive.record.schemas import CONTROL, OUTCOME, RESERVED_PATH
-from executive.run.control import Control, ControlRequests, Event
+from executive.run.control import Control
+from executive.run.control_state import ControlRequests, Event
 from executive.run.outcome import Ending, Outcome, RobotResult, RobotStatus, RunResult, ending_of
 from executive.run.resting import Resting
 from executive.run.session import RunRobot, Session

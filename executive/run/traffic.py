@@ -11,8 +11,6 @@ import numpy as np
 from skills.robot import FloatArray, Pose2D
 from skills.traffic import Neighbour, Traffic
 
-__all__ = ["SILENT_S", "TrafficTable"]
-
 SILENT_S = 2.0
 """Who was not heard of for so long (s of the run's clock) has no claim and no path any more."""
 _ABOUT_M = 0.2

@@ -7,7 +7,8 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from executive.conversation.parts import Waiting
-from executive.run.control import Control, ControlState
+from executive.run.control import Control
+from executive.run.control_state import ControlState
 from skills.files.errors import InputError
 from skills.files.texts import plain_text
 

@@ -9,7 +9,8 @@ from typing import Any, Final
 
 from py_trees.common import Status
 
-from executive.run.control import Control, Mode
+from executive.run.control import Control
+from executive.run.control_state import Mode
 from executive.run.visitor import Progress, RunVisitor
 from executive.tree.snapshot import NodeState, Snapshot
 from executive.view.actions import control_json

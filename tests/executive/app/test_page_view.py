@@ -14,7 +14,7 @@ from executive.app.page_view import PageView, queueing
 from executive.app.page_view import said as sentence_action
 from executive.app.prepare import prepare
 from executive.mission.request import Request
-from executive.run.control import Mode
+from executive.run.control_state import Mode
 from executive.store.missions import MissionState, MissionStore
 from executive.view.actions import RefusedError
 from skills.files.errors import InputError

@@ -6,7 +6,8 @@ from executive.app.prepare import prepare
 from executive.app.talk import Talk
 from executive.conversation import ReplyKind
 from executive.mission.request import Request
-from executive.run.control import Control, Mode
+from executive.run.control import Control
+from executive.run.control_state import Mode
 from executive.words.robots import RobotConfig
 
 TWO = (

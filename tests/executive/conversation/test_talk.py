@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from executive.conversation import Conversation, ReplyKind
-from executive.run.control import Mode
+from executive.run.control_state import Mode
 from executive.run.outcome import Outcome
 from executive.words.command import Command
 from executive.words.leaf_steps import Do, steps_of_commands

@@ -5,7 +5,8 @@ import threading
 import pytest
 from py_trees.common import Status
 
-from executive.run.control import Control, Mode
+from executive.run.control import Control
+from executive.run.control_state import Mode
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.outcome import Outcome
 from executive.run.visitor import RunVisitor

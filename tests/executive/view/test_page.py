@@ -20,7 +20,8 @@ from executive.language.understand import Status, Understanding
 from executive.record.announce import map_message
 from executive.record.event_log import EventLog
 from executive.record.history import read_history
-from executive.run.control import Control, Mode
+from executive.run.control import Control
+from executive.run.control_state import Mode
 from executive.run.outcome import RobotStatus
 from executive.run.visitor import Progress
 from executive.tree.compiler import compile_mission

@@ -11,7 +11,8 @@ from py_trees.common import Status
 from websockets.exceptions import InvalidStatus, WebSocketException
 from websockets.sync.client import connect
 
-from executive.run.control import Control, Mode
+from executive.run.control import Control
+from executive.run.control_state import Mode
 from executive.run.visitor import Progress
 from executive.tree.snapshot import NodeState
 from executive.view.actions import RefusedError, control_actions, control_json, text_of

@@ -97,7 +97,7 @@ class Resting:
             self.stepped_aside.add(name)
         robot.who.attempt("resting", robot.aside.end)
         if robot.own_lease:
-            self.table.release(name)
+            robot.who.context.traffic.release()
             robot.who.stop_and_leave()
 
     def close(self) -> None:

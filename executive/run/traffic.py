@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from skills.robot import FloatArray, Pose2D
-from skills.traffic import Neighbour, Traffic
+from skills.traffic import Neighbour
 
 SILENT_S = 2.0
 """Who was not heard of for so long (s of the run's clock) has no claim and no path any more."""
@@ -20,11 +20,14 @@ _TOLD_EVERY_M = 0.25
 
 @dataclass
 class _Robot:
-    """What is known of one robot. `turn` is its place in the order of claims, None without one.
+    """What is known of one robot, and how it uses the table (`skills.traffic.Traffic`).
 
-    `idle` while it has nothing to do and clears paths that others reserve.
+    `turn` is its place in the order of claims, None without one. `idle` while it has nothing to do and clears paths
+    that others reserve.
     """
 
+    table: TrafficTable
+    name: str
     discs: FloatArray
     believed: Pose2D | None = None
     stamp_s: float = -np.inf
@@ -55,6 +58,53 @@ class _Robot:
             self._covered = self.pose, self.discs, about_W
         return self._covered[2]
 
+    @property
+    def silent(self) -> bool:
+        """Whether it was not heard of for long."""
+        return self.table.now() - self.stamp_s > SILENT_S
+
+    def claim(self) -> None:
+        """See `Traffic.claim`."""
+        if self.turn is None:
+            self.turn = self.table.next_turn()
+            self.path = None if self.pose is None else self.pose[None, :]
+
+    def announce(self, path: FloatArray, discs: FloatArray) -> None:
+        """See `Traffic.announce`."""
+        self.path, self.discs = path, discs
+
+    def release(self) -> None:
+        """See `Traffic.release`."""
+        self.path = self.turn = None
+
+    def others(self) -> Sequence[Neighbour]:
+        """See `Traffic.others`."""
+        return tuple(
+            Neighbour(
+                other.name,
+                other.pose,
+                other.path,
+                other.discs,
+                other.stamp_s,
+                first=other.goes_before(self),
+                yields=self.goes_before(other) and (other.turn is not None or other.idle),
+            )
+            for other in self.table.others(self.name)
+            if other.pose is not None
+        )
+
+    def let_pass(self, name: str) -> None:
+        """See `Traffic.let_pass`."""
+        other = self.table.view_of(name)
+        if self.turn is not None and other.turn is not None:
+            self.turn, other.turn = other.turn, self.turn
+
+    def goes_before(self, other: _Robot) -> bool:
+        """Whether it has the right of way: it claimed first, and still answers."""
+        if self.turn is None or self.silent:
+            return False
+        return other.turn is None or other.silent or self.turn < other.turn
+
 
 class TrafficTable:
     """Claims in the order in which they come. Each robot holds one at most, and no two have the same turn.
@@ -64,60 +114,35 @@ class TrafficTable:
 
     def __init__(self, outlines: dict[str, FloatArray], now: Callable[[], float]) -> None:
         """`outlines` are each robot's discs (x, y, radius in the body frame); `now` is the run's clock (s)."""
-        self._robots = {name: _Robot(discs) for name, discs in sorted(outlines.items())}
-        self._now, self._turns = now, 0
+        self._robots = {name: _Robot(self, name, discs) for name, discs in sorted(outlines.items())}
+        self.now, self._turns = now, 0
 
     def join(self, name: str, discs: FloatArray) -> None:
         """One more robot with its discs (x, y, radius in the body frame); one that is known already stays as it is."""
-        self._robots.setdefault(name, _Robot(discs))
+        self._robots.setdefault(name, _Robot(self, name, discs))
 
     def heard(self, name: str, pose: Pose2D | None) -> None:
         """A robot still answers, and believes to be at a pose of the world; None: it does not know."""
         robot = self._robots[name]
-        robot.stamp_s = self._now()
+        robot.stamp_s = self.now()
         robot.believed = pose or robot.believed
 
     def rest(self, name: str, *, idle: bool) -> None:
         """A robot has nothing to do and clears paths that others reserve, or has work again."""
         self._robots[name].idle = idle
 
-    def view_of(self, name: str) -> Traffic:
-        """What one robot sees of it."""
-        return _View(self, name)
+    def view_of(self, name: str) -> _Robot:
+        """The table as one robot uses it."""
+        return self._robots[name]
 
-    def claim(self, name: str) -> None:
-        """See `Traffic.claim`."""
-        robot = self._robots[name]
-        if robot.turn is None:
-            self._turns += 1
-            robot.turn = self._turns
-            robot.path = None if robot.pose is None else robot.pose[None, :]
+    def next_turn(self) -> int:
+        """The turn of the next claim."""
+        self._turns += 1
+        return self._turns
 
-    def announce(self, name: str, path: FloatArray, discs: FloatArray) -> None:
-        """See `Traffic.announce`."""
-        robot = self._robots[name]
-        robot.path, robot.discs = path, discs
-
-    def release(self, name: str) -> None:
-        """See `Traffic.release`."""
-        robot = self._robots[name]
-        robot.path = robot.turn = None
-
-    def others(self, name: str) -> Sequence[Neighbour]:
-        """See `Traffic.others`."""
-        return tuple(
-            Neighbour(
-                other,
-                robot.pose,
-                robot.path,
-                robot.discs,
-                robot.stamp_s,
-                first=self.goes_before(other, name),
-                yields=self.goes_before(name, other) and (robot.turn is not None or robot.idle),
-            )
-            for other, robot in self._robots.items()
-            if other != name and robot.pose is not None and not self._silent(robot)
-        )
+    def others(self, name: str) -> Sequence[_Robot]:
+        """The other robots that still answer."""
+        return [robot for other, robot in self._robots.items() if other != name and not robot.silent]
 
     def news(self) -> Iterator[Mapping[str, Any]]:
         """For each robot whose path has changed since the last call: its name, its turn (None: nothing is reserved),
@@ -126,7 +151,7 @@ class TrafficTable:
         if len(self._robots) < 2:
             return
         for name, robot in self._robots.items():
-            path = np.empty((0, 2)) if robot.path is None or self._silent(robot) else _thinned(robot.path[:, :2])
+            path = np.empty((0, 2)) if robot.path is None or robot.silent else _thinned(robot.path[:, :2])
             x, y = np.round(path, 2).T.tolist()
             message = {"robot": name, "turn": robot.turn if x else None, "x": x, "y": y}
             if message != (robot.told or {**message, "turn": None, "x": [], "y": []}):
@@ -138,24 +163,8 @@ class TrafficTable:
 
         What a robot sees there is one of them.
         """
-        others = [robot for other, robot in self._robots.items() if other != name and not self._silent(robot)]
+        others = self.others(name)
         return np.vstack([_NOTHING, *(robot.covered_W() for robot in others)]) if others else _NOTHING
-
-    def goes_before(self, one: str, other: str) -> bool:
-        """Whether one has the right of way: it claimed first, and still answers."""
-        turn, against = self._robots[one].turn, self._robots[other].turn
-        if turn is None or self._silent(self._robots[one]):
-            return False
-        return against is None or self._silent(self._robots[other]) or turn < against
-
-    def change_turns(self, one: str, other: str) -> None:
-        """See `Traffic.let_pass`."""
-        a, b = self._robots[one], self._robots[other]
-        if a.turn is not None and b.turn is not None:
-            a.turn, b.turn = b.turn, a.turn
-
-    def _silent(self, robot: _Robot) -> bool:
-        return self._now() - robot.stamp_s > SILENT_S
 
 
 def _thinned(points: FloatArray) -> FloatArray:
@@ -168,26 +177,3 @@ def _thinned(points: FloatArray) -> FloatArray:
     cells = (along_m / _TOLD_EVERY_M).astype(int)
     kept: FloatArray = back[np.concatenate([[True], np.diff(cells) > 0])]
     return kept[::-1]
-
-
-@dataclass(frozen=True)
-class _View:
-    """The table as one robot uses it (`skills.traffic.Traffic`)."""
-
-    table: TrafficTable
-    name: str
-
-    def claim(self) -> None:
-        self.table.claim(self.name)
-
-    def announce(self, path: FloatArray, discs: FloatArray) -> None:
-        self.table.announce(self.name, path, discs)
-
-    def release(self) -> None:
-        self.table.release(self.name)
-
-    def others(self) -> Sequence[Neighbour]:
-        return self.table.others(self.name)
-
-    def let_pass(self, name: str) -> None:
-        self.table.change_turns(self.name, name)

@@ -39,42 +39,42 @@ def test_whoever_claims_first_goes_first() -> None:
     """| claims | goes first |
     | bob, alice | bob |"""
     made = table(Time(), "alice", "bob")
-    made.claim("bob")
-    made.claim("alice")
-    assert made.goes_before("bob", "alice")
-    assert not made.goes_before("alice", "bob")
+    made.view_of("bob").claim()
+    made.view_of("alice").claim()
+    assert made.view_of("bob").goes_before(made.view_of("alice"))
+    assert not made.view_of("alice").goes_before(made.view_of("bob"))
 
 
 def test_a_claim_that_is_held_keeps_its_turn() -> None:
     """Claiming again does not put a robot back."""
     made = table(Time(), "alice", "bob")
-    made.claim("bob")
-    made.claim("alice")
-    made.claim("bob")
-    assert made.goes_before("bob", "alice")
+    made.view_of("bob").claim()
+    made.view_of("alice").claim()
+    made.view_of("bob").claim()
+    assert made.view_of("bob").goes_before(made.view_of("alice"))
 
 
 def test_a_claim_that_is_given_back_is_free_for_the_next() -> None:
     """After release the other goes first, and the way is gone."""
     made = table(Time(), "alice", "bob")
-    made.claim("alice")
-    made.announce("alice", WAY, DISCS)
-    made.claim("bob")
-    made.release("alice")
-    assert made.goes_before("bob", "alice")
-    assert made.others("bob")[0].path is None
+    made.view_of("alice").claim()
+    made.view_of("alice").announce(WAY, DISCS)
+    made.view_of("bob").claim()
+    made.view_of("alice").release()
+    assert made.view_of("bob").goes_before(made.view_of("alice"))
+    assert made.view_of("bob").others()[0].path is None
 
 
 def test_a_robot_that_falls_silent_loses_its_right_and_is_not_heard_of() -> None:
     """Others see it as an obstacle only."""
     time = Time()
     made = table(time, "alice", "bob")
-    made.claim("alice")
-    made.claim("bob")
+    made.view_of("alice").claim()
+    made.view_of("bob").claim()
     time.now_s = SILENT_S + 0.1
     made.heard("bob", Pose2D(0.0, 0.0, 0.0))
-    assert made.goes_before("bob", "alice")
-    assert made.others("bob") == ()
+    assert made.view_of("bob").goes_before(made.view_of("alice"))
+    assert made.view_of("bob").others() == ()
 
 
 def test_a_robot_does_not_see_itself() -> None:
@@ -89,10 +89,10 @@ def test_a_robot_does_not_see_itself() -> None:
 def test_turns_can_be_changed() -> None:
     """One that cannot make way goes first instead."""
     made = table(Time(), "alice", "bob")
-    made.claim("alice")
-    made.claim("bob")
+    made.view_of("alice").claim()
+    made.view_of("bob").claim()
     made.view_of("bob").let_pass("alice")
-    assert made.goes_before("bob", "alice")
+    assert made.view_of("bob").goes_before(made.view_of("alice"))
 
 
 ACTIONS = st.lists(
@@ -107,16 +107,16 @@ def test_the_right_of_way_is_a_strict_order(actions: list[tuple[str, str]]) -> N
     made = table(time, *NAMES)
     for what, name in actions:
         if what == "claim":
-            made.claim(name)
+            made.view_of(name).claim()
         elif what == "release":
-            made.release(name)
+            made.view_of(name).release()
         elif what == "heard":
             made.heard(name, None)
         elif what == "wait":
             time.now_s += 0.8
         else:
-            made.change_turns(name, NAMES[(NAMES.index(name) + 1) % 3])
-        before = {(a, b) for a in NAMES for b in NAMES if a != b and made.goes_before(a, b)}
+            made.view_of(name).let_pass(NAMES[(NAMES.index(name) + 1) % 3])
+        before = {(a, b) for a in NAMES for b in NAMES if a != b and made.view_of(a).goes_before(made.view_of(b))}
         assert all((b, a) not in before for a, b in before)
         a, b, c = NAMES
         assert not {(a, b), (b, c), (c, a)} <= before
@@ -131,13 +131,13 @@ def test_a_reserved_way_is_told_once_and_told_again_when_it_is_given_back() -> N
     | released | no way |"""
     made = table(Time(), "alice", "bob")
     assert list(made.news()) == []
-    made.claim("alice")
-    made.announce("alice", np.column_stack([np.linspace(0.0, 1.0, 101), np.zeros(101), np.zeros(101)]), DISCS)
+    made.view_of("alice").claim()
+    made.view_of("alice").announce(np.column_stack([np.linspace(0.0, 1.0, 101), np.zeros(101), np.zeros(101)]), DISCS)
     (told,) = made.news()
     assert (told["robot"], told["turn"], told["y"]) == ("alice", 1, [0.0] * 5)
     assert np.allclose(told["x"], [0.0, 0.25, 0.5, 0.75, 1.0], atol=0.011)
     assert list(made.news()) == []
-    made.release("alice")
+    made.view_of("alice").release()
     assert list(made.news()) == [{"robot": "alice", "turn": None, "x": [], "y": []}]
 
 
@@ -145,7 +145,7 @@ def test_the_way_of_a_robot_that_does_not_answer_is_told_no_more() -> None:
     """What is silent reserves nothing."""
     time = Time()
     made = table(time, "alice", "bob")
-    made.claim("alice")
+    made.view_of("alice").claim()
     assert len(list(made.news())) == 1
     time.now_s = SILENT_S + 0.1
     assert list(made.news()) == [{"robot": "alice", "turn": None, "x": [], "y": []}]
@@ -158,13 +158,13 @@ def test_who_clears_a_way_is_told_from_who_works() -> None:
     | works | no |
     | claimed first | no |"""
     made = table(Time(), "alice", "bob")
-    made.claim("alice")
-    assert not made.others("alice")[0].yields
+    made.view_of("alice").claim()
+    assert not made.view_of("alice").others()[0].yields
     made.rest("bob", idle=True)
-    assert made.others("alice")[0].yields
+    assert made.view_of("alice").others()[0].yields
     made.rest("bob", idle=False)
-    made.claim("bob")
-    assert made.others("alice")[0].yields and not made.others("bob")[0].yields
+    made.view_of("bob").claim()
+    assert made.view_of("alice").others()[0].yields and not made.view_of("bob").others()[0].yields
 
 
 def test_what_the_others_cover_is_where_they_believe_to_be() -> None:
@@ -181,13 +181,13 @@ def test_a_goal_is_reserved_until_it_is_given_back_or_the_robot_falls_silent() -
     time = Time()
     made = table(time, "alice", "bob")
     for end in ("release", "silence"):
-        made.claim("alice")
-        made.announce("alice", WAY, DISCS)
-        (seen,) = made.others("bob")
+        made.view_of("alice").claim()
+        made.view_of("alice").announce(WAY, DISCS)
+        (seen,) = made.view_of("bob").others()
         assert seen.first and seen.path is not None and seen.path[-1].tolist() == WAY[-1].tolist()
         if end == "release":
-            made.release("alice")
-            assert made.others("bob")[0].path is None
+            made.view_of("alice").release()
+            assert made.view_of("bob").others()[0].path is None
         else:
             time.now_s += SILENT_S + 0.1
-            assert made.others("bob") == ()
+            assert made.view_of("bob").others() == ()

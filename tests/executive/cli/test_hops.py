@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-MOST_TO_THE_FIRST_TICK = 33
-MOST_TO_THE_GRIPPER = 49
+MOST_TO_THE_FIRST_TICK = 28
+MOST_TO_THE_GRIPPER = 44
 
 
 def hops(*words: str) -> int:

@@ -92,7 +92,7 @@ def evaluate(scenario: Path, *, out: Path, jobs: int = 2) -> Sequence[Case]:
     """
     from executive.app.evaluate.cluster import Pool
     from executive.app.evaluate.evaluation import evaluate_runs, refuse_impossible_runs
-    from executive.app.evaluate.scenario import load_evaluation
+    from executive.app.evaluate.evaluation_file import load_evaluation
 
     results, before = out / "results.sqlite", refuse_impossible_runs
     return evaluate_runs(load_evaluation(scenario), Pool(jobs), results, out=out, before=before).cases

@@ -68,7 +68,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "map": _Command("map_command", "map_group", "Maps that the robot makes itself, by exploring or along a route."),
     "world": _Command("world_command", "world", "Worlds made of any map, and how a world looks."),
     "object": _Command("object_command", "object_group", "Objects of your own: any mesh becomes a model for worlds."),
-    "plugins": _Command("plugins", "plugins", "What other distributions add, and what of it is broken."),
+    "plugins": _Command("plugins_command", "plugins", "What other distributions add, and what of it is broken."),
     "warm-up": _Command(
         "robot_command", "warm_up", "Compile the numeric code for this machine, so that runs begin at once."
     ),

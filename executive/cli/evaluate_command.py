@@ -30,8 +30,8 @@ from skills.quantities import Count
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from executive.app.evaluate.case import Evaluation
     from executive.app.evaluate.evaluation import Evaluated
-    from executive.app.evaluate.runs import Evaluation
     from executive.app.evaluate.summary import Case
 
 __all__ = ["evaluate"]
@@ -78,8 +78,8 @@ def evaluate(
     """
     from executive.app.evaluate.cluster import Pool
     from executive.app.evaluate.evaluation import evaluate_runs, refuse_impossible_runs
+    from executive.app.evaluate.evaluation_file import is_evaluation, load_evaluation
     from executive.app.evaluate.random_missions import random_missions as drawn_missions
-    from executive.app.evaluate.scenario import is_evaluation, load_evaluation
     from executive.words.mission import DEFAULT_WORLD
 
     console, out, request = console_for(as_json), request.out, replace(request, out=Request.out)
@@ -144,8 +144,8 @@ def _file_of(results: Path | None) -> Iterator[Path]:
 
 def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> Evaluation:
     """A request at many seeds, its questions answered once. Raises InputError: it cannot be done."""
-    from executive.app.evaluate.runs import seed_range
-    from executive.app.evaluate.scenario import evaluation_at_seeds
+    from executive.app.evaluate.case import seed_range
+    from executive.app.evaluate.evaluation_file import evaluation_at_seeds
     from executive.app.feasibility import refuse_impossible
     from executive.app.prepare import prepare
 
@@ -159,7 +159,7 @@ def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> 
 
 def _show_seeds(cases: Sequence[Case], console: Console, *, as_json: bool) -> None:
     """Show a mission at many seeds: a row for each run, under several conditions a row for each of those."""
-    from executive.app.evaluate.scenario import CONDITION
+    from executive.app.evaluate.evaluation_file import CONDITION
     from executive.app.evaluate.summary import totals_of
 
     conditions: dict[str, list[Case]] = {}
@@ -201,7 +201,7 @@ def _seed_row(case: Case) -> tuple[str, ...]:
 
 def _show(evaluation: Evaluation, found: Evaluated, kept_in: Path, console: Console, *, as_json: bool) -> None:
     """Show a scenario or random missions: success by groups, claims against verdicts, what is to be looked at."""
-    from executive.app.evaluate.scenario import CONDITION
+    from executive.app.evaluate.evaluation_file import CONDITION
     from executive.app.evaluate.summary import groups_of, totals_of
     from executive.cli.report_command import show_cases, standings_json
 

@@ -11,9 +11,9 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from executive.app.evaluate.case import RunSpec
 from executive.app.evaluate.page import EvaluationPage, to_page
 from executive.app.evaluate.results import ResultsFile
-from executive.app.evaluate.runs import RunSpec
 from executive.app.evaluate.summary import (
     GROUP_HEAD,
     STANDING_HEAD,

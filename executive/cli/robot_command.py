@@ -19,10 +19,10 @@ from executive.app.page_view import scene_actions
 from executive.app.robots import only_robot
 from executive.app.simulated import simulate
 from executive.app.worlds import open_world, refuse_blocked
-from executive.cli.keys import keys_pressed
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START
 from executive.cli.output import console_for, refusals
+from executive.cli.run_keys import keys_pressed
 from executive.mission.request import start_in
 from executive.run.worker import LockStepWorker
 from executive.view.actions import Action, RefusedError

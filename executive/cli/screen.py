@@ -20,7 +20,7 @@ from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.runs import Watching
 from executive.app.talk import Talk, load_ahead
-from executive.cli.keys import HELP, Keys, keys_pressed, prompt_lines
+from executive.cli.run_keys import HELP, Keys, keys_pressed, prompt_lines
 from executive.language.parser import load_parser
 from executive.record.profile import Profile
 from executive.record.schemas import SPEECH

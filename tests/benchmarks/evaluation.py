@@ -21,12 +21,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from executive.app.evaluate.case import Evaluation, RunSpec
 from executive.app.evaluate.cluster import local_cluster
 from executive.app.evaluate.evaluation_run import run_one
 from executive.app.evaluate.outcome import Evidence, RunOutcome
 from executive.app.evaluate.page import EvaluationPage, to_page
 from executive.app.evaluate.results import ResultsFile
-from executive.app.evaluate.runs import Evaluation, RunSpec
 from executive.app.evaluate.summary import Case
 from executive.app.report import RefereeReport, RunReport
 from executive.cli.report_command import command_of

@@ -21,7 +21,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from executive.app.evaluate.scenario import load_evaluation
+from executive.app.evaluate.evaluation_file import load_evaluation
 from executive.language.parser import load_parser
 from executive.mission.load import for_robot, load_mission, overridden
 from executive.mission.resolve import mission_from_file

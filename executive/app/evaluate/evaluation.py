@@ -10,11 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
+from executive.app.evaluate.case import Evaluation, RunSpec
 from executive.app.evaluate.cluster import Pool
 from executive.app.evaluate.evaluation_run import lost_outcome, run_one
 from executive.app.evaluate.outcome import RunOutcome
 from executive.app.evaluate.results import ResultsFile
-from executive.app.evaluate.runs import Evaluation, RunSpec
 from executive.app.evaluate.summary import Case
 from executive.app.evaluate.workers import Workers, installed_code
 from executive.app.feasibility import refuse_impossible

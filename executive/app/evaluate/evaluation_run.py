@@ -20,8 +20,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from executive.app.evaluate.case import RunSpec
 from executive.app.evaluate.outcome import Evidence, RunOutcome, Standing
-from executive.app.evaluate.runs import RunSpec
 from executive.app.feasibility import refuse_impossible
 from executive.app.mission_run import return_memory, run_request
 from executive.app.prepare import prepare

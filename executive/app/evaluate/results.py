@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
+from executive.app.evaluate.case import Evaluation, RunSpec
 from executive.app.evaluate.outcome import Evidence, RunOutcome
-from executive.app.evaluate.runs import Evaluation, RunSpec
 from executive.app.report import RunReport
 from executive.store.database import Database, FileKind, form
 from skills.files.errors import InputError

@@ -9,8 +9,8 @@ from typing import Final
 
 from scipy.stats import binomtest, fisher_exact
 
+from executive.app.evaluate.case import RunSpec
 from executive.app.evaluate.outcome import RunOutcome, Standing
-from executive.app.evaluate.runs import RunSpec
 from executive.app.report import RunReport
 
 __all__ = [

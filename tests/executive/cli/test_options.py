@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from executive.app.evaluate.runs import RunSpec
+from executive.app.evaluate.case import RunSpec
 from executive.cli.entry import loaded
 from executive.cli.options import StartCommand, request_arguments, takes_request
 from executive.mission.request import Request

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from executive.app.evaluate.case import Evaluation, RunSpec
 from executive.app.evaluate.outcome import Evidence, RunOutcome
 from executive.app.evaluate.results import ResultsFile
-from executive.app.evaluate.runs import Evaluation, RunSpec
 from executive.app.report import RunReport
 from executive.mission.request import Request
 from skills.files.errors import InputError

@@ -2,9 +2,9 @@
 
 import pytest
 
+from executive.app.evaluate.case import RunSpec
 from executive.app.evaluate.outcome import Evidence, RunOutcome, Standing
 from executive.app.evaluate.page import EvaluationPage, to_page
-from executive.app.evaluate.runs import RunSpec
 from executive.app.evaluate.summary import (
     Case,
     Rate,

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.cli.keys import HELP, SAY_HELP, Keys, Typing, keys_available, keys_pressed, prompt_lines
+from executive.cli.run_keys import HELP, SAY_HELP, Keys, Typing, keys_available, keys_pressed, prompt_lines
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.tree.node import NodeSpec

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.app.evaluate.scenario import is_evaluation, load_evaluation
+from executive.app.evaluate.evaluation_file import is_evaluation, load_evaluation
 from skills.files.errors import InputError
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from executive.app.checker import Checked
-    from executive.app.evaluate.summary import Case
+    from executive.app.evaluate.case import Case
     from executive.app.report import RunReport
     from executive.language.understand import Understanding
     from executive.mission.request import Request
@@ -90,9 +90,9 @@ def evaluate(scenario: Path, *, out: Path, jobs: int = 2) -> Sequence[Case]:
     Raises:
         InputError: the file, or a mission in it, cannot be used, or the folder holds other results.
     """
-    from executive.app.evaluate.cluster import Pool
     from executive.app.evaluate.evaluation import evaluate_runs, refuse_impossible_runs
     from executive.app.evaluate.evaluation_file import load_evaluation
+    from executive.app.evaluate.workers import Pool
 
     results, before = out / "results.sqlite", refuse_impossible_runs
     return evaluate_runs(load_evaluation(scenario), Pool(jobs), results, out=out, before=before).cases

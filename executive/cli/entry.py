@@ -61,7 +61,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
         "evaluate",
         "Run a scenario file, or a mission at many seeds; count claims and what the referee saw.",
     ),
-    "report": _Command("report_command", "report", "Report the results of an evaluation: rates, causes, failures."),
+    "report": _Command("evaluate_command", "report", "Report the results of an evaluation: rates, causes, failures."),
     "teleop": _Command("robot_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "stack": _Command("stack_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
@@ -120,10 +120,10 @@ class _LazyGroup(TyperGroup):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
-        """As typer's. An InputError ends it with one line; a message that repeats an endless word is shown short."""
+        """As typer's. What is refused ends it with one line; a message that repeats an endless word is shown short."""
         try:
             return super().invoke(ctx)
-        except InputError:
+        except (InputError, OSError):
             from executive.cli.output import refusals
 
             with refusals():

@@ -26,6 +26,7 @@ __all__ = [
     "NOT_ACHIEVED",
     "ask_at_terminal",
     "console_for",
+    "finish",
     "plain_lines",
     "print_json",
     "refusals",
@@ -58,6 +59,14 @@ def print_json(value: Mapping[str, Any] | Sequence[Any]) -> None:
     """One JSON object or array on one line of standard output."""
     sys.stdout.write(json.dumps(value, ensure_ascii=False, allow_nan=False) + "\n")
     sys.stdout.flush()
+
+
+def finish(values: Mapping[str, Any] | Sequence[Any] | None, as_json: bool, *, good: bool = True) -> None:
+    """Ends a command: prints its result where a script asks for it, and exits with NOT_ACHIEVED unless it is good."""
+    if as_json and values is not None:
+        print_json(values)
+    if not good:
+        raise typer.Exit(NOT_ACHIEVED)
 
 
 def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> None:

@@ -21,15 +21,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from executive.app.evaluate.case import Evaluation, RunSpec
-from executive.app.evaluate.cluster import local_cluster
-from executive.app.evaluate.evaluation_run import run_one
-from executive.app.evaluate.outcome import Evidence, RunOutcome
-from executive.app.evaluate.page import EvaluationPage, to_page
+from executive.app.evaluate.case import Case, Evaluation, Evidence, RunSpec
+from executive.app.evaluate.evaluation import run_one
 from executive.app.evaluate.results import ResultsFile
-from executive.app.evaluate.summary import Case
+from executive.app.evaluate.summary import to_page
+from executive.app.evaluate.workers import local_cluster
 from executive.app.report import RefereeReport, RunReport
-from executive.cli.report_command import command_of
+from executive.cli.evaluate_command import command_of
 from executive.mission.request import Request
 
 SHORT = "Hey Alice, go to the living room"
@@ -39,7 +37,7 @@ def runs_of(count: int) -> tuple[RunSpec, ...]:
     return tuple(RunSpec(Request(SHORT, seed=seed), SHORT, {"light": str(seed % 3)}) for seed in range(count))
 
 
-def made_outcome(run: RunSpec) -> RunOutcome:
+def made_case(run: RunSpec) -> Case:
     """A made result; every tenth has failed and has a timeline and a picture."""
     rng = random.Random(run.request.seed)
     failed = run.request.seed % 10 == 0
@@ -51,7 +49,7 @@ def made_outcome(run: RunSpec) -> RunOutcome:
     jpeg = cv2.imencode(".jpg", cv2.GaussianBlur(picture, (9, 9), 0), [cv2.IMWRITE_JPEG_QUALITY, 60])[1].tobytes()
     lines = tuple((float(t), "alice/go", "RUNNING: on the way") for t in range(40))
     evidence = Evidence(lines, (("hand camera", jpeg),)) if failed else Evidence()
-    return RunOutcome(run.id, report, {"navigate": 40.0, "detect": rng.uniform(1, 9)}, evidence, 1.0, "here:1")
+    return Case(run, report, {"navigate": 40.0, "detect": rng.uniform(1, 9)}, evidence, 1.0, "here:1")
 
 
 def report(count: int) -> None:
@@ -60,22 +58,20 @@ def report(count: int) -> None:
         with ResultsFile(path, create=True) as kept:
             kept.begin(Evaluation("made.yaml", runs), code="1")
             for run in runs:
-                kept.add(made_outcome(run))
+                kept.add(made_case(run))
         began = time.perf_counter()
         with ResultsFile(path) as kept:
-            known = kept.runs()
-            cases = [Case(known[number], outcome) for number, outcome in kept.outcomes()]
-            page = EvaluationPage("made", (), cases, kept.evidence, lambda case: command_of(case.run), cases, "itself")
+            made = kept.evaluated()
             html = Path(folder) / "report.html"
-            html.write_text(to_page(page))
-        failed = sum(not case.report.achieved for case in cases)
+            html.write_text(to_page(made, kept.evidence, command_of, against=made.cases, other="itself"))
+        failed = sum(not case.report.achieved for case in made.cases)
         print(f"{count} results ({failed} failures): {time.perf_counter() - began:.2f} s, {html.stat().st_size} bytes")
 
 
-def cheap(run: RunSpec) -> RunOutcome:
+def cheap(run: RunSpec) -> Case:
     """A run that takes 0.05 s and tells in which process."""
     time.sleep(0.05)
-    return replace(made_outcome(run), worker=str(os.getpid()))
+    return replace(made_case(run), worker=str(os.getpid()))
 
 
 def kill(count: int) -> None:
@@ -103,12 +99,12 @@ def cluster(count: int) -> None:
         with local_cluster(number) as workers:
             list(workers.give_out(run_one, runs_of(2 * number)))
             began = time.perf_counter()
-            outcomes = [one.result for one in workers.give_out(run_one, runs_of(count)) if one.result is not None]
+            cases = [one.result for one in workers.give_out(run_one, runs_of(count)) if one.result is not None]
             walls[number] = time.perf_counter() - began
-            digests[number] = {outcome.run_id: outcome.digest for outcome in outcomes}
-            spent = sum(outcome.spent_s for outcome in outcomes)
+            digests[number] = {case.run.id: case.digest for case in cases}
+            spent = sum(case.spent_s for case in cases)
             overhead = number * walls[number] / spent - 1.0
-            print(f"{number} workers: {walls[number]:.1f} s for {len(outcomes)} runs, dispatch {overhead:.2%}")
+            print(f"{number} workers: {walls[number]:.1f} s for {len(cases)} runs, dispatch {overhead:.2%}")
     print(f"2 against 1: {walls[1] / walls[2]:.2f} x; equal results: {digests[1] == digests[2]}")
 
 

@@ -1,7 +1,8 @@
-"""One run of an evaluation as plain data, the same on every machine, with an id that is the hash of its content."""
+"""One run of an evaluation as plain data, the same on every machine, and what came of it."""
 
 from __future__ import annotations
 
+import enum
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -10,12 +11,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
+from executive.app.report import RunReport
 from executive.mission.request import Request
-from skills.files.errors import InputError
 
-__all__ = ["Evaluation", "RunSpec", "first_seeds", "seed_range"]
+__all__ = ["Case", "Evaluation", "Evidence", "RunSpec", "Standing"]
 
+FALSE_CLAIM: Final = "FALSE CLAIM"
 _ID_LETTERS: Final = 16
+_OF_THE_MACHINE: Final = ("wall_time_s", "real_time_factor", "log")
+_COUNTERS_OF_THE_MACHINE: Final = ("bytes_logged",)
 
 
 @dataclass(frozen=True)
@@ -43,11 +47,6 @@ class RunSpec:
         return hashlib.sha256(text.encode()).hexdigest()[:_ID_LETTERS]
 
     @property
-    def robot_words(self) -> str:
-        """The robots as `errand run --robots` takes them."""
-        return ",".join(map(str, self.request.robots))
-
-    @property
     def variation_words(self) -> str:
         """The variation on one line."""
         return ", ".join(f"{name} {value}" for name, value in self.varied.items())
@@ -66,41 +65,90 @@ class Evaluation:
         return hashlib.sha256("".join(run.id for run in self.runs).encode()).hexdigest()[:_ID_LETTERS]
 
 
-def seed_range(text: str) -> tuple[int, ...]:
-    """Seeds from "1-20", "3" or "1,4,7-9".
+class Standing(enum.Enum):
+    """The claim of a run against the referee's verdict in words, and as the head of a column; the gravest first."""
 
-    Raises:
-        InputError: anything else.
+    FULFILLED = "claimed and fulfilled", "fulfilled"
+    FALSE_CLAIM = "claimed, not fulfilled: FALSE CLAIM", "false claims"
+    NOT_JUDGED = "claimed, not judged", "not judged"
+    FAILED = "failed and said so", "failed"
+    FULFILLED_YET_FAILED = "failed, though fulfilled", "failed, yet fulfilled"
+    REFUSED = "refused", "refused"
+    BROKEN = "broken by an error", "broken"
+
+    def __init__(self, words: str, column: str) -> None:
+        self.words, self.column = words, column
+
+
+_CLAIMED: Final = {True: Standing.FULFILLED, False: Standing.FALSE_CLAIM, None: Standing.NOT_JUDGED}
+_NO_CLAIM: Final = {"refused": Standing.REFUSED, "error": Standing.BROKEN}
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Evidence of a failure: the timeline as (s, about, text), pictures as caption and JPEG file, other files."""
+
+    timeline: tuple[tuple[float, str, str], ...] = ()
+    pictures: tuple[tuple[str, bytes], ...] = ()
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A run, its report, and what a page shows of it.
+
+    `steps_s` tells how long each skill ran, on the robot's clock. `spent_s` is the wall's time from the beginning of
+    the work on it to its end, `worker` where it ran.
     """
-    try:
-        seeds = tuple(seed for part in text.split(",") for seed in _span(part))
-    except ValueError as error:
-        raise InputError(f"'{text}' is no range of seeds", hint="write it like 1-20 or 1,4,7") from error
-    if not seeds:
-        raise InputError(f"'{text}' holds no seed", hint="write it like 1-20")
-    return seeds
 
+    run: RunSpec
+    report: RunReport
+    steps_s: Mapping[str, float] = field(default_factory=dict)
+    evidence: Evidence = Evidence()
+    spent_s: float = 0.0
+    worker: str = ""
 
-def first_seeds(text: str, count: int) -> tuple[int, ...]:
-    """The first `count` seeds from text whose last range may have no end: "8001-" or "3,8001-".
+    @cached_property
+    def standing(self) -> Standing:
+        """The claim against the verdict."""
+        if self.report.claimed:
+            return _CLAIMED[self.report.seen.success]
+        if self.report.outcome in _NO_CLAIM:
+            return _NO_CLAIM[self.report.outcome]
+        return Standing.FULFILLED_YET_FAILED if self.report.seen.holds else Standing.FAILED
 
-    Raises:
-        InputError: it is no range of seeds, or holds fewer.
-    """
-    before, _, last = text.rpartition(",")
-    begun, dash, end = last.partition("-")
-    if dash and not end.strip():
-        listed = seed_range(before) if before else ()
-        seeds = (*listed, *range(first := seed_range(begun)[0], first + count))
-    else:
-        seeds = seed_range(text)
-    if len(seeds) < count:
-        raise InputError(
-            f"'{text}' holds {len(seeds)} seeds, fewer than {count}", hint="leave its end open, as in 8001-"
-        )
-    return seeds[:count]
+    @property
+    def cause(self) -> str:
+        """Why it is no success; empty where it is one."""
+        if self.report.achieved:
+            return ""
+        return FALSE_CLAIM if self.report.false_claim else self.report.cause or "ERROR"
 
+    @property
+    def failure_cause(self) -> str:
+        """The cause that a run which failed gives; empty for all others."""
+        failed = self.standing in (Standing.FAILED, Standing.FULFILLED_YET_FAILED)
+        return self.report.cause or "" if failed else ""
 
-def _span(part: str) -> range:
-    first, dash, last = part.partition("-")
-    return range(int(first), int(last if dash else first) + 1)
+    @property
+    def label(self) -> str:
+        """The claim against the verdict, with the cause of a failure."""
+        return self.standing.words + (f" ({self.failure_cause})" if self.failure_cause else "")
+
+    @property
+    def why(self) -> str:
+        """The sentence that goes with the cause, or says why it was not judged."""
+        return self.report.seen.why if self.report.claimed else self.report.message
+
+    @property
+    def asked(self) -> str:
+        """The sentence, else the name of the mission."""
+        return self.run.request.sentence or self.run.mission
+
+    @property
+    def digest(self) -> str:
+        """Equal for equal results, wherever and however fast they came: wall times and paths are left out."""
+        report = {name: value for name, value in self.report.to_json().items() if name not in _OF_THE_MACHINE}
+        report["work"] = {name: count for name, count in report["work"].items() if name not in _COUNTERS_OF_THE_MACHINE}
+        text = json.dumps([report, dict(self.steps_s)], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:_ID_LETTERS]

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from executive.app.evaluate.case import Evaluation, RunSpec, seed_range
+from executive.app.evaluate.case import Evaluation, RunSpec
 from executive.app.mission_files import mission_file
 from executive.mission.request import Request
 from executive.mission.scenario import NO_SCENARIO, RandomFaults, Scenario
@@ -40,8 +40,10 @@ __all__ = [
     "MissionEntry",
     "VariationsFile",
     "evaluation_at_seeds",
+    "first_seeds",
     "is_evaluation",
     "load_evaluation",
+    "seed_range",
 ]
 
 MOST_RUNS: Final = 200_000
@@ -108,6 +110,46 @@ def _conditions(asked: Request, *, each_fault: bool) -> Sequence[tuple[str, Requ
     if not alone:
         raise InputError("there is no fault to try alone", hint="give some by --fault, --random-faults or --scenario")
     return [("no fault", plain), *alone]
+
+
+def seed_range(text: str) -> tuple[int, ...]:
+    """Seeds from "1-20", "3" or "1,4,7-9".
+
+    Raises:
+        InputError: anything else.
+    """
+    try:
+        seeds = tuple(seed for part in text.split(",") for seed in _span(part))
+    except ValueError as error:
+        raise InputError(f"'{text}' is no range of seeds", hint="write it like 1-20 or 1,4,7") from error
+    if not seeds:
+        raise InputError(f"'{text}' holds no seed", hint="write it like 1-20")
+    return seeds
+
+
+def first_seeds(text: str, count: int) -> tuple[int, ...]:
+    """The first `count` seeds from text whose last range may have no end: "8001-" or "3,8001-".
+
+    Raises:
+        InputError: it is no range of seeds, or holds fewer.
+    """
+    before, _, last = text.rpartition(",")
+    begun, dash, end = last.partition("-")
+    if dash and not end.strip():
+        listed = seed_range(before) if before else ()
+        seeds = (*listed, *range(first := seed_range(begun)[0], first + count))
+    else:
+        seeds = seed_range(text)
+    if len(seeds) < count:
+        raise InputError(
+            f"'{text}' holds {len(seeds)} seeds, fewer than {count}", hint="leave its end open, as in 8001-"
+        )
+    return seeds[:count]
+
+
+def _span(part: str) -> range:
+    first, dash, last = part.partition("-")
+    return range(int(first), int(last if dash else first) + 1)
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,16 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Final
 
-from executive.app.evaluate.case import Evaluation, RunSpec
-from executive.app.evaluate.outcome import Evidence, RunOutcome
+from executive.app.evaluate.case import Case, Evaluation, Evidence, RunSpec
 from executive.app.report import RunReport
 from executive.store.database import Database, FileKind, form
 from skills.files.errors import InputError
 
-__all__ = ["ResultsFile"]
+__all__ = ["Evaluated", "ResultsFile"]
 
 RESULTS_FILE: Final = FileKind(
     name="results file",
@@ -48,6 +48,19 @@ CREATE TABLE picture (
 );
 """,
 )
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """The runs that have a result, and what is known about all of them."""
+
+    cases: Sequence[Case]
+    about: Mapping[str, str]
+
+    def log_folder(self, case: Case) -> Path | None:
+        """The folder with the log of a run; None where there is none, or the evaluation ran on another machine."""
+        folder = Path(self.about["logs"]) / case.run.id if "logs" in self.about else None
+        return folder if folder is not None and folder.is_dir() else None
 
 
 class ResultsFile(Database):
@@ -92,25 +105,20 @@ class ResultsFile(Database):
         """The ids of the runs that have a result."""
         return frozenset(run_id for (run_id,) in self.rows("SELECT id FROM result"))
 
-    def add(self, outcome: RunOutcome) -> bool:
+    def add(self, case: Case) -> bool:
         """Keep a result, whole or not at all; False where the run had one already, which stays.
 
         Raises InputError: it cannot be written.
         """
-        run_id, evidence = outcome.run_id, outcome.evidence
+        run_id, evidence = case.run.id, case.evidence
         with self.writing() as connection:
-            row = (
-                run_id,
-                outcome.report.outcome,
-                outcome.report.achieved,
-                outcome.digest,
-                json.dumps(outcome.report.to_json()),
-                json.dumps(outcome.steps_s),
-                outcome.spent_s,
-                outcome.worker,
-            )
+            report, steps = json.dumps(case.report.to_json()), json.dumps(case.steps_s)
+            row = (run_id, case.report.outcome, case.report.achieved, case.digest, report, steps)
             columns = "id, outcome, achieved, digest, report, steps, spent_s, worker"
-            new = connection.execute(f"INSERT OR IGNORE INTO result ({columns}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)", row)
+            new = connection.execute(
+                f"INSERT OR IGNORE INTO result ({columns}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+                (*row, case.spent_s, case.worker),
+            )
             if new.rowcount != 1:
                 return False
             if evidence.timeline:
@@ -120,26 +128,21 @@ class ResultsFile(Database):
             connection.executemany("INSERT INTO picture VALUES (?, ?, ?, ?)", pictures)
         return True
 
-    def runs(self) -> Sequence[RunSpec]:
-        """All runs, in order. Raises InputError: it is damaged."""
+    def evaluated(self) -> Evaluated:
+        """The runs that have a result, in order, without evidence. Raises InputError: it is damaged."""
         files = {row["path"]: row["text"] for row in self.rows("SELECT path, text FROM file")}
-        return [_spec(text, files) for (text,) in self.rows("SELECT spec FROM run ORDER BY number")]
-
-    def outcomes(self) -> Sequence[tuple[int, RunOutcome]]:
-        """The number of each run that has a result, and the result, in the order of the runs, without evidence."""
-        query = (
-            "SELECT run.number, result.id, report, steps, spent_s, worker FROM result JOIN run USING (id) "
-            "ORDER BY number"
-        )
-        return [
-            (
-                number,
-                RunOutcome(
-                    run_id, RunReport.from_json(json.loads(report)), json.loads(steps), Evidence(), spent_s, worker
-                ),
+        query = "SELECT spec, report, steps, spent_s, worker FROM result JOIN run USING (id) ORDER BY number"
+        cases = [
+            Case(
+                _spec(spec, files),
+                RunReport.from_json(json.loads(report)),
+                json.loads(steps),
+                spent_s=spent_s,
+                worker=worker,
             )
-            for number, run_id, report, steps, spent_s, worker in self.rows(query)
+            for spec, report, steps, spent_s, worker in self.rows(query)
         ]
+        return Evaluated(cases, self.about())
 
     def evidence(self, run_id: str) -> Evidence:
         """The timeline and the pictures of a run."""
@@ -147,10 +150,6 @@ class ResultsFile(Database):
         entries = json.loads(zlib.decompress(packed[0][0])) if packed else []
         pictures = self.rows("SELECT caption, jpeg FROM picture WHERE id = ? ORDER BY number", run_id)
         return Evidence(tuple((float(t_s), about, text) for t_s, about, text in entries), tuple(map(tuple, pictures)))
-
-    def digests(self) -> Mapping[str, str]:
-        """For each run with a result, what is equal where results are."""
-        return {row["id"]: row["digest"] for row in self.rows("SELECT id, digest FROM result")}
 
 
 def _spec_text(run: RunSpec) -> str:

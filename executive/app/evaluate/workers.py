@@ -1,23 +1,32 @@
-"""Gives out the work of an evaluation: one function for many items, to processes that may die."""
+"""Gives out work, one function for many items, to processes of this machine or a Dask cluster; each may die.
+
+A Dask cluster needs the extra `cluster`.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import logging
 import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any, Final, Generic, Protocol, TypeVar
 
-__all__ = ["MOST_DEATHS", "Finished", "LocalWorkers", "Workers", "installed_code"]
+from skills.files.errors import InputError
+
+__all__ = ["Finished", "LocalWorkers", "Pool", "Workers", "installed_code", "local_cluster", "scheduler_at"]
 
 MOST_DEATHS: Final = 3
 """Work with which so many workers have died is given up."""
@@ -25,6 +34,13 @@ _ROOT: Final = Path(__file__).resolve().parents[3]
 _PACKAGES: Final = ("executive", "skills", "plant", "missions")
 _LIBRARIES: Final = ("drake", "numpy", "numba", "onnxruntime", "ompl", "opencv-python-headless", "scipy")
 _LETTERS: Final = 12
+ANSWER_S: Final = 10.0
+"""Longest wait for a scheduler, and for its first worker."""
+GONE_S: Final = 120.0
+"""Longest wait for a result while no worker is connected: a nanny, or a person, may start another."""
+_LOOK_S: Final = 5.0
+_GO_ON: Final = "what was done is kept; the same command goes on where it stopped"
+_START_ONE: Final = f"start workers again; {_GO_ON}"
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -129,6 +145,197 @@ def _end_with_starter() -> None:
         os._exit(1)
 
     threading.Thread(target=outlive, name="end-with-starter", daemon=True).start()
+
+
+class _OtherVersionError(Exception):
+    """A worker has another Errand than the process that gives out the work."""
+
+
+class ClusterWorkers:
+    """The workers of a connected Dask client."""
+
+    def __init__(self, client: Any) -> None:
+        """Raises InputError: there is no worker, or one is of another version, or works on several things at once."""
+        self._client = client
+        self._check()
+
+    @property
+    def count(self) -> int:
+        """The number of workers that are connected now."""
+        return len(self._client.scheduler_info(n_workers=-1)["workers"])
+
+    def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:
+        """As `Workers` says.
+
+        Raises:
+            InputError: the scheduler or all workers are gone, or a worker of another version has come.
+        """
+        from distributed.scheduler import KilledWorker
+
+        work = partial(_checked, installed_code(), function)
+        futures = self._client.map(work, items, pure=False, retries=0)
+        item_of = {future.key: item for future, item in zip(futures, items, strict=True)}
+        try:
+            with _told_of_loss():
+                for future in self._as_completed(futures):
+                    item = item_of[future.key]
+                    if future.status == "cancelled":
+                        raise InputError("the scheduler has stopped answering", hint=_GO_ON)
+                    if future.status == "error":
+                        error = future.exception()
+                        if not isinstance(error, KilledWorker):
+                            raise error
+                        yield Finished(item, None, f"{MOST_DEATHS} worker processes have died with it")
+                    else:
+                        yield Finished(item, future.result())
+                    future.release()
+        finally:
+            if self._client.status == "running":
+                self._client.cancel(futures, force=True)
+
+    def _as_completed(self, futures: Sequence[Any]) -> Iterator[Any]:
+        """Each future as it ends. Raises InputError: for `GONE_S` no worker is connected."""
+        ended: SimpleQueue[Any] = SimpleQueue()
+        for future in futures:
+            future.add_done_callback(ended.put)
+        left, seen_s = len(futures), time.monotonic()
+        while left:
+            try:
+                yield ended.get(timeout=min(_LOOK_S, GONE_S))
+                left, seen_s = left - 1, time.monotonic()
+            except Empty as error:
+                if self.count:
+                    seen_s = time.monotonic()
+                elif time.monotonic() - seen_s >= GONE_S:
+                    raise InputError(f"no worker has been connected for {GONE_S:g} s", hint=_START_ONE) from error
+
+    def _check(self) -> None:
+        """Refuse what would give other results. Raises InputError."""
+        with _told_of_loss():
+            try:
+                self._client.wait_for_workers(1, timeout=ANSWER_S)
+            except TimeoutError as error:
+                address = self._client.scheduler.address
+                hint = f"start one: dask worker {address} --nthreads 1"
+                raise InputError(f"the scheduler at {address} has no workers", hint=hint) from error
+            found = self._client.scheduler_info(n_workers=-1)["workers"]
+            for address, facts in found.items():
+                if facts["nthreads"] != 1:
+                    what = f"the worker at {address} has {facts['nthreads']} threads, and a mission needs a process"
+                    raise InputError(what, hint="start it with --nthreads 1; --nworkers says how many processes")
+            codes = self._client.run(_code_here, on_error="return")
+        for address, code in codes.items():
+            _refuse_other(address, code)
+
+
+def _refuse_other(address: str, code: Any) -> None:
+    """Raises InputError: a worker has no Errand, or another."""
+    own = installed_code()
+    if isinstance(code, ModuleNotFoundError):
+        raise InputError(f"the worker at {address} has no Errand ({code})", hint=f"install {own} there")
+    if code != own:
+        what = f"the worker at {address} has another version of Errand ({code}; here it is {own})"
+        raise InputError(what, hint="install the same version and start the worker again")
+
+
+def _code_here() -> str:
+    return installed_code()
+
+
+def _checked(expected: str, function: Callable[[Item], Result], item: Item) -> Result:
+    """Work on an item where the code is the same."""
+    if installed_code() != expected:
+        raise _OtherVersionError(f"a worker has another version of Errand ({installed_code()}; here it is {expected})")
+    return function(item)
+
+
+@contextmanager
+def _told_of_loss() -> Iterator[None]:
+    """A scheduler that is gone becomes an InputError."""
+    try:
+        yield
+    except _OtherVersionError as error:
+        raise InputError(str(error), hint=f"install the same version there; {_GO_ON}") from error
+    except OSError as error:
+        raise InputError(f"the scheduler has stopped answering ({error})", hint=_GO_ON) from error
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError as error:
+        hint = "pip install 'spot-errand[cluster]', or run it without --workers and --scheduler"
+        raise InputError("the extra `cluster` is not installed", hint=hint) from error
+    for name in ("distributed.client", "distributed.nanny", "distributed.scheduler", "distributed.batched"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    return distributed
+
+
+@contextmanager
+def local_cluster(count: int) -> Iterator[ClusterWorkers]:
+    """Starts `count` worker processes on this machine, each with a nanny that replaces it when it dies.
+
+    Raises InputError: the extra is not installed.
+    """
+    distributed = _distributed()
+    with (
+        distributed.LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield ClusterWorkers(client)
+
+
+@contextmanager
+def scheduler_at(address: str) -> Iterator[ClusterWorkers]:
+    """The workers of a scheduler.
+
+    Raises InputError: the extra is not installed, the address is none, or nothing answers there.
+    """
+    distributed = _distributed()
+    try:
+        client = distributed.Client(address, timeout=ANSWER_S)
+    except (OSError, TimeoutError, ValueError, TypeError) as error:
+        hint = "start one with `dask scheduler`, and give the address that it prints, like tcp://HOST:8786"
+        raise InputError(f"no scheduler answers at {address}", hint=hint) from error
+    with client:
+        yield ClusterWorkers(client)
+
+
+@dataclass(frozen=True)
+class Pool:
+    """The workers to use: `jobs` local processes, a local cluster of `workers`, or the workers of a `scheduler`.
+
+    Raises:
+        InputError: both of a cluster and a scheduler are given.
+    """
+
+    jobs: int = 2
+    workers: int | None = None
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.workers is not None and self.scheduler is not None:
+            hint = "a scheduler has the workers that were started for it"
+            raise InputError("--workers and --scheduler do not go together", hint=hint)
+
+    @contextmanager
+    def opened(self) -> Iterator[Workers]:
+        """The workers, for as long as the context is open. Raises InputError: they cannot be had."""
+        if self.scheduler is not None:
+            with scheduler_at(self.scheduler) as workers:
+                yield workers
+        elif self.workers is not None:
+            with local_cluster(self.workers) as workers:
+                yield workers
+        else:
+            yield LocalWorkers(self.jobs)
 
 
 @cache

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import yaml
 
-from executive.app.evaluate.case import seed_range
+from executive.app.evaluate.evaluation_file import seed_range
 
 VERDICTS = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
 

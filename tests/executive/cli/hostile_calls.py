@@ -63,7 +63,7 @@ WORK: Final = (
     "executive.app.simulated.simulate",
     "executive.cli.robot_command.simulate",
     "executive.app.simulated.simulate",
-    "executive.app.evaluate.cluster.Pool.opened",
+    "executive.app.evaluate.workers.Pool.opened",
     "errand_train.dataset.shards.render",
     "plant.worlds.builder.own.world_from_grid",
     "plant.worlds.builder.own.world_from_cylinders",

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from executive.app.evaluate import cluster, evaluation_run
+from executive.app.evaluate import evaluation
 from executive.app.evaluate.workers import Finished as Done
+from executive.app.evaluate.workers import Pool
 from executive.app.mission_run import Finished
 from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry
@@ -55,8 +56,8 @@ def plant(monkeypatch):
     def opened(_):
         yield Here()
 
-    monkeypatch.setattr(evaluation_run, "run_request", stand_in)
-    monkeypatch.setattr(cluster.Pool, "opened", opened)
+    monkeypatch.setattr(evaluation, "run_request", stand_in)
+    monkeypatch.setattr(Pool, "opened", opened)
     return stand_in
 
 

@@ -6,9 +6,10 @@ from contextlib import contextmanager
 import pytest
 from typer.testing import CliRunner
 
-from executive.app.evaluate import cluster, evaluation_run
+from executive.app.evaluate import evaluation
 from executive.app.evaluate.random_missions import random_missions
 from executive.app.evaluate.workers import Finished as Done
+from executive.app.evaluate.workers import Pool
 from executive.app.mission_run import Finished
 from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry
@@ -47,8 +48,8 @@ def ran(monkeypatch):
     def opened(_):
         yield Here()
 
-    monkeypatch.setattr(evaluation_run, "run_request", run_request)
-    monkeypatch.setattr(cluster.Pool, "opened", opened)
+    monkeypatch.setattr(evaluation, "run_request", run_request)
+    monkeypatch.setattr(Pool, "opened", opened)
     return seen
 
 
@@ -80,7 +81,7 @@ def test_what_cannot_be_done_counts_as_refused_with_its_words(ran, tmp_path, mon
     def refuse(prepared):
         raise InputError("there is no way into the hall")
 
-    monkeypatch.setattr(evaluation_run, "refuse_impossible", refuse)
+    monkeypatch.setattr(evaluation, "refuse_impossible", refuse)
     _, values = evaluate("--out", str(tmp_path / "checked"))
     assert values["standings"]["refused"]["runs"] == 6
     assert {each["why"] for each in values["to_look_at"]} == {"there is no way into the hall"}

@@ -18,8 +18,7 @@ from errand_train.commands.refine import refine_command
 from errand_train.commands.score import score_command
 from errand_train.commands.train import train_command
 from errand_train.dataset.errors import DatasetError
-from executive.app.evaluate.cluster import Pool
-from executive.app.evaluate.workers import Workers
+from executive.app.evaluate.workers import Pool, Workers
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json, refusals, show_table
 from skills.files.errors import InputError

@@ -4,8 +4,8 @@ import logging
 
 import pytest
 
-from executive.app.evaluate import cluster
-from executive.app.evaluate.cluster import scheduler_at
+from executive.app.evaluate import workers as module
+from executive.app.evaluate.workers import scheduler_at
 from skills.files.errors import InputError
 from tests.executive.app.evaluate import cheap_run
 
@@ -50,7 +50,7 @@ def test_a_worker_that_is_killed_loses_nothing_and_doubles_nothing(tmp_path):
 
 
 def test_workers_of_another_version_are_refused_before_anything_runs(address, monkeypatch):
-    monkeypatch.setattr(cluster, "_code_here", lambda: "9.9.9 of tomorrow")
+    monkeypatch.setattr(module, "_code_here", lambda: "9.9.9 of tomorrow")
     with (
         pytest.raises(InputError, match=r"has another version of Errand \(9\.9\.9 of tomorrow; here it is "),
         scheduler_at(address),
@@ -73,7 +73,7 @@ def test_a_worker_with_two_threads_is_refused():
 
 
 def test_a_scheduler_without_workers_is_told(monkeypatch):
-    monkeypatch.setattr(cluster, "ANSWER_S", 0.3)
+    monkeypatch.setattr(module, "ANSWER_S", 0.3)
     with (
         distributed.LocalCluster(n_workers=0, processes=False, protocol="tcp", **QUIET) as started,
         pytest.raises(InputError, match=r"has no workers; start one: dask worker tcp://"),
@@ -84,13 +84,13 @@ def test_a_scheduler_without_workers_is_told(monkeypatch):
 
 @pytest.mark.parametrize("named", ["tcp://127.0.0.1:9", "here"])
 def test_a_scheduler_that_does_not_answer_is_told(named, monkeypatch):
-    monkeypatch.setattr(cluster, "ANSWER_S", 0.3)
+    monkeypatch.setattr(module, "ANSWER_S", 0.3)
     with pytest.raises(InputError, match=f"no scheduler answers at {named}"), scheduler_at(named):
         pass
 
 
 def test_workers_that_are_all_gone_are_told_and_what_has_landed_is_kept(options, monkeypatch):
-    monkeypatch.setattr(cluster, "GONE_S", 0.5)
+    monkeypatch.setattr(module, "GONE_S", 0.5)
     started = distributed.LocalCluster(n_workers=1, **options)
     landed = []
     with (

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.app.evaluate.case import Evaluation, RunSpec
-from executive.app.evaluate.outcome import Evidence, RunOutcome
+from executive.app.evaluate.case import Case, Evaluation, Evidence, RunSpec
 from executive.app.evaluate.results import ResultsFile
 from executive.app.report import RunReport
 from executive.mission.request import Request
@@ -15,20 +14,20 @@ RUNS = tuple(RunSpec(Request("go", seed=seed), "go") for seed in range(3))
 EVALUATION = Evaluation("scenario.yaml", RUNS)
 
 
-def outcome(run, result="success"):
+def case(run, result="success"):
     report = RunReport(result, None, "", None, (), "flat", run.request.seed, 1.0, 1.0, 1.0, 20, "")
-    return RunOutcome(run.id, report, {"navigate": 1.0}, Evidence(((0.5, "go", "went"),), (("map", b"jpeg"),)))
+    return Case(run, report, {"navigate": 1.0}, Evidence(((0.5, "go", "went"),), (("map", b"jpeg"),)))
 
 
 def test_results_are_kept_once_and_read_back(tmp_path):
     with ResultsFile(tmp_path / "r.sqlite", create=True) as kept:
         kept.begin(EVALUATION, code="1")
-        assert (kept.add(outcome(RUNS[1])), kept.add(outcome(RUNS[1], "failure"))) == (True, False)
+        assert (kept.add(case(RUNS[1])), kept.add(case(RUNS[1], "failure"))) == (True, False)
     with ResultsFile(tmp_path / "r.sqlite") as kept:
         kept.begin(EVALUATION, code="1")
-        ((number, found),) = kept.outcomes()
-        assert (number, found.run_id, found.report.achieved, kept.done()) == (1, RUNS[1].id, True, {RUNS[1].id})
-        assert (tuple(kept.runs()), kept.evidence(RUNS[1].id)) == (RUNS, outcome(RUNS[1]).evidence)
+        (found,) = kept.evaluated().cases
+        assert (found.run, found.report.achieved, kept.done()) == (RUNS[1], True, {RUNS[1].id})
+        assert kept.evidence(RUNS[1].id) == case(RUNS[1]).evidence
 
 
 def test_results_of_another_scenario_or_version_are_refused(tmp_path):
@@ -55,6 +54,6 @@ def test_what_is_no_results_file_is_refused(tmp_path):
 
 
 def test_wall_times_do_not_change_the_digest():
-    slow = outcome(RUNS[0])
+    slow = case(RUNS[0])
     fast = replace(slow, report=replace(slow.report, wall_time_s=3.0, log="elsewhere"), spent_s=9.0, worker="b")
-    assert (slow.digest == fast.digest, slow.digest == outcome(RUNS[0], "failure").digest) == (True, False)
+    assert (slow.digest == fast.digest, slow.digest == case(RUNS[0], "failure").digest) == (True, False)

@@ -2,19 +2,17 @@
 
 import pytest
 
-from executive.app.evaluate.case import RunSpec
-from executive.app.evaluate.outcome import Evidence, RunOutcome, Standing
-from executive.app.evaluate.page import EvaluationPage, to_page
+from executive.app.evaluate.case import Case, Evidence, RunSpec, Standing
+from executive.app.evaluate.results import Evaluated
 from executive.app.evaluate.summary import (
-    Case,
     Rate,
+    compared,
     fisher,
-    group_rows,
     groups_of,
     mcnemar,
     standing_rows,
-    standing_texts,
     to_look_at,
+    to_page,
 )
 from executive.app.report import RefereeReport, RunReport
 from executive.mission.request import Request
@@ -24,7 +22,7 @@ def case(seed, outcome, success=None, *, cause=None, holds=None, kind="fetch", w
     referee = RefereeReport(success, "the hammer is on the floor", 0, 0, holds=holds)
     report = RunReport(outcome, cause, "no path", referee, (), world, seed, 9.0, 1.0, 9.0, 90, "")
     run = RunSpec(Request(f"fetch me the hammer {seed}", world=world, seed=seed), kind)
-    return Case(run, RunOutcome(run.id, report))
+    return Case(run, report)
 
 
 CASES = (
@@ -54,7 +52,7 @@ CASES = (
     ],
 )
 def test_a_run_stands_where_its_claim_meets_its_verdict(number, standing):
-    assert CASES[number].outcome.standing is standing
+    assert CASES[number].standing is standing
 
 
 def test_claims_are_counted_against_verdicts_with_intervals_and_causes():
@@ -68,9 +66,9 @@ def test_claims_are_counted_against_verdicts_with_intervals_and_causes():
         Standing.REFUSED: 1,
         Standing.BROKEN: 1,
     }
-    assert rows[Standing.FAILED].causes == [("PLANNING", 2)]
+    assert rows[Standing.FAILED].causes == {"PLANNING": 2}
     # 2 of 9: Wilson's interval by hand
-    assert next(iter(standing_texts(CASES))) == ("claimed and fulfilled", "2", "22.2%", "6.3% to 54.7%", "")
+    assert rows[Standing.FULFILLED].rate.interval_text == "6.3% to 54.7%"
 
 
 def test_what_is_to_be_looked_at_begins_with_false_claims():
@@ -82,16 +80,19 @@ def test_a_false_claim_is_explained_by_the_referee_and_a_failure_by_the_robot():
 
 
 def test_runs_are_grouped_by_kind_and_by_world_with_the_counts_of_each_standing():
-    rows = {row[0]: row for row in group_rows(groups_of(CASES))}
-    assert rows["mission: go"][1:3] == ("1", "1 (100.0%)")
-    assert rows["world: flat"][4:] == ("1", "1", "1", "2", "1", "1", "1")
+    groups = {group.label: group for group in groups_of(CASES)}
+    assert groups["mission: go"].rate == (1, 1)
+    assert [groups["world: flat"].standings[standing] for standing in Standing] == [1, 1, 1, 2, 1, 1, 1]
 
 
-def test_the_page_lists_each_run_to_look_at_with_its_sentence_and_the_commands():
-    commands = ("errand run --say x", "errand log logs/3/log.mcap")
-    page = to_page(EvaluationPage("random", (), CASES, lambda _: Evidence(), lambda _: commands))
+def test_the_page_lists_each_run_to_look_at_with_its_sentence_and_the_commands(tmp_path):
+    log = tmp_path / CASES[2].run.id
+    log.mkdir()
+    found = Evaluated(CASES, {"scenario": "random.yaml", "code": "1", "logs": str(tmp_path)})
+    page = to_page(found, lambda _: Evidence(), lambda _: "errand run --say x")
     assert "claimed, not fulfilled: FALSE CLAIM</b> fetch me the hammer 3, flat, seed 3" in page
-    assert page.count("errand run --say x\nerrand log logs/3/log.mcap\n") == 7
+    assert page.count("errand run --say x\n") == 7
+    assert page.count(f"errand run --say x\nerrand log {log}/log.mcap\n") == 1
     assert "fetch me the hammer 1," not in page
 
 
@@ -110,3 +111,16 @@ def test_mcnemar_counts_only_pairs_that_differ():
 
 def test_fisher_of_the_lady_tasting_tea():
     assert fisher(Rate(3, 4), Rate(1, 4)) == pytest.approx(0.4857, abs=1e-4)
+
+
+def test_two_results_are_compared_by_the_runs_that_both_have():
+    other = tuple(case(number, "failure", cause="TIMEOUT", kind=kind) for number, kind in ((1, "fetch"), (5, "fetch")))
+    both = next(iter(compared(CASES, other)))
+    assert (both.paired, both.here, both.there, both.only_here, both.only_there) == (True, (1, 2), (0, 2), 1, 0)
+
+
+def test_results_without_a_run_in_common_are_compared_as_a_whole():
+    other = (case(91, "success", True), case(92, "success", True))
+    found = {each.name: each for each in compared(CASES, other)}
+    assert (found["all runs"].paired, found["all runs"].here, found["all runs"].there) == (False, (3, 9), (2, 2))
+    assert set(found) == {"all runs", "fetch", "flat"}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.app.evaluate.case import first_seeds, seed_range
+from executive.app.evaluate.evaluation_file import first_seeds, seed_range
 from skills.files.errors import InputError
 
 

@@ -15,7 +15,7 @@ from rich.console import Console
 
 from executive.app.pictures import detector_of, drawn, read_picture, write_picture
 from executive.cli.number_options import quantity_option
-from executive.cli.output import BAD_INPUT, console_for, print_json, refusals, show_table
+from executive.cli.output import BAD_INPUT, console_for, print_json, show_table
 from skills.detection import Detection, Detector
 from skills.files.errors import InputError
 from skills.perception.detector.onnx_detector import DetectorOptions
@@ -56,10 +56,9 @@ def detect(
 
     A picture that cannot be read does not keep the others from being looked at; the exit status is 2 then.
     """
-    with refusals():
-        detector = detector_of(model, DetectorOptions(threshold=threshold))
-        names = _drawing_names(images, draw) if draw is not None else {}
-        looked = [one for group in _groups(images) for one in _look(detector, group, names)]
+    detector = detector_of(model, DetectorOptions(threshold=threshold))
+    names = _drawing_names(images, draw) if draw is not None else {}
+    looked = [one for group in _groups(images) for one in _look(detector, group, names)]
     for one in looked:
         if one.error is not None:
             typer.echo(f"errand: {one.error}", err=True)

@@ -123,11 +123,10 @@ class _LazyGroup(TyperGroup):
         """As typer's. What is refused ends it with one line; a message that repeats an endless word is shown short."""
         try:
             return super().invoke(ctx)
-        except (InputError, OSError):
-            from executive.cli.output import refusals
+        except (InputError, OSError) as error:
+            from executive.cli.output import refuse
 
-            with refusals():
-                raise
+            refuse(error)
         except typer.BadParameter as error:
             line = one_line(error.message)
             error.message = line if len(line) <= MOST_LETTERS else f"{line[:MOST_LETTERS]}..."

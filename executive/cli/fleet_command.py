@@ -10,7 +10,7 @@ import typer
 
 from executive.app.report import VERDICTS
 from executive.cli.options import AS_JSON, QUIET, VIEW, VIEW_FOR, VIEW_PORT, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, refusals, show_table
+from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, show_table
 from executive.mission.request import Request
 from executive.store.given import GivenMissions
 from executive.store.missions import STORE as STORE_NAME
@@ -53,7 +53,7 @@ def run(
     """
     console = console_for(as_json)
     store, tell = _store(queue), plain_lines(console)
-    with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
+    with MissionStore(store, create=False) as missions, missions.claimed():
         from executive.app.dispatch import silence
         from executive.app.fleet import missions_json
         from executive.app.fleet_run import run_fleet, simulated_fleet
@@ -94,7 +94,7 @@ def run(
 @fleet.command()
 def status(queue: Queue, as_json: AS_JSON = False) -> None:
     """Show which robot has which mission, also while they run."""
-    with refusals(), MissionStore(_store(queue), create=False) as missions:
+    with MissionStore(_store(queue), create=False) as missions:
         from executive.app.fleet import missions_json
 
         results = missions_json(missions, [each.id for each in missions.missions() if each.queued])

@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.text import Text
 
 from executive.cli.number_options import quantity_option
-from executive.cli.output import console_for, refusals, show_table, terminal_answerer, write_text
+from executive.cli.output import console_for, show_table, terminal_answerer, write_text
 from executive.record.history import History, read_history
 from executive.record.schemas import ERRORS
 from executive.record.timeline import Entry, timeline
@@ -50,21 +50,20 @@ def log(
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
 ) -> None:
     """Print what happened in a run: what each node did and why, detections, the outcome, tracebacks of defects."""
-    with refusals():
-        history = read_history(file)
-        history = history if robot is None else history.of_robot(robot)
-        if ros2 is not None:
-            from executive.record.ros2 import write_ros2
+    history = read_history(file)
+    history = history if robot is None else history.of_robot(robot)
+    if ros2 is not None:
+        from executive.record.ros2 import write_ros2
 
-            typer.echo(f"{write_ros2(history.events, ros2)} messages in {ros2}", err=True)
-            return
-        if map_file is not None:
-            _draw(history, map_file, at)
-            return
-        if as_json:
-            sys.stdout.write(json.dumps(list(history.transitions()), ensure_ascii=False) + "\n")
-            return
-        _show(history, console_for(as_json=False), every_node=every_node)
+        typer.echo(f"{write_ros2(history.events, ros2)} messages in {ros2}", err=True)
+        return
+    if map_file is not None:
+        _draw(history, map_file, at)
+        return
+    if as_json:
+        sys.stdout.write(json.dumps(list(history.transitions()), ensure_ascii=False) + "\n")
+        return
+    _show(history, console_for(as_json=False), every_node=every_node)
 
 
 def _draw(history: History, file: Path, at_s: float) -> None:
@@ -118,17 +117,16 @@ def replay(
     view_for: Annotated[float | None, quantity_option(Wait, help="End after so many seconds.")] = None,
 ) -> None:
     """Show what happened in a run, at any time of it: tree, map, pictures, events, 3D recording."""
-    with refusals():
-        history = read_history(file)
-        history.trees()
-        beside = file.parent / RECORDING
-        recording = beside if scene and beside.is_file() else None
-        if html is not None:
-            from executive.view.html import log_page
+    history = read_history(file)
+    history.trees()
+    beside = file.parent / RECORDING
+    recording = beside if scene and beside.is_file() else None
+    if html is not None:
+        from executive.view.html import log_page
 
-            write_text(html, log_page(history.events, recording))
-            return
-        _serve(history, recording, port, view_for)
+        write_text(html, log_page(history.events, recording))
+        return
+    _serve(history, recording, port, view_for)
 
 
 def _serve(history: History, recording: Path | None, port: int, view_for_s: float | None) -> None:
@@ -182,15 +180,14 @@ def tree(
     ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,
 ) -> None:
     """Show the tree of a sentence or a mission file before it runs, or of a log as it last was."""
-    with refusals():
-        whole = _view(file, say, world, at, robot)
-        shown = whole if depth is None else fold_below(whole, depth)
-        few = most or _MOST.get(form)
-        text = _FORMS[form](shown if few is None else fold_to(shown, few), ascii_only)
-        if output is None:
-            sys.stdout.write(text)
-        else:
-            write_text(output, text)
+    whole = _view(file, say, world, at, robot)
+    shown = whole if depth is None else fold_below(whole, depth)
+    few = most or _MOST.get(form)
+    text = _FORMS[form](shown if few is None else fold_to(shown, few), ascii_only)
+    if output is None:
+        sys.stdout.write(text)
+    else:
+        write_text(output, text)
 
 
 def _view(text: str | None, say: str | None, world: str | None, at_s: float | None, robot: str | None) -> NodeView:

@@ -16,7 +16,7 @@ from rich.text import Text
 from executive.app.signals import interrupted_by_hang_up
 from executive.app.worlds import knowledge_of, open_world
 from executive.cli.options import takes_request
-from executive.cli.output import BAD_INPUT, console_for, refusals
+from executive.cli.output import BAD_INPUT, console_for
 from executive.language.parser import load_parser
 from executive.language.understand import Part, Status, Understanding
 from executive.mission.request import Request
@@ -51,26 +51,25 @@ def listen(
     jsonl: Annotated[bool, typer.Option("--jsonl", help="One JSON object for each file.")] = False,
 ) -> None:
     """Recognise what is said in wav files or at the microphone, and show the commands that it means."""
-    with refusals():
-        if mic == bool(files):
-            raise InputError("errand listen takes wav files or --mic", hint="try: errand listen request.wav")
-        knowledge = knowledge_of(open_world(request.world or DEFAULT_WORLD))
-        several = called_robots(request.robots, knowledge) if robot is None else ()
-        if (robot is not None and request.robots) or (open_words and several):
-            what = "--robots stands without --robot and --open"
-            raise InputError(what, hint="what is said to several robots is understood in a world")
-        listener = listener_for(
-            knowledge,
-            open_words=open_words,
-            require_wake=not no_wake,
-            vocabulary=vocabulary,
-            robot_name=robot,
-            robots=several,
-        )
-        if mic:
-            _follow_microphone(listener)
-            return
-        answers = [_answer(listener, file, jsonl=jsonl) for file in files or ()]
+    if mic == bool(files):
+        raise InputError("errand listen takes wav files or --mic", hint="try: errand listen request.wav")
+    knowledge = knowledge_of(open_world(request.world or DEFAULT_WORLD))
+    several = called_robots(request.robots, knowledge) if robot is None else ()
+    if (robot is not None and request.robots) or (open_words and several):
+        what = "--robots stands without --robot and --open"
+        raise InputError(what, hint="what is said to several robots is understood in a world")
+    listener = listener_for(
+        knowledge,
+        open_words=open_words,
+        require_wake=not no_wake,
+        vocabulary=vocabulary,
+        robot_name=robot,
+        robots=several,
+    )
+    if mic:
+        _follow_microphone(listener)
+        return
+    answers = [_answer(listener, file, jsonl=jsonl) for file in files or ()]
     if any(answer is None or not (jsonl or answer.status is Status.OK) for answer in answers):
         raise typer.Exit(BAD_INPUT)
 

@@ -17,7 +17,7 @@ import typer
 from executive.app.signals import cancelled_by_signals
 from executive.app.worlds import open_world
 from executive.cli.number_options import quantity_option
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json
 from executive.run.control import Control
 from skills.files.errors import InputError
 from skills.files.outside import read_text
@@ -72,17 +72,16 @@ def build(
 ) -> None:
     """Explore a world, or follow a route, and save both grids and the pose graph."""
     console = console_for(as_json)
-    with refusals():
-        opened = open_world(world) if people else open_world(world).without_people()
-        points = None if route is None else _route_points(route)
-        mapper = _mapper(opened, out)
-        from executive.app.simulated import compile_first
+    opened = open_world(world) if people else open_world(world).without_people()
+    points = None if route is None else _route_points(route)
+    mapper = _mapper(opened, out)
+    from executive.app.simulated import compile_first
 
-        compile_first()
-        building = _Building(opened, seed, mapper, points, out, console)
-        with cancelled_by_signals(Control(pace=None)) as control:
-            ended = building.drive(most_s, lambda: control.poll().cancel is not None)
-        result = building.result()
+    compile_first()
+    building = _Building(opened, seed, mapper, points, out, console)
+    with cancelled_by_signals(Control(pace=None)) as control:
+        ended = building.drive(most_s, lambda: control.poll().cancel is not None)
+    result = building.result()
     if ended is not None:
         console.print(f"errand: the map is not complete: {ended}", markup=False)
     console.print(f"{result['map']}: {result['distance_m']} m driven, {result['loop_closures']} loops", markup=False)

@@ -9,7 +9,7 @@ from typing import Annotated, Final
 import typer
 
 from executive.app.mission_files import FOLDER, shipped_missions
-from executive.cli.output import console_for, refusals, show_table
+from executive.cli.output import console_for, show_table
 from skills.files.errors import InputError
 
 __all__ = ["init", "missions", "new_skill"]
@@ -27,14 +27,13 @@ def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to put them.", show_default=False)],
 ) -> None:
     """Copy the missions that come with Errand into a folder, to be changed; files that are there stay."""
-    with refusals():
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            new = [file for file in sorted(FOLDER.glob("*.[yj]*")) if not (folder / file.name).exists()]
-            for file in new:
-                shutil.copyfile(file, folder / file.name)
-        except OSError as error:
-            raise InputError(f"cannot write it ({error.strerror})", hint="name another folder", file=folder) from error
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        new = [file for file in sorted(FOLDER.glob("*.[yj]*")) if not (folder / file.name).exists()]
+        for file in new:
+            shutil.copyfile(file, folder / file.name)
+    except OSError as error:
+        raise InputError(f"cannot write it ({error.strerror})", hint="name another folder", file=folder) from error
     first = folder / next(iter(shipped_missions().values())).name
     console_for(as_json=False).print(f"{len(new)} files in {folder}; try: errand run {first}", markup=False)
 
@@ -53,8 +52,7 @@ def new_skill(
     from executive.cli.new_skill.render import render_skill
     from executive.tree.registry import installed_skills
 
-    with refusals():
-        written = render_skill(name, folder, taken=frozenset(installed_skills().names))
+    written = render_skill(name, folder, taken=frozenset(installed_skills().names))
     for path in written:
         typer.echo(str(path))
     typer.echo(f"\nNext:\n  pip install --no-build-isolation --editable {folder}\n  pytest {folder}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from executive.cli.number_options import quantity_option
-from executive.cli.output import print_json, refusals
+from executive.cli.output import print_json
 from plant.models.imported import ImportedObject, read_imported
 from skills.files.errors import InputError, count_text
 from skills.perception.class_forms import class_forms
@@ -53,9 +53,8 @@ def import_command(
     """Make a model of a mesh: visual geometry, convex collision parts, and inertia from its volume and mass."""
     from plant.models.builder.importing import Wanted
 
-    with refusals():
-        wanted = Wanted(name, mass, class_name, scale, up, close_holes)
-        made = _imported(mesh, wanted, out)
+    wanted = Wanted(name, mass, class_name, scale, up, close_holes)
+    made = _imported(mesh, wanted, out)
     if (doubt := _unlike_its_class(made)) is not None:
         typer.echo(f"errand: warning: {doubt}", err=True)
     if as_json:
@@ -71,10 +70,9 @@ def show(
     as_json: AsJson = False,
 ) -> None:
     """Tell what an imported model holds: extents, mass, inertia, collision parts."""
-    with refusals():
-        found = read_imported(folder)
-        if picture is not None:
-            _draw(folder, found, picture)
+    found = read_imported(folder)
+    if picture is not None:
+        _draw(folder, found, picture)
     if as_json:
         print_json(_facts(found, folder))
         return

@@ -18,7 +18,6 @@ import typer
 from typer.core import TyperCommand
 
 from executive.cli.number_options import quantity_option
-from executive.cli.output import refusals
 from executive.mission.request import Request, start_in
 from executive.words.option import Option
 from skills.quantities import Port, Wait, quantity_of
@@ -189,8 +188,7 @@ def takes_request(
 
         @functools.wraps(function)
         def command(**given: Any) -> None:
-            with refusals():
-                request = _request([(each, given.pop(each.name)) for each in fields])
+            request = _request([(each, given.pop(each.name)) for each in fields])
             function(request, **given)
 
         command.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]

@@ -5,10 +5,9 @@ from __future__ import annotations
 import errno
 import json
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import typer
 
@@ -29,7 +28,7 @@ __all__ = [
     "finish",
     "plain_lines",
     "print_json",
-    "refusals",
+    "refuse",
     "show_table",
     "terminal_answerer",
     "write_text",
@@ -87,24 +86,21 @@ def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[
         console.print(line.rstrip(), markup=False)
 
 
-@contextmanager
-def refusals() -> Iterator[None]:
-    """Bad input becomes one line on standard error for each error, and exit status 2; so does a file that cannot be
-    used, such as one whose name is too long."""
-    try:
-        yield
-    except InputError as error:
-        for each in (error, *error.others):
-            typer.echo(f"errand: {each}", err=True)
-        raise typer.Exit(BAD_INPUT) from error
-    except OSError as error:
-        if error.errno not in _OF_NAMES or error.filename is None:
-            raise
-        refused = InputError(
-            f"cannot use it ({error.strerror})", hint="name another", file=str(error.filename)[:_SHOWN]
-        )
-        typer.echo(f"errand: {refused}", err=True)
-        raise typer.Exit(BAD_INPUT) from error
+def refuse(error: InputError | OSError) -> NoReturn:
+    """Ends a command for bad input, or a file that cannot be used, such as one whose name is too long.
+
+    Writes one line on standard error for each error; the exit status is 2. Raises the error where it is neither.
+    """
+    if isinstance(error, InputError):
+        refused = error
+    elif error.errno not in _OF_NAMES or error.filename is None:
+        raise error
+    else:
+        what = f"cannot use it ({error.strerror})"
+        refused = InputError(what, hint="name another", file=str(error.filename)[:_SHOWN])
+    for each in (refused, *refused.others):
+        typer.echo(f"errand: {each}", err=True)
+    raise typer.Exit(BAD_INPUT) from error
 
 
 def write_text(file: Path, text: str) -> None:

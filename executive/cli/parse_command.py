@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from executive.app.worlds import knowledge_of, open_world
-from executive.cli.output import BAD_INPUT, print_json, refusals, write_text
+from executive.cli.output import BAD_INPUT, print_json, write_text
 from executive.language.explain import arcs_svg, explain, explanation_lines
 from executive.language.parser import load_parser
 from executive.language.understand import Status, Understanding, understand
@@ -37,30 +37,29 @@ def parse(
     ] = None,
 ) -> None:
     """Show the commands that a sentence means."""
-    with refusals():
-        if (sentence is None) == (file is None):
-            raise InputError("errand parse takes one sentence or --file", hint='try: errand parse "go to the kitchen"')
-        if svg is not None and sentence is None:
-            raise InputError("--svg draws one sentence", hint='try: errand parse "go to the kitchen" --svg arcs.svg')
-        knowledge = None if open_words else knowledge_of(open_world(world or DEFAULT_WORLD))
-        parser = load_parser()
-        lines = [sentence] if sentence is not None else _lines_of(file)
-        wake = knowledge is not None and knowledge.robot.require_wake
-        told = (understand(line, parser=parser, knowledge=knowledge, require_wake=wake) for line in lines)
-        if jsonl:
-            for meaning in told:
-                print(json.dumps(_values(meaning, explained), ensure_ascii=False), flush=True)
-            return
-        meanings = list(told)
-        if svg is not None:
-            _draw(meanings[0], svg)
-        for meaning in meanings:
-            _show(meaning, as_json, explained)
-        if as_json:
-            values = [_values(meaning, explained) for meaning in meanings]
-            print_json(values[0] if file is None else {"sentences": values})
-        if any(meaning.status is not Status.OK for meaning in meanings):
-            raise typer.Exit(BAD_INPUT)
+    if (sentence is None) == (file is None):
+        raise InputError("errand parse takes one sentence or --file", hint='try: errand parse "go to the kitchen"')
+    if svg is not None and sentence is None:
+        raise InputError("--svg draws one sentence", hint='try: errand parse "go to the kitchen" --svg arcs.svg')
+    knowledge = None if open_words else knowledge_of(open_world(world or DEFAULT_WORLD))
+    parser = load_parser()
+    lines = [sentence] if sentence is not None else _lines_of(file)
+    wake = knowledge is not None and knowledge.robot.require_wake
+    told = (understand(line, parser=parser, knowledge=knowledge, require_wake=wake) for line in lines)
+    if jsonl:
+        for meaning in told:
+            print(json.dumps(_values(meaning, explained), ensure_ascii=False), flush=True)
+        return
+    meanings = list(told)
+    if svg is not None:
+        _draw(meanings[0], svg)
+    for meaning in meanings:
+        _show(meaning, as_json, explained)
+    if as_json:
+        values = [_values(meaning, explained) for meaning in meanings]
+        print_json(values[0] if file is None else {"sentences": values})
+    if any(meaning.status is not Status.OK for meaning in meanings):
+        raise typer.Exit(BAD_INPUT)
 
 
 def _values(meaning: Understanding, explained: bool) -> dict[str, object]:

@@ -15,7 +15,7 @@ import typer
 from executive.cli import plugin_commands
 from executive.cli.entry import COMMANDS, as_command
 from executive.cli.number_options import quantity_option
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, show_table
 from executive.store import trigger_source
 from executive.tree import registry
 from plant import kinds
@@ -49,8 +49,7 @@ def plugins(
 ) -> None:
     """List what other distributions add, each loaded in a process of its own, and why some cannot be used."""
     if load is not None:
-        with refusals():
-            _load(load, limit)
+        _load(load, limit)
         return
     entries = _of_others()
     with ThreadPoolExecutor(_WORKERS) as pool:

@@ -14,7 +14,7 @@ from executive.app.prepare import prepare
 from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON, QUIET, STORE, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table, terminal_answerer
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, show_table, terminal_answerer
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
@@ -75,23 +75,22 @@ def add(
     as_json: AS_JSON = False,
 ) -> None:
     """Queue a sentence or a mission file, checked; with a trigger, `errand queue serve` queues it each time."""
-    with refusals():
-        trigger = _trigger(at, every, on, missed)
-        refuse_unaddressed(request)
-        load_stack(request.stack)
-        prepared = prepare(request, ask=terminal_answerer())
-        if not anyway:
-            from executive.app.feasibility import refuse_impossible
+    trigger = _trigger(at, every, on, missed)
+    refuse_unaddressed(request)
+    load_stack(request.stack)
+    prepared = prepare(request, ask=terminal_answerer())
+    if not anyway:
+        from executive.app.feasibility import refuse_impossible
 
-            refuse_impossible(prepared)
-        out, request = request.out, prepared.request.from_anywhere()
-        with MissionStore(store or out / STORE_NAME) as missions:
-            if trigger is None:
-                mission, standing = missions.add(request, queued=True), {}
-            else:
-                added = StandingMissions(missions).add(request, trigger, missed or Missed.SKIP)
-                mission, standing = missions.mission(added.id), {added.id: added}
-        wake_server(store or out / STORE_NAME)
+        refuse_impossible(prepared)
+    out, request = request.out, prepared.request.from_anywhere()
+    with MissionStore(store or out / STORE_NAME) as missions:
+        if trigger is None:
+            mission, standing = missions.add(request, queued=True), {}
+        else:
+            added = StandingMissions(missions).add(request, trigger, missed or Missed.SKIP)
+            mission, standing = missions.mission(added.id), {added.id: added}
+    wake_server(store or out / STORE_NAME)
     said = "is queued" if trigger is None else f"stands, to be queued by `errand queue serve` ({trigger})"
     console_for(as_json).print(f"Mission {mission.id} {said}: {request.name}", markup=False)
     if as_json:
@@ -101,7 +100,7 @@ def add(
 @queue.command(name="list")
 def show(out: Out = Path("out"), store: STORE = None, as_json: AS_JSON = False) -> None:
     """Show all missions of the store and how far each is."""
-    with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions:
+    with MissionStore(store or out / STORE_NAME, create=False) as missions:
         known = missions.missions()
         standing = {each.id: each for each in StandingMissions(missions).missions()}
     header = ("mission", "state", "name", "world", "seed", "commands", "message", "trigger")
@@ -113,7 +112,7 @@ def show(out: Out = Path("out"), store: STORE = None, as_json: AS_JSON = False) 
 @queue.command()
 def remove(number: Number, out: Out = Path("out"), store: STORE = None) -> None:
     """Forget a mission; one that stands can be removed while a server runs."""
-    with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions:
+    with MissionStore(store or out / STORE_NAME, create=False) as missions:
         stands = missions.mission(number).state is MissionState.STANDING
         with nullcontext() if stands else missions.claimed():
             missions.remove(number)
@@ -133,7 +132,7 @@ def run(
     from executive.cli.screen import ConsoleScreen
 
     console = console_for(as_json)
-    with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
+    with MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
         runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
         ended = run_in_turn(queued_missions(missions), runs)
         resumable = resumable_line(missions)
@@ -234,7 +233,7 @@ def serve(
     def tell(line: str) -> None:
         console.print(line, markup=False)
 
-    with refusals(), MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
+    with MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
         end = None if limit is None else missions.now() + limit
         address = CallAddress(host, port, token)
         with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
@@ -264,7 +263,7 @@ def resume(
 ) -> None:
     """Go on with the mission that was broken off or cancelled, from its last finished step; then with its queue."""
     console = console_for(as_json)
-    with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
+    with MissionStore(store, create=False) as missions, missions.claimed():
         from executive.app.runs import MissionRuns, queued_missions, run_in_turn
         from executive.cli.screen import ConsoleScreen
 

@@ -21,7 +21,7 @@ from executive.app.simulated import simulate
 from executive.app.worlds import open_world, refuse_blocked
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START
-from executive.cli.output import console_for, refusals
+from executive.cli.output import console_for
 from executive.cli.run_keys import keys_pressed
 from executive.mission.request import start_in
 from executive.run.worker import LockStepWorker
@@ -60,7 +60,7 @@ def teleop(
     ] = None,
 ) -> None:
     """Drive a robot's body and arm by hand. It stops when keys stop coming, and keeps the skills' limits."""
-    with refusals(), ExitStack() as stack:
+    with ExitStack() as stack:
         if not _NAME.fullmatch(robot):
             raise InputError(f"'{robot[:60]}' is no name for a robot", hint="use letters and digits, as in Alice")
         opened = open_world(world)
@@ -183,6 +183,5 @@ def _told(hands: Teleop) -> dict[str, Any]:
 def warm_up() -> None:
     """Compile the numeric code for this machine, so that the first run begins at once."""
     begun_s = time.monotonic()
-    with refusals():
-        compile_kernels()
+    compile_kernels()
     typer.echo(f"{count_text(newly_compiled(), 'function')} compiled in {time.monotonic() - begun_s:.0f} s")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from executive.cli.options import ANYWAY, AS_JSON, QUIET, STORE, VIEW, VIEW_FOR, VIEW_PORT, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, refusals, terminal_answerer
+from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, terminal_answerer
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.request import Request
 
@@ -35,8 +35,7 @@ def run(
     view_port: VIEW_PORT = 0,
 ) -> None:
     """Run a sentence or a mission file in the simulated world."""
-    with refusals():
-        refuse_unaddressed(request)
+    refuse_unaddressed(request)
     from executive.app.feasibility import refuse_impossible
     from executive.app.page_view import PageView, queueing
     from executive.app.prepare import prepare
@@ -56,7 +55,7 @@ def run(
             prepared, plain_lines(console), port=view_port, later=queueing(prepared, store=kept_in, out=request.out)
         )
 
-    with refusals(), voice_for(aloud) as voice:
+    with voice_for(aloud) as voice:
         if listen_to is not None:
             request = replace(request, sentence=hear_request(listen_to, request, console=console))
         prepared = prepare(request, ask=terminal_answerer())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import typer
 
 from executive.cli.options import takes_request
-from executive.cli.output import refusals
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
 from skills.files.yaml_scalars import yaml_of
@@ -28,6 +27,5 @@ def _group() -> None:
 @takes_request("stack")
 def show(request: Request) -> None:
     """Print a stack with all its options as YAML, which --stack takes again."""
-    with refusals():
-        chosen = load_stack(request.stack)
+    chosen = load_stack(request.stack)
     typer.echo(yaml_of(plain(chosen), flow_style=False), nl=False)

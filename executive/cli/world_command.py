@@ -16,7 +16,6 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from executive.app.worlds import knowledge_of, open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, StartCommand, start_pose
-from executive.cli.output import refusals
 from plant.worlds.world import WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.files.errors import InputError, count_text
@@ -60,15 +59,14 @@ def from_map(
     from plant.worlds.builder.maps import FREE, OCCUPIED, UNKNOWN, Grid
     from plant.worlds.builder.own import world_from_grid
 
-    with refusals():
-        read = load_grid_map(map_file)
-        for note in read.notes:
-            typer.echo(f"errand: warning: {map_file}: {note}", err=True)
-        unknown = np.zeros_like(read.occupied) if read.unknown is None else read.unknown
-        cells = np.where(read.occupied, OCCUPIED, np.where(unknown, UNKNOWN, FREE)).astype(np.uint8)
-        grid, pose = Grid(cells, read.origin_m, read.resolution_m), start_pose(start)
-        _made(map_file, out, lambda folder: world_from_grid(folder, grid, start=pose, wall_height_m=wall_height))
-        _told(out)
+    read = load_grid_map(map_file)
+    for note in read.notes:
+        typer.echo(f"errand: warning: {map_file}: {note}", err=True)
+    unknown = np.zeros_like(read.occupied) if read.unknown is None else read.unknown
+    cells = np.where(read.occupied, OCCUPIED, np.where(unknown, UNKNOWN, FREE)).astype(np.uint8)
+    grid, pose = Grid(cells, read.origin_m, read.resolution_m), start_pose(start)
+    _made(map_file, out, lambda folder: world_from_grid(folder, grid, start=pose, wall_height_m=wall_height))
+    _told(out)
 
 
 @world.command(cls=StartCommand)
@@ -80,13 +78,12 @@ def from_cylinders(
     """Make a world of upright cylinders: a JSON object with `cylinders` [[x, y, radius, height], ...] and `start`."""
     from plant.worlds.builder.own import world_from_cylinders
 
-    with refusals():
-        read = _cylinders(file)
-        pose = start_pose(start) or (None if read.start is None else Pose2D(*read.start))
-        around = [] if pose is None else [(pose.x_m, pose.y_m)]
-        around += [] if read.goal is None else [read.goal]
-        _made(file, out, lambda folder: world_from_cylinders(folder, read.cylinders, start=pose, around=around))
-        _told(out)
+    read = _cylinders(file)
+    pose = start_pose(start) or (None if read.start is None else Pose2D(*read.start))
+    around = [] if pose is None else [(pose.x_m, pose.y_m)]
+    around += [] if read.goal is None else [read.goal]
+    _made(file, out, lambda folder: world_from_cylinders(folder, read.cylinders, start=pose, around=around))
+    _told(out)
 
 
 @world.command()
@@ -98,22 +95,21 @@ def show(
     from plant.pictures import save_png
     from plant.worlds.drawing import draw_world
 
-    with refusals():
-        drawn = open_world(folder)
-        facts = knowledge_of(drawn)
-        grid = load_grid_map(drawn.surveyed.keepout_map_path)
-        picture = draw_world(
-            drawn,
-            _grey(grid),
-            grid.origin_m,
-            grid.resolution_m,
-            labels={name: (place.pose.x, place.pose.y) for name, place in facts.places.items()},
-            doors=[(door.at, door.width) for door in facts.doors],
-        )
-        try:
-            save_png(out, picture)
-        except OSError as error:
-            raise InputError(f"the picture cannot be written ({error.strerror})", file=out) from error
+    drawn = open_world(folder)
+    facts = knowledge_of(drawn)
+    grid = load_grid_map(drawn.surveyed.keepout_map_path)
+    picture = draw_world(
+        drawn,
+        _grey(grid),
+        grid.origin_m,
+        grid.resolution_m,
+        labels={name: (place.pose.x, place.pose.y) for name, place in facts.places.items()},
+        doors=[(door.at, door.width) for door in facts.doors],
+    )
+    try:
+        save_png(out, picture)
+    except OSError as error:
+        raise InputError(f"the picture cannot be written ({error.strerror})", file=out) from error
     counts = ((facts.places, "room"), (facts.doors, "door"), (facts.surfaces, "surface"))
     typer.echo(f"{out}: {', '.join(count_text(len(each), noun) for each, noun in counts)}")
 

@@ -5,7 +5,7 @@ import typer
 from typer.testing import CliRunner
 
 from executive.cli import entry
-from executive.cli.output import refusals
+from executive.cli.output import refuse
 
 
 @pytest.mark.parametrize("option", ["--out", "--store", "--stack", "--world", ""])
@@ -18,12 +18,14 @@ def test_a_name_of_endless_length_is_refused_in_one_line(option):
 
 
 def test_what_is_no_fault_of_a_name_is_not_hidden():
-    with pytest.raises(OSError, match="wire"), refusals():
-        raise OSError("the wire is cut")
+    with pytest.raises(OSError, match="wire"):
+        refuse(OSError("the wire is cut"))
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path, capsys):
     (tmp_path / "file").write_text("")
-    with pytest.raises(typer.Exit), refusals():
+    with pytest.raises(NotADirectoryError) as found:
         (tmp_path / "file" / "below").mkdir()
+    with pytest.raises(typer.Exit):
+        refuse(found.value)
     assert "file/below: cannot use it (Not a directory); name another" in capsys.readouterr().err

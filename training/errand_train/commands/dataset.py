@@ -20,7 +20,7 @@ from errand_train.commands.train import train_command
 from errand_train.dataset.errors import DatasetError
 from executive.app.evaluate.workers import Pool, Workers
 from executive.cli.number_options import quantity_option
-from executive.cli.output import console_for, print_json, refusals, show_table
+from executive.cli.output import console_for, print_json, show_table
 from skills.files.errors import InputError
 from skills.quantities import Count, Quantity, Seed
 
@@ -62,9 +62,8 @@ def render_command(
     """Render pictures of objects in random rooms, with boxes and masks as COCO files."""
     console = console_for(as_json)
     began = time.monotonic()
-    with refusals():
-        pool = Pool(jobs or os.cpu_count() or 1, workers, scheduler)
-        summary = _render(out, images, seed, others, pool, console)
+    pool = Pool(jobs or os.cpu_count() or 1, workers, scheduler)
+    summary = _render(out, images, seed, others, pool, console)
     _show(console, out, summary, time.monotonic() - began)
     if as_json:
         print_json({"out": str(out), **asdict(summary)})

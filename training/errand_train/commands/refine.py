@@ -13,7 +13,7 @@ from errand_train.commands.learning import LIBRARIES, budget_of, check_folders, 
 from errand_train.detector.schedule import REFINEMENT_RATE, RefineOptions, Schedule
 from errand_train.libraries import check_libraries
 from executive.cli.number_options import LearningRate, Minutes, quantity_option
-from executive.cli.output import console_for, refusals
+from executive.cli.output import console_for
 from skills.files.errors import InputError
 from skills.perception.detector.cascade_files import MODEL_FILE
 from skills.quantities import Count, Seed
@@ -49,22 +49,21 @@ def refine_command(
 ) -> None:
     """Train the refinement network, which takes crops of the proposals, or the classifier network; export it."""
     console = console_for(as_json)
-    with refusals():
-        check_folders(data, out, resume)
-        check_time(minutes, epochs)
-        check_libraries(LIBRARIES)
-        options = RefineOptions(
-            data,
-            out,
-            budget_of(data, minutes, epochs, default_minutes=DEFAULT_MINUTES),
-            model=_proposal_network(model),
-            classifier=classifier,
-            seed=seed,
-            resume=resume,
-            start=start,
-            schedule=Schedule(rate),
-        )
-        file, figures = _refine(options, console)
+    check_folders(data, out, resume)
+    check_time(minutes, epochs)
+    check_libraries(LIBRARIES)
+    options = RefineOptions(
+        data,
+        out,
+        budget_of(data, minutes, epochs, default_minutes=DEFAULT_MINUTES),
+        model=_proposal_network(model),
+        classifier=classifier,
+        seed=seed,
+        resume=resume,
+        start=start,
+        schedule=Schedule(rate),
+    )
+    file, figures = _refine(options, console)
     print_trained(console, file, figures, as_json=as_json)
 
 

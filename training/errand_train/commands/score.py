@@ -21,7 +21,7 @@ from errand_train.detector.scoring_labels import LabelledPicture, pictures_of_co
 from errand_train.libraries import check_libraries
 from executive.app.pictures import detector_of, read_picture, write_picture
 from executive.cli.number_options import quantity_option
-from executive.cli.output import console_for, print_json, refusals
+from executive.cli.output import console_for, print_json
 from skills.detection import Detection
 from skills.files.errors import InputError
 from skills.files.outside import read_text
@@ -66,20 +66,19 @@ def score_command(
 ) -> None:
     """Judge the detector by labelled pictures: average precision as COCO has it, precision, recall, speed."""
     console = console_for(as_json)
-    with refusals():
-        check_libraries(("pycocotools",), "scoring")
-        drawing = _png(sheet)
-        detector = detector_of(model, DetectorOptions(threshold=LEAST_SCORE))
-        work = _work(data, pictures or data.parent, limit, detector, views)
-        found = _all_found(work, console)
-        names = work.detector.class_names
-        scores = {"all": score(work.pictures, found, names)}
-        for camera, (shown, seen) in by_camera(work.pictures, found).items():
-            scores[camera] = score(shown, seen, BODY_CLASSES if camera == BODY else names)
-        speed = _pictures_per_second(work)
-        order = _worst_first(work, found)[: worst or (WORST if drawing else 0)]
-        if drawing is not None:
-            write_picture(drawing, contact_sheet([_shown(work, found, k) for k in order]))
+    check_libraries(("pycocotools",), "scoring")
+    drawing = _png(sheet)
+    detector = detector_of(model, DetectorOptions(threshold=LEAST_SCORE))
+    work = _work(data, pictures or data.parent, limit, detector, views)
+    found = _all_found(work, console)
+    names = work.detector.class_names
+    scores = {"all": score(work.pictures, found, names)}
+    for camera, (shown, seen) in by_camera(work.pictures, found).items():
+        scores[camera] = score(shown, seen, BODY_CLASSES if camera == BODY else names)
+    speed = _pictures_per_second(work)
+    order = _worst_first(work, found)[: worst or (WORST if drawing else 0)]
+    if drawing is not None:
+        write_picture(drawing, contact_sheet([_shown(work, found, k) for k in order]))
     named = [{"file": work.pictures[k].file, "error": round(_error(work, found, k), 3)} for k in order]
     if as_json:
         print_json({"data": str(data), **scores_json(scores, speed), **({"worst": named} if named else {})})

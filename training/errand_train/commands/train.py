@@ -13,7 +13,7 @@ from errand_train.commands.learning import LIBRARIES, budget_of, check_folders, 
 from errand_train.detector.schedule import HIGHEST_RATE, REFINING_RATE, Schedule, TrainOptions
 from errand_train.libraries import check_libraries
 from executive.cli.number_options import LearningRate, Minutes, quantity_option
-from executive.cli.output import console_for, refusals
+from executive.cli.output import console_for
 from skills.quantities import Count, Seed
 
 __all__ = ["train_command"]
@@ -46,20 +46,19 @@ def train_command(
 ) -> None:
     """Train the detector and export it as ONNX; write checkpoints and figures during training."""
     console = console_for(as_json)
-    with refusals():
-        check_folders(data, out, resume)
-        check_time(minutes, epochs)
-        check_libraries(LIBRARIES)
-        options = TrainOptions(
-            data,
-            out,
-            budget_of(data, minutes, epochs, default_minutes=DEFAULT_MINUTES),
-            seed=seed,
-            resume=resume,
-            start=start,
-            schedule=Schedule.refining(rate or REFINING_RATE) if start else Schedule(rate or HIGHEST_RATE),
-        )
-        model, figures = _train(options, console)
+    check_folders(data, out, resume)
+    check_time(minutes, epochs)
+    check_libraries(LIBRARIES)
+    options = TrainOptions(
+        data,
+        out,
+        budget_of(data, minutes, epochs, default_minutes=DEFAULT_MINUTES),
+        seed=seed,
+        resume=resume,
+        start=start,
+        schedule=Schedule.refining(rate or REFINING_RATE) if start else Schedule(rate or HIGHEST_RATE),
+    )
+    model, figures = _train(options, console)
     print_trained(console, model, figures, as_json=as_json)
 
 

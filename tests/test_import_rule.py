@@ -143,7 +143,7 @@ def test_the_root_of_executive_holds_no_modules() -> None:
         ("executive/mission/resolve.py", "from executive.language import understand", []),
         ("executive/tree/estimate.py", "def f():\n    import executive.run.runner", ["executive.run.runner"]),
         ("executive/tree/estimate.py", "from executive.attic import old", ["executive.attic.old"]),
-        ("executive/view/svg.py", "from executive.tree.node_view import NodeView", []),
+        ("executive/view/formats.py", "from executive.tree.node_view import NodeView", []),
     ],
 )
 def test_the_check_finds_imports_upward(path: str, source: str, expected: list[str]) -> None:

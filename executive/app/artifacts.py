@@ -14,7 +14,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from executive.record.reader import Event
+from executive.record.history import Event
 from executive.record.schemas import DESTINATION, TRANSITIONS
 from executive.run.visitor import RunVisitor
 from executive.store.resuming import told_before

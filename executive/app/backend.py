@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from executive.app.artifacts import Artifacts
 from executive.app.report import RefereeReport
-from executive.record.profile import Profile
+from executive.record.work import Profile
 from executive.run.outcome import RobotResult
 from executive.run.visitor import RunEntry
 from executive.store.journal import StoreJournal

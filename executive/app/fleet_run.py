@@ -28,7 +28,7 @@ from executive.app.signals import ended_by_signals
 from executive.app.simulated import SimulatedBackend, compile_first
 from executive.app.worlds import knowledge_of, open_world
 from executive.record.event_log import EventLog
-from executive.record.reader import Event, read_events
+from executive.record.history import Event, read_events
 from executive.run.visitor import RunSettings
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission

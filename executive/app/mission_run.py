@@ -25,10 +25,9 @@ from executive.app.simulated import SimulatedBackend, compile_first
 from executive.mission.request import Request
 from executive.record.announce import announce, map_message
 from executive.record.event_log import EventLog
-from executive.record.profile import Profile
-from executive.record.reader import Event, read_events
+from executive.record.history import Event, read_events
 from executive.record.schemas import CONTROL, MAP, RUN, WORK
-from executive.record.work import CountedDetector
+from executive.record.work import CountedDetector, Profile
 from executive.run.control import Control
 from executive.run.outcome import RobotResult, RunResult
 from executive.run.runner import run

@@ -20,9 +20,17 @@ from executive.record.event_log import EventLog
 from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
 from executive.store.missions import MissionStore
-from executive.view.actions import Action, RefusedError, asked_json, control_actions, robot_of, text_of
 from executive.view.feed import Feed
-from executive.view.watch import ControlWatch, ProgressWatch
+from executive.view.page_control import (
+    Action,
+    ControlWatch,
+    ProgressWatch,
+    RefusedError,
+    asked_json,
+    control_actions,
+    robot_of,
+    text_of,
+)
 from skills.files.errors import InputError
 
 if TYPE_CHECKING:

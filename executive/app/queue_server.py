@@ -28,7 +28,7 @@ from executive.store.standing import StandingMission, StandingMissions, TooManyE
 from executive.store.trigger_source import TriggerSource, trigger_source
 from executive.store.triggers import OnCall, OnTopic, Trigger
 from executive.store.wakeup import wake_server
-from executive.view.calls import CallError, CallServer
+from executive.view.serving import CallError, CallServer
 from skills.files.errors import InputError
 from skills.files.plugins import PluginDefect, run_in_thread
 

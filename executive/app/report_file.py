@@ -16,17 +16,16 @@ from executive.app.artifacts import Artifacts, detection_picture, file_name, to_
 from executive.app.pictures import read_picture
 from executive.app.prepared import Prepared
 from executive.app.report import Ending, ReportedAnswer, ReportedObject, RobotReport, RunReport, counts_text
-from executive.record.reader import Event
+from executive.record.history import Event, seen_objects
 from executive.record.schemas import TRANSITIONS
-from executive.record.sightings import seen_objects
 from executive.run.outcome import Finding, RunResult, Said
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.tree.node_view import NodeView
 from executive.view.collapse import DRAWN_NODES, executed_tree, fold_to
+from executive.view.formats import to_svg
 from executive.view.html import render
 from executive.view.map_picture import map_picture
 from executive.view.styles import ROBOT_COLOURS, NodeStyle, Styles, style_of
-from executive.view.svg import to_svg
 from executive.words.geometry import inside
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectObservation

@@ -17,7 +17,7 @@ from executive.app.prepared import Prepared
 from executive.app.report import RunReport
 from executive.app.signals import HUNG_UP
 from executive.language.questions import Answerer
-from executive.record.profile import Profile
+from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.visitor import RunVisitor
 from executive.store.database import STORE_FILE, StoreError

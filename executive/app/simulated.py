@@ -15,7 +15,7 @@ from executive.app.backend import Durable, Scene
 from executive.app.goal_conditions import Share, verdict_of
 from executive.app.report import RefereeReport
 from executive.app.robots import PlacedRobot, shared_detector
-from executive.record.profile import Profile
+from executive.record.work import Profile
 from executive.run.outcome import RobotResult
 from executive.run.visitor import RunEntry
 from executive.run.worker import WorkThread

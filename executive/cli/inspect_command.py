@@ -17,15 +17,12 @@ from rich.text import Text
 
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, show_table, terminal_answerer, write_text
-from executive.record.history import History, read_history
+from executive.record.history import Entry, History, read_history, timeline
 from executive.record.schemas import ERRORS
-from executive.record.timeline import Entry, timeline
 from executive.tree.node_view import NodeView, node_view, to_json
-from executive.view.btcpp import to_btcpp
 from executive.view.collapse import DRAWN_NODES, MANY_NODES, fold_below, fold_to
-from executive.view.mermaid import to_mermaid
+from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.styles import style_of
-from executive.view.svg import to_svg
 from executive.view.text import printable, to_text
 from skills.files.errors import InputError
 from skills.files.outside import is_file

@@ -25,8 +25,8 @@ from executive.cli.output import console_for
 from executive.cli.run_keys import keys_pressed
 from executive.mission.request import start_in
 from executive.run.worker import LockStepWorker
-from executive.view.actions import Action, RefusedError
 from executive.view.feed import Feed
+from executive.view.page_control import Action, RefusedError
 from executive.view.server import PageContent, serve
 from plant.worlds.world import World
 from skills.api import SkillContext

@@ -42,7 +42,7 @@ def run(
     from executive.app.runs import MissionRuns
     from executive.cli.listen_command import hear_request
     from executive.cli.screen import ConsoleScreen, voice_for
-    from executive.record.profile import Profile, lines
+    from executive.record.work import Profile, lines
     from executive.store.missions import STORE as STORE_NAME
     from executive.store.missions import MissionStore
 

@@ -22,8 +22,8 @@ from executive.app.runs import Watching
 from executive.app.talk import Talk, load_ahead
 from executive.cli.run_keys import HELP, Keys, keys_pressed, prompt_lines
 from executive.language.parser import load_parser
-from executive.record.profile import Profile
 from executive.record.schemas import SPEECH
+from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
 from executive.speech.voice import Silence, Voice, queued_voice

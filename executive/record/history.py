@@ -1,23 +1,87 @@
-"""History of a run from its event log: the trees at any time, and the transitions."""
+"""Reads event logs, even those that a killed process left behind: the trees at any time, a timeline, objects seen."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import json
+import struct
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+from mcap.exceptions import McapError
+from mcap.reader import NonSeekingReader
 from py_trees.common import Status
+from zstandard import ZstdError
 
-from executive.record.reader import Event, read_events
-from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
+from executive.record.schemas import (
+    ACTIVITY,
+    CONTROL,
+    DESTINATION,
+    ERRORS,
+    MISSIONS,
+    OUTCOME,
+    RUN,
+    SPEECH,
+    TASK,
+    TO_DETECT,
+    TOPIC,
+    TRACKS,
+    TRANSITIONS,
+    TREE,
+    WALL,
+)
 from executive.tree.node_view import NodeView, logged_view
 from executive.tree.snapshot import NodeState
 from executive.words.robots import robot_called
-from skills.api import Cause
+from skills.api import Cause, ObjectObservation, Thing
+from skills.detect.words import told_apart
 from skills.files.errors import InputError
+from skills.files.outside import plain_file
+from skills.perception.class_forms import THING
 
-TRANSITION_KEYS = ("t", "node", "from", "to", "cause", "message")
+MOST_BYTES = 100_000_000_000
+_DAMAGE = (McapError, struct.error, ZstdError, ValueError)
+
+
+@dataclass(frozen=True)
+class Event:
+    """One message: topic, the robot's clock in seconds, and its values."""
+
+    topic: str
+    stamp_s: float
+    data: dict[str, Any]
+
+
+def read_events(path: Path) -> tuple[Event, ...]:
+    """All events in the order in which they were written; of a log that was cut off, those before the cut.
+
+    Raises InputError if there is no such file, or it is no event log.
+    """
+    plain_file(path, most_bytes=MOST_BYTES, hint="name a log that exists")
+    try:
+        with path.open("rb") as file:
+            return tuple(_events(NonSeekingReader(file)))
+    except OSError as error:
+        raise InputError(f"cannot read it ({error.strerror})", hint="name a log that exists", file=path) from error
+    except _DAMAGE as error:
+        raise InputError("it is no event log", hint="name a log.mcap that a run has written", file=path) from error
+
+
+def _events(reader: NonSeekingReader) -> Iterator[Event]:
+    count = 0
+    try:
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            count += 1
+            topic = channel.metadata.get(TOPIC, channel.topic)
+            yield Event(topic, message.log_time / 1e9, json.loads(message.data))
+    except _DAMAGE:
+        if count == 0:
+            raise
+
+
+_KEYS: Final = ("node", "from", "to", "cause", "message")
 
 
 @dataclass(frozen=True)
@@ -31,7 +95,7 @@ class History:
         """The transitions of the nodes: `t` (s), `node`, `from`, `to`, `cause`, `message`."""
         for event in self.events:
             if event.topic == TRANSITIONS:
-                yield {"t": event.data.get("t", event.stamp_s), **_picked(event.data, TRANSITION_KEYS[1:])}
+                yield {"t": event.data.get("t", event.stamp_s), **{key: event.data.get(key) for key in _KEYS}}
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -52,7 +116,9 @@ class History:
         Raises InputError: the log holds no tree, or a broken one.
         """
         found: list[tuple[dict[str, Any], dict[str, NodeState]]] = []
-        for event in _before(self.events, until_s):
+        for event in self.events:
+            if until_s is not None and event.stamp_s > until_s + 1e-9:
+                continue
             if event.topic == TREE:
                 found.append((event.data, {}))
             elif event.topic == TRANSITIONS and found:
@@ -88,15 +154,144 @@ def logged_activity(activity: dict[str, Any]) -> NodeState:
     return NodeState(Status.RUNNING, None, activity.get("message") or "")
 
 
-def _before(events: Iterable[Event], until_s: float | None) -> Iterator[Event]:
-    return (event for event in events if until_s is None or event.stamp_s <= until_s + 1e-9)
-
-
 def _latest(found: list[tuple[dict[str, Any], dict[str, NodeState]]], robot: Any) -> dict[str, NodeState]:
     """States of the robot's latest tree, or of the latest tree if no robot is named."""
     mine = [states for data, states in found if data.get("robot") == robot]
     return mine[-1] if mine else found[-1][1]
 
 
-def _picked(data: dict[str, Any], keys: Iterable[str]) -> dict[str, Any]:
-    return {key: data.get(key) for key in keys}
+@dataclass(frozen=True)
+class Entry:
+    """One line of a timeline: time on the robot's clock (s), node or topic, and text.
+
+    `state` is the node's state after a change, `robot` the robot's name.
+    """
+
+    t: float
+    about: str
+    text: str
+    state: NodeState | None = None
+    robot: str = ""
+
+
+def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[Entry]:
+    """The entries of a log in order.
+
+    `leaves_only` omits changes of inner nodes that did not fail, and single late ticks.
+    """
+    return (replace(entry, robot=robot_of(event)) for event, entry in _entries(events, leaves_only))
+
+
+def _entries(events: Iterable[Event], leaves_only: bool) -> Iterator[tuple[Event, Entry]]:
+    inner: set[str] = set()
+    commands: Sequence[str] = ()
+    for event in events:
+        if event.topic == RUN:
+            commands = event.data.get("commands", ())
+        if event.topic == TREE:
+            inner |= _inner_nodes(event.data["root"])
+        if event.topic == TRANSITIONS:
+            entry = _transition(event)
+            if not leaves_only or entry.about not in inner or (entry.state is not None and entry.state.cause):
+                yield event, entry
+        elif event.topic == ACTIVITY:
+            state = logged_activity(event.data)
+            yield event, Entry(event.data.get("t", event.stamp_s), event.data["node"], state.message, state)
+        elif event.topic == TASK:
+            yield event, Entry(event.stamp_s, event.topic, _task(event.data, commands))
+        elif event.topic in _TEXTS and not (leaves_only and event.topic == WALL and "wall_time_s" not in event.data):
+            text = _TEXTS[event.topic](event.data)
+            if text:
+                yield event, Entry(event.stamp_s, event.topic, text)
+
+
+def _inner_nodes(structure: Mapping[str, Any]) -> set[str]:
+    below = [_inner_nodes(child) for child in structure["children"]]
+    return set().union(*below) | ({structure["id"]} if structure["children"] else set())
+
+
+def _transition(event: Event) -> Entry:
+    data = event.data
+    state = logged_state(data)
+    cause = state.cause.value if state.cause else ""
+    return Entry(data.get("t", event.stamp_s), data["node"], ": ".join(filter(None, (cause, state.message))), state)
+
+
+def _run(data: Mapping[str, Any]) -> str:
+    versions = ", ".join(f"{name} {version}" for name, version in data.get("versions", {}).items())
+    scenario = "".join(f"; {line}" for line in data.get("scenario", ()))
+    return f"world {data.get('world')}, seed {data.get('seed')}; {versions}{scenario}"
+
+
+def _mission(data: Mapping[str, Any]) -> str:
+    return f"{data.get('id')} ({data.get('robot') or 'nobody'}): {data.get('outcome')}"
+
+
+def _outcome(data: Mapping[str, Any]) -> str:
+    cause = f" ({data['cause']})" if data.get("cause") else ""
+    return f"{data.get('robot')}: {data.get('outcome')}{cause}: {data.get('message')}"
+
+
+def _task(data: Mapping[str, Any], commands: Sequence[str]) -> str:
+    number = int(data.get("task_count", 0))
+    text = commands[number - 1] if 1 <= number <= len(commands) else f"objects {data.get('obj_type')}"
+    return f"command {number} of {data.get('mission_count')} for {data.get('robot_name')}: {text}"
+
+
+def _seen(data: Mapping[str, Any]) -> str:
+    x, y, z = (data.get(f"goal_{axis}") or 0.0 for axis in "xyz")
+    return f"{data.get('class_name')} at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+
+
+def _ticks(data: Mapping[str, Any]) -> str:
+    late = [tick for tick in data.get("tick_s", ()) if tick > (data.get("limit_s") or float("inf"))]
+    longest = f"longest {max(late) * 1e3:.0f} ms" if late else ""
+    if "wall_time_s" in data:
+        return f"{data['wall_time_s']:.1f} s on the wall's clock, {data.get('overruns')} ticks overran"
+    return f"{len(late)} ticks overran; {longest}" if late else ""
+
+
+_TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
+    RUN: _run,
+    OUTCOME: _outcome,
+    SPEECH: lambda data: f'{data.get("robot")} says: "{data.get("text")}"',
+    MISSIONS: lambda data: "; ".join(_mission(each) for each in data.get("missions", ())),
+    CONTROL: lambda data: f"{data.get('what')}: {data.get('message')}",
+    TO_DETECT: lambda data: f"look for {', '.join(data.get('class_name', ()))}",
+    DESTINATION: _seen,
+    ERRORS: lambda data: str(data.get("traceback", "")).strip().splitlines()[-1:][0] if data else "",
+    WALL: _ticks,
+}
+
+
+def seen_objects(events: Iterable[Event]) -> tuple[ObjectObservation, ...]:
+    """The confirmed objects of a run, each once, in the order of the searches.
+
+    An object is confirmed as in `detect`: seen from two viewpoints, and still believed to be of its class at the end of
+    the search. Objects without a class are left out. Two objects of one class from different searches are the same if
+    they are within `SAME_WITHIN_M`. The log has no sizes, so they are 0 here; the score is the belief.
+    """
+    searches: list[list[ObjectObservation]] = []
+    open_searches: dict[str, int] = {}
+    for event in events:
+        robot = str(event.data.get("robot_name", ""))
+        if event.topic == TO_DETECT:
+            open_searches[robot] = len(searches)
+            searches.append([])
+        elif event.topic == TRACKS and robot in open_searches:
+            sure = [track for track in event.data["tracks"] if track.get("confirmed") and track["class_name"] != THING]
+            searches[open_searches[robot]] = [_observation(track) for track in sorted(sure, key=itemgetter("number"))]
+    return told_apart(searches)
+
+
+def _observation(track: Mapping[str, Any]) -> ObjectObservation:
+    x_m, y_m, z_m = track["position_W"]
+    return ObjectObservation(
+        stamp_s=float(track["last_seen_s"]),
+        thing=Thing(track["class_name"]),
+        position_W=(x_m, y_m, z_m),
+        size_m=(0.0, 0.0, 0.0),
+        yaw_rad=0.0,
+        score=float(track["belief"]),
+        surface=track["surface"] or None,
+    )

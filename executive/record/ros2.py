@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from mcap_ros2.writer import Writer
 
-from executive.record.reader import Event
+from executive.record.history import Event
 from executive.record.schemas import BOXES, DETECTIONS, PATH, POSE, stamp
 from executive.words.slug import slug
 from skills.files.errors import InputError

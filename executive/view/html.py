@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from executive.record.reader import Event
+from executive.record.history import Event
 from executive.view.feed import Feed
 from executive.view.text import printable
 

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.record.reader import Event
+from executive.record.history import Event
 from executive.record.schemas import MAP, NAVIGATION, PATH, POSE, RESERVED_PATH
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from skills.files.errors import InputError

@@ -24,9 +24,9 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from executive.view.actions import Action, RefusedError
 from executive.view.feed import Feed
 from executive.view.html import PAGE_FOLDER
+from executive.view.page_control import Action, RefusedError
 from executive.view.serving import MAX_BODY, ServingThread, body_of
 from skills.files.errors import InputError
 from skills.files.texts import json_object

@@ -25,7 +25,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Final
 
-from executive.record.reader import Event, read_events
+from executive.record.history import Event, read_events
 from tests.benchmarks.kill_and_resume import kill_at
 
 MOST_DIFFERENCES: Final = 5

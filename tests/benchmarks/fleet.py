@@ -33,7 +33,7 @@ from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
-from executive.record.reader import Event, read_events
+from executive.record.history import Event, read_events
 from executive.run.outcome import Outcome
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings

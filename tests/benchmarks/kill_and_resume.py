@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from executive.record.reader import read_events
+from executive.record.history import read_events
 from executive.store.resuming import told_before
 from plant.diagram import TIME_STEP_S
 from plant.snapshot import SnapshotError, read_snapshot

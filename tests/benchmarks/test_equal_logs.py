@@ -1,6 +1,6 @@
 """What two runs are compared by."""
 
-from executive.record.reader import Event
+from executive.record.history import Event
 from tests.benchmarks.equal_logs import differences, lines, steady
 
 RUN = {"exit": 0, "result": {"outcome": "success"}, "logs": [["0.050 state abc", "0.100 state def"]]}

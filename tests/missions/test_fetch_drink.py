@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.record.reader import read_events
+from executive.record.history import read_events
 from executive.record.schemas import WALL
 
 pytestmark = pytest.mark.mission

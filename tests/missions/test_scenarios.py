@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from executive.cli.entry import app
-from executive.record.reader import read_events
+from executive.record.history import read_events
 
 pytestmark = pytest.mark.mission
 

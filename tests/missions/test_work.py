@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.record.reader import read_events
+from executive.record.history import read_events
 
 # What this fetch took when the budget was last set, and a fifth more.
 BUDGETS = {

@@ -29,9 +29,8 @@ from executive.app.mission_run import return_memory, run_request
 from executive.app.prepare import prepare
 from executive.app.report import RefereeReport, RunReport
 from executive.mission.request import Request
-from executive.record.reader import Event, read_events
+from executive.record.history import Event, read_events, timeline
 from executive.record.schemas import TRANSITIONS, TREE
-from executive.record.timeline import timeline
 from executive.tree.node_view import logged_view
 from executive.view.map_picture import map_picture
 from executive.words.variation import NO_VARIATION

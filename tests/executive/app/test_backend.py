@@ -10,8 +10,8 @@ from executive.app.prepare import prepare
 from executive.app.report import RunReport
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
-from executive.record.profile import Profile
-from executive.record.reader import read_events
+from executive.record.history import read_events
+from executive.record.work import Profile
 from executive.run.outcome import Outcome
 from tests.executive.app.scripted_backend import ScriptedBackend
 

@@ -19,7 +19,7 @@ from executive.app.robots import PlacedRobot
 from executive.cli import entry
 from executive.cli.fleet_command import _to_do, resumable_lines
 from executive.mission.request import Request
-from executive.record.reader import read_events
+from executive.record.history import read_events
 from executive.run.visitor import RunEntry
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionStore

@@ -16,7 +16,7 @@ from executive.app.prepare import prepare
 from executive.mission.request import Request
 from executive.run.control_state import Mode
 from executive.store.missions import MissionState, MissionStore
-from executive.view.actions import RefusedError
+from executive.view.page_control import RefusedError
 from skills.files.errors import InputError
 
 

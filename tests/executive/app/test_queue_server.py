@@ -14,7 +14,7 @@ from executive.mission.request import Request
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing import MOST_WAITING, StandingMissions
 from executive.store.triggers import OnCall, OnTopic, trigger_of
-from executive.view.calls import CallError
+from executive.view.serving import CallError
 from skills.files.errors import InputError
 
 TOKEN = "a-token-of-the-test"

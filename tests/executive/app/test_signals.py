@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from executive.app.signals import cancelled_by_signals, ended_by_signals, interrupted_by_hang_up
-from executive.record.reader import read_events
+from executive.record.history import read_events
 from executive.run.control import Control
 from executive.store.missions import MissionState, MissionStore
 

@@ -10,7 +10,7 @@ from executive.app.prepare import prepare
 from executive.app.runs import note_run
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
-from executive.record.reader import read_events
+from executive.record.history import read_events
 from executive.run.outcome import Outcome
 from executive.store.missions import MissionState, MissionStore
 from skills.files.errors import InputError

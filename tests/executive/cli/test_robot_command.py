@@ -15,7 +15,7 @@ from executive.app.worlds import open_world
 from executive.cli.entry import app
 from executive.cli.robot_command import TerminalKeys, context_for, page_actions, period
 from executive.mission.load import load_mission
-from executive.view.actions import RefusedError
+from executive.view.page_control import RefusedError
 from skills.arm.kinematics import arm_model
 from skills.files.errors import InputError
 from skills.robot import Pose2D

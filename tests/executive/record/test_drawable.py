@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 
 from executive.record.announce import map_message
 from executive.record.event_log import EventLog, boxes, drawable, with_picture
-from executive.record.reader import read_events
+from executive.record.history import read_events
 from skills.estimate.grid_map import GridMap
 
 SEEN = {"class_name": "coke", "score": 0.9, "box": [10, 20, 30, 40]}

@@ -17,7 +17,7 @@ import pytest
 from mcap.reader import make_reader
 
 from executive.record.event_log import EventLog, plain_values
-from executive.record.reader import read_events
+from executive.record.history import read_events
 from executive.record.schemas import WALL
 from executive.run.outcome import RunResult
 from executive.run.visitor import Progress, RunSettings

@@ -6,9 +6,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.record.event_log import EventLog
-from executive.record.history import read_history
-from executive.record.reader import Event
-from executive.record.timeline import timeline
+from executive.record.history import Event, read_history, timeline
 from executive.tree.node_view import node_view, to_json
 from skills.api import Cause, Failed
 from skills.files.errors import InputError

@@ -8,7 +8,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from executive.record.event_log import EventLog
-from executive.record.reader import read_events
+from executive.record.history import read_events
 from executive.record.ros2 import write_ros2
 from skills.files.errors import InputError
 

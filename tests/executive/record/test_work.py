@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from executive.record.profile import OTHER, START, Profile, lines
-from executive.record.work import CountedDetector, Work
+from executive.record.work import OTHER, START, CountedDetector, Profile, Work, lines
 
 
 def busy(seconds):

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from executive.record.reader import Event
+from executive.record.history import Event
 from executive.view.map_picture import WIDTH_PX, map_picture
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from skills.files.errors import InputError

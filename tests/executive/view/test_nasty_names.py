@@ -7,14 +7,12 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 from py_trees.common import Status
 
-from executive.record.reader import Event
+from executive.record.history import Event
 from executive.tree.node_view import NodeView, to_json
 from executive.tree.ports import Port
 from executive.tree.snapshot import NodeState
-from executive.view.btcpp import to_btcpp
+from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.html import log_page
-from executive.view.mermaid import to_mermaid
-from executive.view.svg import to_svg
 from executive.view.text import printable, to_text
 from skills.api import Cause
 

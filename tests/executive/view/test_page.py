@@ -26,12 +26,11 @@ from executive.run.outcome import RobotStatus
 from executive.run.visitor import Progress
 from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
-from executive.view.actions import RefusedError, asked_json, control_actions
 from executive.view.feed import Feed
 from executive.view.html import feed_of, log_page, render
+from executive.view.page_control import SEND_LIMIT_S, ControlWatch, RefusedError, asked_json, control_actions
 from executive.view.server import PageContent, PageServer
 from executive.view.styles import Styles
-from executive.view.watch import SEND_LIMIT_S, ControlWatch
 from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission

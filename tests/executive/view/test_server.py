@@ -15,10 +15,16 @@ from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.run.visitor import Progress
 from executive.tree.snapshot import NodeState
-from executive.view.actions import RefusedError, control_actions, control_json, text_of
 from executive.view.feed import Feed
+from executive.view.page_control import (
+    ControlWatch,
+    RefusedError,
+    control_actions,
+    control_json,
+    progress_json,
+    text_of,
+)
 from executive.view.server import PageContent, PageServer
-from executive.view.watch import ControlWatch, progress_json
 from skills.api import Question
 from tests.hostile_values import DATA
 

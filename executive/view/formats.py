@@ -1,22 +1,152 @@
-"""The tree in the XML format of BehaviorTree.CPP 4, which Groot2 opens.
-
-Sequences and selectors become `Sequence` and `Fallback`, which mean the same. Every other node has its own name in
-explicit form, and the `TreeNodesModel` lists its ports. Each step of the mission is a tree of its own, so that the
-editor can fold it. The node's description has state, cause, path id and source line.
-"""
+"""The tree in forms that other programs read: SVG, Mermaid, and the XML of BehaviorTree.CPP."""
 
 from __future__ import annotations
 
 import re
+import textwrap
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
 from executive.tree.node_view import NodeView
 from executive.tree.ports import Port
-from executive.view.styles import style_of
+from executive.view.html import render
+from executive.view.styles import NodeStyle, Styles, style_of
 from executive.view.text import note_of, printable
+
+BOX_W: Final = 232
+BOX_H: Final = 40
+NOTE_LINE_H: Final = 13
+COLUMN_GAP: Final = 34
+ROW_GAP: Final = 10
+MARGIN: Final = 20
+TITLE_H: Final = 34
+LEGEND_H: Final = 34
+LEGEND_W: Final = 105
+NOTE_CHARS: Final = 33
+NOTE_LINES: Final = 3
+NAME_CHARS: Final = 30
+_SIZES: Final = {
+    "box_w": BOX_W,
+    "box_h": BOX_H,
+    "note_h": NOTE_LINE_H,
+    "gap": COLUMN_GAP,
+    "margin": MARGIN,
+    "legend_w": LEGEND_W,
+}
+
+
+@dataclass(frozen=True)
+class _Box:
+    """A node with its place: the left upper corner, height, and the boxes of its children."""
+
+    node: NodeView
+    x: float
+    y: float
+    height: float
+    note: tuple[str, ...]
+    children: tuple[_Box, ...]
+
+    @property
+    def middle(self) -> float:
+        return self.y + self.height / 2
+
+    @property
+    def style(self) -> NodeStyle:
+        return style_of(self.node.state)
+
+    @property
+    def name(self) -> str:
+        return textwrap.shorten(printable(self.node.name), NAME_CHARS, placeholder="…")
+
+    @property
+    def tooltip(self) -> list[str]:
+        return [text for text in (self.node.path_id, self.style.word, note_of(self.node)) if text]
+
+    def walk(self) -> Iterator[_Box]:
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+
+def to_svg(root: NodeView, *, title: str = "") -> str:
+    """The tree as a whole SVG document, with a legend; notes are cut to three lines and stand whole in the tooltip."""
+    box, bottom = _laid_out(root, MARGIN, MARGIN + TITLE_H)
+    boxes = list(box.walk())
+    return render(
+        "tree.svg",
+        boxes=boxes,
+        height=bottom + LEGEND_H + MARGIN,
+        width=max(MARGIN + len(Styles) * LEGEND_W, *(each.x + BOX_W + MARGIN for each in boxes)),
+        title=title or root.name,
+        styles=[style.value for style in Styles],
+        size=_SIZES,
+    )
+
+
+def _laid_out(node: NodeView, x: float, y: float) -> tuple[_Box, float]:
+    """The box of a node and of all nodes below it from height y on, and the height at which the next one may begin."""
+    note = _wrapped(note_of(node))
+    height = BOX_H + NOTE_LINE_H * len(note) + (4 if note else 0)
+    children: list[_Box] = []
+    below = y
+    for child in node.children:
+        box, below = _laid_out(child, x + BOX_W + COLUMN_GAP, below)
+        children.append(box)
+    if not children:
+        return _Box(node, x, y, height, note, ()), y + height + ROW_GAP
+    middle = (children[0].middle + children[-1].middle) / 2
+    top = max(y, middle - height / 2)
+    return _Box(node, x, top, height, note, tuple(children)), max(below, top + height + ROW_GAP)
+
+
+def _wrapped(note: str) -> tuple[str, ...]:
+    return tuple(textwrap.wrap(printable(note), NOTE_CHARS, max_lines=NOTE_LINES, placeholder=" …"))
+
+
+_SAFE: Final = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 .,:()-_/+'")
+
+
+def to_mermaid(root: NodeView) -> str:
+    """The tree from left to right: a box for each node, with its state as symbol, colour and line, and its cause."""
+    return "\n".join(["flowchart LR", *_nodes(root), *_classes(), ""])
+
+
+def _nodes(root: NodeView) -> Iterator[str]:
+    numbers = {id(node): number for number, (_, node) in enumerate(root.walk())}
+    for _, node in root.walk():
+        number = numbers[id(node)]
+        yield f'  n{number}["{_label(node)}"]:::{_class(style_of(node.state))}'
+        for child in node.children:
+            yield f"  n{number} --> n{numbers[id(child)]}"
+
+
+def _label(node: NodeView) -> str:
+    title = node.name if node.kind == "skill" else f"{node.kind} {node.name}"
+    folded = f"({node.hidden} nodes below)" if node.hidden else ""
+    rows = filter(None, (f"{style_of(node.state).symbol} {title}", note_of(node), folded))
+    return "<br/>".join(map(escaped, rows))
+
+
+def escaped(text: str) -> str:
+    """The text, with a character reference for every character that Mermaid might read as syntax."""
+    return "".join(char if char in _SAFE else f"#{ord(char)};" for char in printable(text))
+
+
+def _classes() -> Iterator[str]:
+    for member in Styles:
+        style: NodeStyle = member.value
+        dashes = f",stroke-dasharray:{style.dashes}" if style.dashes else ""
+        width = 3 if member is Styles.FAILURE else 2
+        colours = f"fill:{style.fill},stroke:{style.line},color:{style.ink}"
+        yield f"  classDef {_class(style)} {colours},stroke-width:{width}px{dashes}"
+
+
+def _class(style: NodeStyle) -> str:
+    return style.word.replace(" ", "")
+
 
 FORMAT: Final = "4"
 _BUILT_IN: Final[Mapping[str, str]] = {"sequence": "Sequence", "selector": "Fallback"}
@@ -34,7 +164,12 @@ _TAKEN: Final = frozenset(re.findall(r"\w+", _BUILT_IN_NAMES))
 
 
 def to_btcpp(root: NodeView) -> str:
-    """The tree as an XML document."""
+    """The tree as an XML document, which Groot2 opens.
+
+    Sequences and selectors become `Sequence` and `Fallback`, which mean the same. Every other node has its own name in
+    explicit form, and the `TreeNodesModel` lists its ports. Each step of the mission is a tree of its own, so that the
+    editor can fold it. The node's description has state, cause, path id and source line.
+    """
     parts = _parts(root)
     steps = {id(node): tree_id for node, tree_id in parts}
     main = _identifier(root.name)

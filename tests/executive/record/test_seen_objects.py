@@ -2,8 +2,7 @@
 
 import pytest
 
-from executive.record.reader import Event
-from executive.record.sightings import seen_objects
+from executive.record.history import Event, seen_objects
 
 
 def look_for(robot="Alice"):

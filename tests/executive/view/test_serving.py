@@ -7,8 +7,7 @@ from http import HTTPStatus
 
 import pytest
 
-from executive.view.calls import CallError, CallServer
-from executive.view.serving import MAX_BODY
+from executive.view.serving import MAX_BODY, CallError, CallServer
 
 TOKEN = "a-token-of-the-test"
 

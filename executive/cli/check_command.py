@@ -13,7 +13,7 @@ from rich.markup import escape
 
 from executive.app.checker import Checked, Checker
 from executive.cli.options import takes_request
-from executive.cli.output import BAD_INPUT, console_for, print_json
+from executive.cli.output import BAD_INPUT, console_for, finish
 from executive.mission.request import Request
 from executive.tree.estimate import Estimate
 from executive.tree.node_view import node_view
@@ -39,14 +39,9 @@ def check(
     """Check mission files without running them: commands, tree, paths on the map, time and battery."""
     checker = Checker(request)
     checked = [checker.check_file(file) for file in files]
-    if as_json:
-        print_json(to_json(checked))
-    else:
-        console = console_for(as_json=False)
-        for one in checked:
-            _show(one, console, verbose=verbose)
-    if not all(one.ok for one in checked):
-        raise typer.Exit(BAD_INPUT)
+    for one in () if as_json else checked:
+        _show(one, console_for(as_json=False), verbose=verbose)
+    finish(to_json(checked), as_json, good=all(one.ok for one in checked), otherwise=BAD_INPUT)
 
 
 def to_json(checked: Sequence[Checked]) -> dict[str, Any]:

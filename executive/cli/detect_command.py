@@ -15,7 +15,7 @@ from rich.console import Console
 
 from executive.app.pictures import detector_of, drawn, read_picture, write_picture
 from executive.cli.number_options import quantity_option
-from executive.cli.output import BAD_INPUT, console_for, print_json, show_table
+from executive.cli.output import BAD_INPUT, console_for, finish, show_table
 from skills.detection import Detection, Detector
 from skills.files.errors import InputError
 from skills.perception.detector.onnx_detector import DetectorOptions
@@ -62,12 +62,10 @@ def detect(
     for one in looked:
         if one.error is not None:
             typer.echo(f"errand: {one.error}", err=True)
-    if as_json:
-        print_json([one.to_json() for one in looked])
-    else:
+    if not as_json:
         _show(console_for(as_json), looked)
-    if any(one.error is not None for one in looked):
-        raise typer.Exit(BAD_INPUT)
+    good = all(one.error is None for one in looked)
+    finish([one.to_json() for one in looked], as_json, good=good, otherwise=BAD_INPUT)
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,11 @@ import gc
 import os
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from types import FunctionType
 from typing import Any, Final, NoReturn
 
@@ -21,13 +22,19 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-from executive.cli.plugin_commands import help_lines, plugin_command
-from skills.files.errors import MOST_LETTERS, InputError, one_line
+from skills.files.errors import MOST_LETTERS, InputError, listing, one_line
 
-__all__ = ["app", "as_command", "command_line", "loaded", "main"]
+__all__ = ["COMMANDS_GROUP", "app", "as_command", "command_line", "help_lines", "loaded", "main", "plugin_command"]
 
 _COLLECTED_AFTER: Final = (30_000, 20, 50)
 """So many new objects, collections of young ones, and of middle-aged ones: imports make many objects that all stay."""
+
+
+COMMANDS_GROUP: Final = "errand.commands"
+"""The entry-point group of plug-ins: name = the word after `errand`, value = a `typer.Typer` or a function with typer's
+options."""
+_KNOWN: Final[Mapping[str, str]] = {"dataset": "errand-train"}
+"""Commands of the project's other distribution."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +103,57 @@ def as_command(name: str, found: Any) -> Any:
     return get_command(alone)
 
 
+def help_lines(shipped: Collection[str]) -> dict[str, str]:
+    """The commands of plug-ins by name, each with the summary of its distribution. Imports none of their code.
+
+    It reads the metadata files itself, because importing `importlib.metadata` takes longer than the whole help.
+    """
+    lines = dict[str, str]()
+    for folder in map(Path, sys.path):
+        for info in (*folder.glob("*.dist-info"), *folder.glob("*.egg-info")):
+            section = _text(info / "entry_points.txt").partition(f"[{COMMANDS_GROUP}]\n")[2].partition("\n[")[0]
+            names = [line.partition("=")[0].strip() for line in section.splitlines() if "=" in line]
+            lines |= {name: _summary(info) for name in names if name not in shipped}
+    return dict(sorted(lines.items()))
+
+
+def _summary(info: Path) -> str:
+    metadata = _text(info / "METADATA") or _text(info / "PKG-INFO")
+    found = (line.removeprefix("Summary: ") for line in metadata.splitlines() if line.startswith("Summary: "))
+    return next(found, f"A command of {info.stem.partition('-')[0]}.")
+
+
+def _text(file: Path) -> str:
+    with suppress(OSError):
+        return file.read_text(encoding="utf-8", errors="replace")
+    return ""
+
+
+def plugin_command(name: str) -> Any | None:
+    """The command of a plug-in, or None if no distribution registers the name.
+
+    Raises InputError if the command cannot be loaded, several distributions register it, or it belongs to errand-train,
+    which is not installed.
+    """
+    from skills.files.plugins import PluginDefect, distribution_of, installed_plugins, run_plugin
+
+    found = [entry for entry in installed_plugins(COMMANDS_GROUP) if entry.name == name]
+    if not found:
+        if name in _KNOWN:
+            what = f"'{name}' is a command of {_KNOWN[name]}, which is not installed"
+            raise InputError(what, hint="run `make train` in a clone of Errand")
+        return None
+    if len(found) > 1:
+        what = f"{listing(sorted(map(distribution_of, found)))} both have a command '{name}'"
+        raise InputError(what, hint="uninstall one of them")
+    (entry,) = found
+    try:
+        return run_plugin(entry, lambda: as_command(name, entry.load()))
+    except PluginDefect as defect:
+        what = f"cannot load command '{name}' ({entry.value}) of {distribution_of(entry)}: {defect}"
+        raise InputError(what, hint="repair or uninstall that distribution") from defect
+
+
 class _LazyGroup(TyperGroup):
     """Lists all commands by their line of help, imports the one that is resolved, and shows errors of usage short."""
 
@@ -115,7 +173,7 @@ class _LazyGroup(TyperGroup):
         """The command that the first argument names, imported."""
         if args and args[0] in COMMANDS:
             self.add_command(loaded(args[0]), args[0])
-        elif args and (found := plugin_command(args[0], as_command)) is not None:
+        elif args and (found := plugin_command(args[0])) is not None:
             self.add_command(found, args[0])
         return super().resolve_command(ctx, args)
 

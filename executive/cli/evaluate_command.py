@@ -15,7 +15,7 @@ import typer
 
 from executive.cli.number_options import quantity_option
 from executive.cli.options import ANYWAY, AS_JSON, request_arguments, takes_request
-from executive.cli.output import console_for, finish, plain_lines, show_table, terminal_answerer, write_text
+from executive.cli.output import console_for, finish, plain_lines, show_table, terminal_answerer, writing
 from executive.mission.request import Request
 from skills.files.errors import InputError
 from skills.quantities import Count
@@ -268,9 +268,11 @@ def report(
                 other = _evaluated(compared_with).cases
         _show_report(console, found, other)
         if html is not None:
-            write_text(html, to_page(found, kept.evidence, command_of, against=other, other=str(against or "")))
+            page = to_page(found, kept.evidence, command_of, against=other, other=str(against or ""))
+            with writing(html):
+                html.write_text(page, encoding="utf-8")
             console.print(f"Written: {html}", markup=False)
-        finish(summary_json(found, command_of, other) if as_json else None, as_json)
+        finish(summary_json(found, command_of, other), as_json)
 
 
 def _evaluated(kept: ResultsFile) -> Evaluated:

@@ -10,7 +10,7 @@ import typer
 
 from executive.app.report import VERDICTS
 from executive.cli.options import AS_JSON, QUIET, VIEW, VIEW_FOR, VIEW_PORT, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, show_table
+from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, show_table
 from executive.mission.request import Request
 from executive.store.given import GivenMissions
 from executive.store.missions import STORE as STORE_NAME
@@ -101,8 +101,7 @@ def status(queue: Queue, as_json: AS_JSON = False) -> None:
         names = {each.id: each.request.name for each in missions.missions()}
     header = ("mission", "name", "robot", "state", "after", "referee", "reassigned", "message")
     show_table(console_for(as_json), header, [_row(each, names) for each in results])
-    if as_json:
-        print_json({"missions": results})
+    finish({"missions": results}, as_json)
 
 
 def _store(queue: Path) -> Path:

@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.text import Text
 
 from executive.cli.number_options import quantity_option
-from executive.cli.output import console_for, show_table, terminal_answerer, write_text
+from executive.cli.output import console_for, show_table, terminal_answerer, writing
 from executive.record.history import Entry, History, read_history, timeline
 from executive.record.schemas import ERRORS
 from executive.tree.node_view import NodeView, node_view, to_json
@@ -55,26 +55,19 @@ def log(
         typer.echo(f"{write_ros2(history.events, ros2)} messages in {ros2}", err=True)
         return
     if map_file is not None:
-        _draw(history, map_file, at)
+        import cv2
+
+        from executive.view.map_picture import map_picture
+
+        _, png = cv2.imencode(".png", map_picture(history.events, at))
+        with writing(map_file):
+            map_file.write_bytes(png.tobytes())
+        typer.echo(f"the map is in {map_file}", err=True)
         return
     if as_json:
         sys.stdout.write(json.dumps(list(history.transitions()), ensure_ascii=False) + "\n")
         return
     _show(history, console_for(as_json=False), every_node=every_node)
-
-
-def _draw(history: History, file: Path, at_s: float) -> None:
-    """Write the map's picture. Raises InputError: it cannot be written."""
-    import cv2
-
-    from executive.view.map_picture import map_picture
-
-    _, png = cv2.imencode(".png", map_picture(history.events, at_s))
-    try:
-        file.write_bytes(png.tobytes())
-    except OSError as error:
-        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=file) from error
-    typer.echo(f"the map is in {file}", err=True)
 
 
 def _show(history: History, console: Console, *, every_node: bool) -> None:
@@ -121,7 +114,8 @@ def replay(
     if html is not None:
         from executive.view.html import log_page
 
-        write_text(html, log_page(history.events, recording))
+        with writing(html):
+            html.write_text(log_page(history.events, recording), encoding="utf-8")
         return
     _serve(history, recording, port, view_for)
 
@@ -184,7 +178,8 @@ def tree(
     if output is None:
         sys.stdout.write(text)
     else:
-        write_text(output, text)
+        with writing(output):
+            output.write_text(text, encoding="utf-8")
 
 
 def _view(text: str | None, say: str | None, world: str | None, at_s: float | None, robot: str | None) -> NodeView:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -17,7 +16,8 @@ import typer
 from executive.app.signals import cancelled_by_signals
 from executive.app.worlds import open_world
 from executive.cli.number_options import quantity_option
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json
+from executive.cli.options import AS_JSON
+from executive.cli.output import console_for, finish, writing
 from executive.run.control import Control
 from skills.files.errors import InputError
 from skills.files.outside import read_text
@@ -45,6 +45,7 @@ KEPT_EVERY_S: Final = 20.0
 """Seconds of the robot's clock between two lines, and of the wall's between two pictures and two savings."""
 MOST_POINTS: Final = 10_000
 PICTURE: Final = "map.png"
+_OTHER: Final = "name another --out"
 
 map_group = typer.Typer(name="map", help="Maps that the robot makes itself.", rich_markup_mode=None)
 
@@ -68,7 +69,7 @@ def build(
     people: Annotated[
         bool, typer.Option(help="Whether the world's people are there; who stands about becomes part of the map.")
     ] = True,
-    as_json: Annotated[bool, typer.Option("--json", help="The last line of output is the result as JSON.")] = False,
+    as_json: AS_JSON = False,
 ) -> None:
     """Explore a world, or follow a route, and save both grids and the pose graph."""
     console = console_for(as_json)
@@ -85,10 +86,7 @@ def build(
     if ended is not None:
         console.print(f"errand: the map is not complete: {ended}", markup=False)
     console.print(f"{result['map']}: {result['distance_m']} m driven, {result['loop_closures']} loops", markup=False)
-    if as_json:
-        print_json(result)
-    if ended is not None:
-        raise typer.Exit(NOT_ACHIEVED)
+    finish(result, as_json, good=ended is None)
 
 
 class _Building:
@@ -120,7 +118,7 @@ class _Building:
         if points is not None:
             there = (compose(world.start, Pose2D(x, y, 0.0)) for x, y in points)
             route = [(pose.x_m, pose.y_m) for pose in there]
-        with _writing(out):
+        with writing(out, _OTHER):
             out.mkdir(parents=True, exist_ok=True)
         lease = self._robot.acquire_lease("errand map")
         self._survey: Survey = Survey(self._robot, lease, mapper, home=world.start, route=route)
@@ -166,7 +164,7 @@ class _Building:
         mapper = self._mapper
         if not mapper.keyframes:
             raise InputError("no map was made", hint="look at the robot's LiDAR")
-        with _writing(self._out):
+        with writing(self._out, _OTHER):
             path = save_grids(self._out, surveyed(mapper))
         self._draw()
         pairs = [
@@ -205,25 +203,15 @@ class _Building:
         )
         draft = self._out / f".{PICTURE}"
         write_picture(draft, picture)
-        with _writing(self._out):
+        with writing(self._out, _OTHER):
             draft.replace(self._out / PICTURE)
 
     def _keep(self) -> None:
         """Save what the next run goes on from."""
         from skills.mapping.map_folder import save_graph
 
-        with _writing(self._out):
+        with writing(self._out, _OTHER):
             save_graph(self._out, self._mapper)
-
-
-@contextmanager
-def _writing(folder: Path) -> Iterator[None]:
-    """What cannot be written is bad input."""
-    try:
-        yield
-    except OSError as error:
-        hint = "name another --out"
-        raise InputError(f"the map cannot be written ({error.strerror})", hint=hint, file=folder) from error
 
 
 def _mapper(world: World, out: Path) -> Mapper:

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from executive.cli.number_options import quantity_option
-from executive.cli.output import print_json
+from executive.cli.options import AS_JSON
+from executive.cli.output import new_folder, print_json, writing
 from plant.models.imported import ImportedObject, read_imported
 from skills.files.errors import InputError, count_text
 from skills.perception.class_forms import class_forms
 from skills.quantities import Factor, Mass
 
-if TYPE_CHECKING:
-    from plant.models.builder.importing import Wanted
-
 __all__ = ["object_group"]
 
 PICTURE_PX = (640, 480)
-AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
 
 object_group = typer.Typer(name="object", help="Objects of your own, made of any mesh.", rich_markup_mode=None)
 
@@ -48,13 +45,16 @@ def import_command(
         str | None, typer.Option(help="The file's axis that is up: x, y or z; z, but y of glTF and what COLLADA says.")
     ] = None,
     close_holes: Annotated[bool, typer.Option("--close-holes", help="Close an open mesh where it is open.")] = False,
-    as_json: AsJson = False,
+    as_json: AS_JSON = False,
 ) -> None:
     """Make a model of a mesh: visual geometry, convex collision parts, and inertia from its volume and mass."""
-    from plant.models.builder.importing import Wanted
+    from plant.models.builder.importing import Wanted, import_object
 
     wanted = Wanted(name, mass, class_name, scale, up, close_holes)
-    made = _imported(mesh, wanted, out)
+    with _refused():
+        wanted.refuse_wrong()
+    with _refused(mesh), new_folder(out) as draft:
+        made = import_object(mesh, wanted, draft)
     if (doubt := _unlike_its_class(made)) is not None:
         typer.echo(f"errand: warning: {doubt}", err=True)
     if as_json:
@@ -67,7 +67,7 @@ def import_command(
 def show(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of `errand object import`.")],
     picture: Annotated[Path | None, typer.Option("--picture", help="Draw it into this file, PNG.")] = None,
-    as_json: AsJson = False,
+    as_json: AS_JSON = False,
 ) -> None:
     """Tell what an imported model holds: extents, mass, inertia, collision parts."""
     found = read_imported(folder)
@@ -85,37 +85,17 @@ def show(
     typer.echo(f"triangles         {found.triangles}")
 
 
-def _imported(mesh: Path, wanted: Wanted, out: Path) -> ImportedObject:
-    """Import beside the folder, and put it there when it is whole. Raises InputError."""
-    from plant.models.builder.importing import ObjectImportError, ObjectsExtraMissingError, import_object
+@contextmanager
+def _refused(mesh: Path | None = None) -> Iterator[None]:
+    """Raises InputError for what cannot be imported."""
+    from plant.models.builder.importing import ObjectImportError, ObjectsExtraMissingError
 
-    _refuse_wrong(wanted)
     try:
-        if out.exists() and (not out.is_dir() or any(out.iterdir())):
-            raise InputError("there is something already", hint="name a new folder by --out", file=out)
-        with tempfile.TemporaryDirectory(prefix="errand-object-") as draft:
-            made = import_object(mesh, wanted, Path(draft))
-            out.mkdir(parents=True, exist_ok=True)
-            for file in Path(draft).iterdir():
-                shutil.copyfile(file, out / file.name)
+        yield
     except ObjectImportError as error:
         raise InputError(error.message, hint=error.hint, file=mesh) from error
     except ObjectsExtraMissingError as error:
         raise InputError(str(error), hint="pip install 'spot-errand[objects]'") from error
-    except OSError as error:
-        hint = "name another --out"
-        raise InputError(f"the model cannot be written ({error.strerror})", hint=hint, file=out) from error
-    return made
-
-
-def _refuse_wrong(wanted: Wanted) -> None:
-    """Raises InputError."""
-    from plant.models.builder.importing import ObjectImportError
-
-    try:
-        wanted.refuse_wrong()
-    except ObjectImportError as error:
-        raise InputError(error.message, hint=error.hint) from error
 
 
 def _unlike_its_class(made: ImportedObject) -> str | None:
@@ -144,10 +124,8 @@ def _draw(folder: Path, found: ImportedObject, picture: Path) -> None:
     mesh = folder.resolve() / f"{found.name}.obj"
     if not mesh.is_file():
         raise InputError(f"{mesh.name} is missing", hint="import the object once more", file=folder)
-    try:
+    with writing(picture):
         save_png(picture, portrait(mesh, ball, found.size_m, PICTURE_PX))
-    except OSError as error:
-        raise InputError(f"the picture cannot be written ({error.strerror})", file=picture) from error
 
 
 def _in_words(made: ImportedObject) -> str:

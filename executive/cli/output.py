@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import errno
 import json
+import shutil
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
@@ -26,12 +29,13 @@ __all__ = [
     "ask_at_terminal",
     "console_for",
     "finish",
+    "new_folder",
     "plain_lines",
     "print_json",
     "refuse",
     "show_table",
     "terminal_answerer",
-    "write_text",
+    "writing",
 ]
 
 NOT_ACHIEVED = 1
@@ -60,12 +64,14 @@ def print_json(value: Mapping[str, Any] | Sequence[Any]) -> None:
     sys.stdout.flush()
 
 
-def finish(values: Mapping[str, Any] | Sequence[Any] | None, as_json: bool, *, good: bool = True) -> None:
-    """Ends a command: prints its result where a script asks for it, and exits with NOT_ACHIEVED unless it is good."""
-    if as_json and values is not None:
+def finish(
+    values: Mapping[str, Any] | Sequence[Any], as_json: bool, *, good: bool = True, otherwise: int = NOT_ACHIEVED
+) -> None:
+    """Ends a command: prints its result where a script asks for it; unless it is good, exits with another status."""
+    if as_json:
         print_json(values)
     if not good:
-        raise typer.Exit(NOT_ACHIEVED)
+        raise typer.Exit(otherwise)
 
 
 def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> None:
@@ -103,12 +109,28 @@ def refuse(error: InputError | OSError) -> NoReturn:
     raise typer.Exit(BAD_INPUT) from error
 
 
-def write_text(file: Path, text: str) -> None:
-    """Writes a file that the user names. Raises InputError: it cannot be written."""
+@contextmanager
+def writing(file: Path, hint: str = "name another file") -> Iterator[None]:
+    """Writes a file or a folder that the user names. Raises InputError: it cannot be written."""
     try:
-        file.write_text(text, encoding="utf-8")
+        yield
     except OSError as error:
-        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=file) from error
+        raise InputError(f"cannot write it ({error.strerror})", hint=hint, file=file) from error
+
+
+@contextmanager
+def new_folder(out: Path) -> Iterator[Path]:
+    """A draft beside a new folder, put there when it is whole. Raises InputError: there is something, or it cannot be.
+
+    A draft that raises leaves nothing.
+    """
+    with writing(out, "name another --out"):
+        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+            raise InputError("there is something already", hint="name a new folder by --out", file=out)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}-") as draft:
+            yield Path(draft)
+            shutil.copytree(draft, out, dirs_exist_ok=True)
 
 
 def terminal_answerer() -> Answerer | None:

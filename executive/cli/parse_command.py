@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from executive.app.worlds import knowledge_of, open_world
-from executive.cli.output import BAD_INPUT, print_json, write_text
+from executive.cli.output import BAD_INPUT, print_json, writing
 from executive.language.explain import arcs_svg, explain, explanation_lines
 from executive.language.parser import load_parser
 from executive.language.understand import Status, Understanding, understand
@@ -90,7 +90,8 @@ def _echo(lines: Iterable[str], as_json: bool) -> None:
 def _draw(meaning: Understanding, file: Path) -> None:
     if meaning.trace is None or not meaning.trace.tokens:
         raise InputError("there are no words to draw", hint="give a sentence in English words", file=file)
-    write_text(file, arcs_svg(explain(meaning.trace).tokens))
+    with writing(file):
+        file.write_text(arcs_svg(explain(meaning.trace).tokens), encoding="utf-8")
 
 
 def _lines_of(file: Path | None) -> list[str]:

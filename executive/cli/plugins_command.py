@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import EntryPoint, entry_points
 from typing import Annotated, Final
 
 import typer
 
-from executive.cli import plugin_commands
-from executive.cli.entry import COMMANDS, as_command
+from executive.cli.entry import COMMANDS, COMMANDS_GROUP, as_command
 from executive.cli.number_options import quantity_option
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, show_table
+from executive.cli.output import console_for, finish, show_table
 from executive.store import trigger_source
 from executive.tree import registry
 from plant import kinds
@@ -60,15 +59,12 @@ def plugins(
     else:
         rows = [(each.group, each.name, each.distribution, each.value, each.broken or "can be used") for each in found]
         show_table(console, ("group", "name", "distribution", "value", ""), rows)
-    if as_json:
-        print_json({"plugins": [asdict(each) for each in found]})
-    if any(each.broken for each in found):
-        raise typer.Exit(NOT_ACHIEVED)
+    finish({"plugins": [asdict(each) for each in found]}, as_json, good=not any(each.broken for each in found))
 
 
 def groups() -> Sequence[str]:
     """The entry-point groups that errand reads."""
-    return (registry.GROUP, *SLOTS.values(), kinds.GROUP, trigger_source.GROUP, plugin_commands.GROUP)
+    return (registry.GROUP, *SLOTS.values(), kinds.GROUP, trigger_source.GROUP, COMMANDS_GROUP)
 
 
 def _of_others() -> Sequence[EntryPoint]:
@@ -83,28 +79,21 @@ def _key(entry: EntryPoint) -> str:
 def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
     """What becomes of a plug-in that is loaded in a process of its own."""
     plugin = Plugin(entry.group, entry.name, distribution_of(entry), entry.value)
-    clash = next((each for each in _of_name(entry) if _key(each) != _key(entry)), None)
+    namesakes = entry_points(group=entry.group, name=entry.name)
+    clash = next((each for each in namesakes if _key(each) != _key(entry)), None)
     if clash is not None:
-        return Plugin(*_facts(plugin), f"{distribution_of(clash)} registers the same name")
-    if entry.group == plugin_commands.GROUP and entry.name in COMMANDS:
-        return Plugin(*_facts(plugin), "a command of Errand has this name")
+        return replace(plugin, broken=f"{distribution_of(clash)} registers the same name")
+    if entry.group == COMMANDS_GROUP and entry.name in COMMANDS:
+        return replace(plugin, broken="a command of Errand has this name")
     command = [sys.executable, "-m", "executive.cli", "plugins", "--load", _key(entry), "--limit", str(limit_s)]
     try:
         ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=limit_s + _MORE_S)
     except subprocess.TimeoutExpired:
-        return Plugin(*_facts(plugin), f"it is not loaded within {limit_s:g} s")
+        return replace(plugin, broken=f"it is not loaded within {limit_s:g} s")
     if ended.returncode == 0:
         return plugin
     last = ended.stderr.strip().rpartition("\n")[2].removeprefix("errand: ")
-    return Plugin(*_facts(plugin), last or f"its process ended with status {ended.returncode}")
-
-
-def _facts(plugin: Plugin) -> tuple[str, str, str, str]:
-    return plugin.group, plugin.name, plugin.distribution, plugin.value
-
-
-def _of_name(entry: EntryPoint) -> Iterable[EntryPoint]:
-    return entry_points(group=entry.group, name=entry.name)
+    return replace(plugin, broken=last or f"its process ended with status {ended.returncode}")
 
 
 def _load(key: str, limit_s: float) -> None:
@@ -114,7 +103,7 @@ def _load(key: str, limit_s: float) -> None:
         raise InputError(f"there is no plug-in {key}")
     if entry.group == registry.GROUP:
         registry.skills_of([entry], limit_s=limit_s)
-    is_command = entry.group == plugin_commands.GROUP
+    is_command = entry.group == COMMANDS_GROUP
     try:
         run_plugin(entry, lambda: as_command(entry.name, entry.load()) if is_command else entry.load(), limit_s=limit_s)
     except PluginDefect as defect:

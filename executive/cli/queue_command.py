@@ -14,7 +14,7 @@ from executive.app.prepare import prepare
 from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON, QUIET, STORE, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, show_table, terminal_answerer
+from executive.cli.output import console_for, finish, plain_lines, show_table, terminal_answerer
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
@@ -93,8 +93,7 @@ def add(
     wake_server(store or out / STORE_NAME)
     said = "is queued" if trigger is None else f"stands, to be queued by `errand queue serve` ({trigger})"
     console_for(as_json).print(f"Mission {mission.id} {said}: {request.name}", markup=False)
-    if as_json:
-        print_json(_told(mission, standing))
+    finish(_told(mission, standing), as_json)
 
 
 @queue.command(name="list")
@@ -105,8 +104,7 @@ def show(out: Out = Path("out"), store: STORE = None, as_json: AS_JSON = False) 
         standing = {each.id: each for each in StandingMissions(missions).missions()}
     header = ("mission", "state", "name", "world", "seed", "commands", "message", "trigger")
     show_table(console_for(as_json), header, [_row(each, standing) for each in known])
-    if as_json:
-        print_json({"missions": [_told(each, standing) for each in known]})
+    finish({"missions": [_told(each, standing) for each in known]}, as_json)
 
 
 @queue.command()
@@ -142,36 +140,25 @@ def run(
         console.print("Nothing is queued; `errand queue add` queues a mission, `errand queue list` shows all.")
     if resumable is not None:
         console.print(resumable, markup=False)
-    if as_json:
-        print_json({"missions": [each.to_json() for each in ended]})
-    if not all(each.achieved for each in ended):
-        raise typer.Exit(NOT_ACHIEVED)
-
-
-def _state(mission: StoredMission) -> str:
-    return "running or broken off" if mission.state is MissionState.RUNNING else mission.state.value
+    finish({"missions": [each.to_json() for each in ended]}, as_json, good=all(each.achieved for each in ended))
 
 
 def _row(mission: StoredMission, standing: Mapping[int, StandingMission]) -> tuple[str, ...]:
     asked, commands = mission.request, "\n".join(mission.request.commands)
+    state = "running or broken off" if mission.state is MissionState.RUNNING else mission.state.value
     trigger = f"{mission.standing}: {mission.why}" if mission.why else ""
     if (stands := standing.get(mission.id)) is not None:
         due = _due(stands)
         timed = isinstance(stands.trigger, Timed)
         trigger = f"{stands.trigger}{f', next {due:%a %Y-%m-%d %H:%M}' if due else ', over' if timed else ''}"
-    told = (asked.name, asked.world_name, str(asked.seed), commands, mission.message, trigger)
-    return str(mission.id), _state(mission), *told
+    return str(mission.id), state, asked.name, asked.world_name, str(asked.seed), commands, mission.message, trigger
 
 
 def _told(mission: StoredMission, standing: Mapping[int, StandingMission]) -> dict[str, Any]:
     asked = mission.request
-    told: dict[str, Any] = {
-        "mission": mission.id,
-        "state": mission.state.value,
-        "name": asked.name,
-        "world": asked.world_name,
-    }
-    told |= {"seed": asked.seed, "commands": list(asked.commands), "message": mission.message}
+    told: dict[str, Any] = {"mission": mission.id, "state": mission.state.value, "name": asked.name}
+    told |= {"world": asked.world_name, "seed": asked.seed, "commands": list(asked.commands)}
+    told["message"] = mission.message
     if (stands := standing.get(mission.id)) is not None:
         due = _due(stands)
         told |= {"trigger": str(stands.trigger), "next": None if due is None else due.isoformat()}
@@ -196,9 +183,8 @@ def _trigger(at: str | None, every: str | None, on: str | None, missed: Missed |
     if missed is not None and (trigger is None or isinstance(trigger, OnCall | OnTopic)):
         what = "without a trigger" if trigger is None else f"for '{trigger}'"
         hint = "leave it out: calls and messages are queued as they come, and only while `errand queue serve` runs"
-        raise InputError(
-            f"--missed says nothing {what}", hint=hint if trigger else "give --at, --every or --on as well"
-        )
+        hint = hint if trigger else "give --at, --every or --on as well"
+        raise InputError(f"--missed says nothing {what}", hint=hint)
     if isinstance(trigger, OnTopic):
         refuse_missing_source(trigger.kind)
     return trigger
@@ -228,19 +214,13 @@ def serve(
     from executive.cli.screen import ConsoleScreen
 
     console = console_for(as_json)
-    limit = None if for_s is None else timedelta(seconds=min(for_s, _LONGEST_S))
-
-    def tell(line: str) -> None:
-        console.print(line, markup=False)
-
+    tell = plain_lines(console)
     with MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
-        end = None if limit is None else missions.now() + limit
+        end = None if for_s is None else missions.now() + timedelta(seconds=min(for_s, _LONGEST_S))
         address = CallAddress(host, port, token)
         with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
-            standing, runner = (
-                StandingMissions(missions),
-                MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer()),
-            )
+            standing = StandingMissions(missions)
+            runner = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
             server = QueueServer(missions, standing, wakeup, runner, follow=listeners.follow, tell=tell)
             with ended_by_signals(server.stop):
                 tell(f"Standing missions: {len(standing.missions())} ({missions.path}). Ctrl-C ends.")
@@ -249,8 +229,7 @@ def serve(
     tell(f"{sum(each.achieved for each in ended)} of {len(ended)} missions achieved")
     if resumable is not None:
         tell(resumable)
-    if as_json:
-        print_json({"missions": [{"mission": e.mission, "outcome": e.outcome, "achieved": e.achieved} for e in ended]})
+    finish({"missions": [{"mission": e.mission, "outcome": e.outcome, "achieved": e.achieved} for e in ended]}, as_json)
 
 
 def resume(
@@ -270,10 +249,8 @@ def resume(
         chosen = _broken_off(missions, mission)
         runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
         ended = [runs.run(chosen), *(run_in_turn(queued_missions(missions), runs) if chosen.queued else ())]
-    if as_json:
-        print_json({**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]})
-    if not all(each.achieved for each in ended):
-        raise typer.Exit(NOT_ACHIEVED)
+    values = {**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]}
+    finish(values, as_json, good=all(each.achieved for each in ended))
 
 
 def _broken_off(missions: MissionStore, number: int | None) -> StoredMission:

@@ -166,12 +166,6 @@ def keys_pressed(keys: Pressed, descriptor: int | None = None) -> Iterator[bool]
             termios.tcsetattr(source, termios.TCSADRAIN, before)
 
 
-def keys_available() -> bool:
-    """Whether somebody sits at a terminal."""
-    source = _stdin()
-    return source is not None and os.isatty(source)
-
-
 def _read(source: int, wake: int, keys: Pressed) -> None:
     while True:
         ready, _, _ = select.select([source, wake], [], [])

@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -68,6 +68,7 @@ class HeardSpeech(RunVisitor):
         return message
 
 
+@dataclass
 class ConsoleScreen:
     """Shows runs on the console, and has them controlled from there (`executive.app.runs.Screen`).
 
@@ -75,23 +76,17 @@ class ConsoleScreen:
     of a tree are shown in the end, and `profile` times the subsystems.
     """
 
-    def __init__(
-        self,
-        console: Console,
-        *,
-        quiet: bool,
-        whole_tree: bool = False,
-        voice: Voice = SILENCE,
-        page: Callable[[Prepared], PageView] | None = None,
-        profile: Profile | None = None,
-    ) -> None:
-        self._console, self._quiet, self._whole_tree, self._voice = console, quiet, whole_tree, voice
-        self._page, self._profile = page, profile
-        self.shown_page: PageView | None = None
+    console: Console
+    quiet: bool
+    whole_tree: bool = False
+    voice: Voice = SILENCE
+    page: Callable[[Prepared], PageView] | None = None
+    profile: Profile | None = None
+    shown_page: PageView | None = field(default=None, init=False)
 
     def tell(self, line: str, *, title: bool = False) -> None:
         """Show a line."""
-        self._console.print(line, markup=False, style="bold" if title else None)
+        self.console.print(line, markup=False, style="bold" if title else None)
 
     @contextmanager
     def watching(self, prepared: Prepared) -> Iterator[Watching]:
@@ -104,29 +99,29 @@ class ConsoleScreen:
             to = f"{each.mission.robot_name}: " if prepared.request.robots else ""
             for command in each.mission.commands:
                 self.tell(f"{to}{command}")
-        page = self.shown_page = None if self._page is None else self._page(prepared)
-        attended = self._console.is_terminal and sys.stdin.isatty() and not self._quiet
+        page = self.shown_page = None if self.page is None else self.page(prepared)
+        attended = self.console.is_terminal and sys.stdin.isatty() and not self.quiet
         control = Control(attended=attended, pace=1.0 if attended else None) if page is None else page.control
-        speech = HeardSpeech(self._console, self._voice, self._quiet)
-        if self._quiet and page is None:  # nobody speaks to the run
+        speech = HeardSpeech(self.console, self.voice, self.quiet)
+        if self.quiet and page is None:  # nobody speaks to the run
             load_parser().release()
-            yield Watching(control, (speech,), page, self._profile)
+            yield Watching(control, (speech,), page, self.profile)
             return
         talk = Talk(prepared, control) if page is None or page.talk is None else page.talk
         talk.set_missions()
-        shown = live_view(self._console, control, say=lambda text: talk.hear(text).text)
-        with nullcontext() if self._quiet else shown as view:
+        shown = live_view(self.console, control, say=lambda text: talk.hear(text).text)
+        with nullcontext() if self.quiet else shown as view:
             if control.attended and page is None:
                 load_ahead()
             visitors = (speech, talk) if view is None else (speech, view, talk)
-            yield Watching(control, visitors, page, self._profile)
+            yield Watching(control, visitors, page, self.profile)
 
     def conclude(self, finished: Finished) -> None:
         """Show the verdicts and the figures, after the whole tree where that is wanted."""
-        if self._whole_tree:
-            self._console.print(to_rich(finished.tree, collapsed=False))
+        if self.whole_tree:
+            self.console.print(to_rich(finished.tree, collapsed=False))
         for line in finished.report.lines():
-            self._console.print(line)
+            self.console.print(line)
 
     def name_files(self, out: Path) -> None:
         """Name what was left in a folder, but for what the store keeps there."""

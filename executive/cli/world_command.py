@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Final
@@ -16,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from executive.app.worlds import knowledge_of, open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, StartCommand, start_pose
+from executive.cli.output import new_folder, writing
 from plant.worlds.world import WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.files.errors import InputError, count_text
@@ -66,7 +65,6 @@ def from_map(
     cells = np.where(read.occupied, OCCUPIED, np.where(unknown, UNKNOWN, FREE)).astype(np.uint8)
     grid, pose = Grid(cells, read.origin_m, read.resolution_m), start_pose(start)
     _made(map_file, out, lambda folder: world_from_grid(folder, grid, start=pose, wall_height_m=wall_height))
-    _told(out)
 
 
 @world.command(cls=StartCommand)
@@ -83,7 +81,6 @@ def from_cylinders(
     around = [] if pose is None else [(pose.x_m, pose.y_m)]
     around += [] if read.goal is None else [read.goal]
     _made(file, out, lambda folder: world_from_cylinders(folder, read.cylinders, start=pose, around=around))
-    _told(out)
 
 
 @world.command()
@@ -106,10 +103,8 @@ def show(
         labels={name: (place.pose.x, place.pose.y) for name, place in facts.places.items()},
         doors=[(door.at, door.width) for door in facts.doors],
     )
-    try:
+    with writing(out):
         save_png(out, picture)
-    except OSError as error:
-        raise InputError(f"the picture cannot be written ({error.strerror})", file=out) from error
     counts = ((facts.places, "room"), (facts.doors, "door"), (facts.surfaces, "surface"))
     typer.echo(f"{out}: {', '.join(count_text(len(each), noun) for each, noun in counts)}")
 
@@ -137,24 +132,12 @@ def _cylinders(path: Path) -> _Cylinders:
 
 
 def _made(source: Path, out: Path, make: Callable[[Path], None]) -> None:
-    """Make a world beside its place, and put it there when it is whole. Raises InputError."""
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError("there is something already", hint="name a new folder by --out", file=out)
+    """Make a world, and say what was made; it is read once more, so that what is said is so. Raises InputError."""
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}-") as draft:
-            make(Path(draft))
-            shutil.copytree(draft, out, dirs_exist_ok=True)
+        with new_folder(out) as draft:
+            make(draft)
     except WorldError as error:
         raise InputError(str(error), file=source) from error
-    except OSError as error:
-        raise InputError(
-            f"the world cannot be written ({error.strerror})", hint="name another --out", file=out
-        ) from error
-
-
-def _told(out: Path) -> None:
-    """Say what was made; it is read once more, so that what is said is so."""
     made = open_world(str(out))
     facts = knowledge_of(made)
     start = f"{made.start.x_m:.2f} {made.start.y_m:.2f} {made.start.yaw_rad:.2f}"

@@ -19,7 +19,6 @@ import cv2
 import numpy as np
 
 from executive.cli import entry
-from executive.cli.plugin_commands import plugin_command
 from executive.mission.request import Request
 from executive.store.missions import MissionStore
 from executive.store.standing import StandingMissions
@@ -145,7 +144,7 @@ def places() -> list[Place]:
 def commands() -> dict[str, Any]:
     """All commands by the words that call them."""
     top = {name: entry.loaded(name) for name in entry.COMMANDS}
-    top["dataset"] = plugin_command("dataset", entry.as_command)
+    top["dataset"] = entry.plugin_command("dataset")
     return {" ".join(words): found for name, each in top.items() for words, found in _below((name,), each)}
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.cli.new_skill.render import render_skill
+from executive.cli.missions_command import render_skill
 from skills.files.errors import InputError
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.cli.run_keys import HELP, SAY_HELP, Keys, Typing, keys_available, keys_pressed, prompt_lines
+from executive.cli.run_keys import HELP, SAY_HELP, Keys, Typing, keys_pressed, prompt_lines
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.tree.node import NodeSpec
@@ -122,7 +122,6 @@ def test_the_terminal_is_put_back_after_an_exception(control, terminal):
 def test_nothing_is_read_where_there_is_no_terminal(control, tmp_path):
     with (tmp_path / "in").open("w+") as file, keys_pressed(Keys(control), file.fileno()) as heard:
         assert not heard
-    assert not keys_available()
 
 
 def test_waiting_for_keys_takes_no_time_of_the_processor(control, terminal):

@@ -14,8 +14,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from executive.app.scenarios import ScenarioFile
 from executive.mission.json_schema import mission_json_schema
-from executive.mission.scenario_file import ScenarioFile
 from executive.testing.skill_test import SkillTestFile
 from executive.tree.registry import built_in_skills
 from executive.tree.types import describe_type, field_types

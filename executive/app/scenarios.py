@@ -1,26 +1,32 @@
-"""Puts a scenario into a request and its world: faults checked and drawn, places and doors found."""
+"""Scenario files: faults by their words, how many more the seed draws, and events; put into a request and its world."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Final
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Final
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from executive.mission.request import Request
-from executive.mission.scenario import Scenario
-from executive.mission.scenario_file import checked_fault, load_scenario, scenario_of
-from executive.words.knowledge import Knowledge
-from executive.words.mission import Route
+from executive.mission.scenario import RandomFaults, Scenario
+from executive.words.knowledge import Corner, Knowledge
+from executive.words.mission import Route, Stop
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import DoorRule, MoveRule, World, WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
-from skills.faults.words import random_faults
-from skills.files.errors import InputError
+from skills.faults.words import parse_fault, random_faults
+from skills.files.errors import InputError, Problems, suggestion
+from skills.files.schema import Name, Text, validate
+from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
+from skills.quantities import Coordinate, Delay, Height, Speed
 from skills.robot import FloatArray
 
-__all__ = ["with_events", "with_scenario"]
+__all__ = ["EventFile", "ScenarioFile", "read_scenario", "with_events", "with_scenario"]
 
 DIRECTIONS: Final = 36
 _STEP_M: Final = 0.01
@@ -35,12 +41,11 @@ def with_scenario(request: Request, world: World, knowledge: Knowledge) -> Reque
     cameras = tuple(camera.source for camera in spot_capabilities().cameras)
     scenario = request.scenario
     for words in scenario.faults:
-        checked_fault(words, cameras)
+        _check_fault(words, cameras, lambda what, hint: InputError(what, hint=hint))
     objects = {rule.name: _class_of(rule.model, world) for rule in world.seed_rules.objects}
     people = {rule.name: rule.route is not None for rule in world.seed_rules.people}
     for path in request.scenario_files:
-        file, source = load_scenario(path)
-        read = scenario_of(file, source, knowledge, cameras=cameras, objects=objects, people=people)
+        read = read_scenario(path, knowledge, cameras=cameras, objects=objects, people=people)
         twice = read.moving & scenario.moving
         if twice:
             raise InputError(f"another scenario has an event of {min(twice)}", hint="keep one of them", file=path)
@@ -106,3 +111,196 @@ def _occupied(grid: GridMap, points_W: FloatArray) -> Any:
     rows, columns = grid.cells(points_W).T
     inside = (rows >= 0) & (rows < grid.occupied.shape[0]) & (columns >= 0) & (columns < grid.occupied.shape[1])
     return ~inside | grid.occupied[np.where(inside, rows, 0), np.where(inside, columns, 0)]
+
+
+_KINDS: Final = ("person", "door", "object")
+_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
+    "person": ("at", "to", "from", "speed", "loop", "yields"),
+    "door": ("closes", "opens"),
+    "object": ("at", "to"),
+}
+
+
+Spot = tuple[Coordinate, Coordinate, Height]
+Stops = Annotated[tuple[Corner | Name | Stop, ...], Field(min_length=1)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, defer_build=True)
+
+
+class EventFile(_Strict):
+    """Something that happens: exactly one of `person`, `door` and `object` says to whom or what."""
+
+    person: Name | None = Field(None, description="Somebody who walks; known in the world, or somebody new.")
+    door: tuple[Name, Name] | None = Field(None, description="The two rooms that a door joins.")
+    object: Name | None = Field(None, description="An object by its name in the world, or the first of a class.")
+    at: Delay | None = Field(None, description="When, on the robot's clock: `20`, `20 s` or `2 min`.")
+    to: Corner | Spot | Name | Stops | None = Field(
+        None,
+        description="A person: a place, a point [x, y], or a list of them with pauses. An object: a surface, or "
+        "[x, y, z] of what it is put on, in metres.",
+    )
+    from_: Corner | Name | None = Field(None, alias="from", description="Where somebody new stands at first.")
+    speed: Speed = Field(1.2, description="How fast the person walks, in m/s.")
+    loop: StrictBool = Field(False, description="Whether the person goes on from the first place after the last.")
+    yields: StrictBool = Field(True, description="Whether the person stops for a robot that is close ahead.")
+    closes: Delay | None = Field(None, description="When the door begins to close.")
+    opens: Delay | None = Field(None, description="When it begins to open; alone, it is closed at first.")
+
+    @model_validator(mode="after")
+    def _of_one_kind(self) -> EventFile:
+        named = [kind for kind in _KINDS if getattr(self, kind) is not None]
+        if len(named) != 1:
+            raise ValueError("give exactly one of 'person', 'door' and 'object'")
+        given = {name.removesuffix("_") for name in self.model_fields_set} - {named[0]}
+        strange = sorted(given - {*_KEYS[named[0]]})
+        if strange:
+            raise ValueError(f"'{strange[0]}' is none of the keys of a {named[0]}: {', '.join(_KEYS[named[0]])}")
+        if named[0] == "door" and self.closes is None and self.opens is None:
+            raise ValueError("a door needs 'closes' or 'opens'")
+        if named[0] != "door" and (self.at is None or self.to is None):
+            raise ValueError(f"a {named[0]} needs 'at' and 'to'")
+        spot = isinstance(self.to, tuple) and len(self.to) == 3 and isinstance(self.to[0], float)
+        if named[0] == "person" and spot:
+            raise ValueError("a person walks to a point [x, y], without a height")
+        if named[0] == "object" and not (spot or isinstance(self.to, str)):
+            raise ValueError("an object is moved to a surface, or to a point [x, y, z], z of what it is put on")
+        return self
+
+
+class ScenarioFile(_Strict):
+    """Faults and events while a mission runs."""
+
+    faults: tuple[Text, ...] = Field(default=(), description="Faults by their words.")
+    random: RandomFaults = Field(0, description="How many more faults the run's seed draws.")
+    events: tuple[EventFile, ...] = Field(default=(), description="What happens in the world.")
+
+
+def _check_fault(words: str, cameras: tuple[str, ...], refusal: Callable[[str, str], InputError]) -> None:
+    """Raises InputError, made of a sentence and a hint: there is no such fault."""
+    try:
+        parse_fault(words, cameras=cameras)
+    except ValueError as error:
+        what, _, hint = str(error).partition("; ")
+        raise refusal(what, hint) from error
+
+
+def read_scenario(
+    path: Path,
+    knowledge: Knowledge,
+    *,
+    cameras: tuple[str, ...],
+    objects: Mapping[str, str],
+    people: Mapping[str, bool],
+) -> Scenario:
+    """The scenario of a file in a world, its places as points.
+
+    `cameras` are the robot's, `objects` the classes of the world's objects by their names, `people` tells of those in
+    the world whether they walk already.
+
+    Raises:
+        InputError: a key is wrong, or a fault, place, door, object or person is not there; with the line.
+    """
+    source = read_yaml(path)
+    file, problems = validate(ScenarioFile, source), Problems()
+    for number, words in enumerate(file.faults):
+        with problems:
+            _check_fault(words, cameras, partial(source.error, ("faults", number)))
+    reader = _Events(source, knowledge, objects, people)
+    for number, event in enumerate(file.events):
+        with problems:
+            reader.take(event, ("events", number))
+    problems.raise_any()
+    return Scenario(file.faults, file.random, reader.people, tuple(reader.doors), tuple(reader.moves))
+
+
+class _Events:
+    """Collects the events of a file, each checked against the world."""
+
+    def __init__(
+        self, source: YamlSource, knowledge: Knowledge, objects: Mapping[str, str], known_people: Mapping[str, bool]
+    ) -> None:
+        self._source, self._knowledge = source, knowledge
+        self._objects, self._known_people = objects, known_people
+        self.people: dict[str, Mapping[str, Any]] = {}
+        self.doors: list[Mapping[str, Any]] = []
+        self.moves: list[Mapping[str, Any]] = []
+
+    def take(self, event: EventFile, path: KeyPath) -> None:
+        """Take in one. Raises InputError."""
+        if event.person is not None:
+            self._walk(event, event.person, path)
+        elif event.door is not None:
+            self._door(event, event.door, path)
+        elif event.object is not None:
+            self._move(event, event.object, path)
+
+    def _walk(self, event: EventFile, said: str, path: KeyPath) -> None:
+        name = self._knowledge.person(said) or said
+        if name in self.people:
+            hint = "give its 'to' a list of places, with pauses"
+            raise self._source.error((*path, "person"), f"{name} has an event already", hint)
+        if self._known_people.get(name, False):
+            raise self._source.error((*path, "person"), f"{name} walks already", "take somebody who stands")
+        if name not in self._known_people and event.from_ is None:
+            hint = suggestion(said, self._known_people, f"add 'from', where {name} stands at first")
+            raise self._source.error((*path, "person"), f"there is no {said} in the world", hint)
+        if name in self._known_people and event.from_ is not None:
+            raise self._source.error((*path, "from"), f"{name} stands in the world already", "take 'from' out")
+        stops = _stops(event.to) if event.from_ is None else [Stop(at=event.from_, pause=0.0), *_stops(event.to)]
+        route = {"start": event.at, "speed": event.speed, "loop": event.loop, "yields": event.yields}
+        points = [{"at": self._point(stop.at, (*path, "to")), "pause": stop.pause} for stop in stops]
+        self.people[name] = {**route, "waypoints": points}
+
+    def _point(self, at: Corner | str, path: KeyPath) -> Corner:
+        """A place as a point."""
+        if not isinstance(at, str):
+            return at
+        place = self._knowledge.place(at)
+        if place is None:
+            hint = suggestion(at, self._knowledge.spellings(self._knowledge.place_names()), "give a point [x, y]")
+            raise self._source.error(path, f"unknown place {at!r}", hint)
+        pose = self._knowledge.place_pose(place)
+        return pose.x, pose.y
+
+    def _door(self, event: EventFile, rooms: tuple[str, str], path: KeyPath) -> None:
+        names = tuple(self._knowledge.place(room) or room for room in rooms)
+        doors = [door for door in self._knowledge.doors if set(door.between) == set(names)]
+        if not doors:
+            known = [" and ".join(door.between) for door in self._knowledge.doors]
+            hint = suggestion(" and ".join(names), known) if known else "list it under 'doors' in knowledge.yaml"
+            raise self._source.error((*path, "door"), f"no door is known between {rooms[0]} and {rooms[1]}", hint)
+        for number, door in enumerate(doors, 1):
+            name = f"door between {door.between[0]} and {door.between[1]}" + (f" ({number})" if number > 1 else "")
+            if any(other["name"] == name for other in self.doors):
+                raise self._source.error((*path, "door"), f"the {name} has an event already", "write one for each door")
+            times = {"closes": event.closes, "opens": event.opens}
+            self.doors.append({"name": name, "at": door.at, "width": door.width, **times})
+
+    def _move(self, event: EventFile, said: str, path: KeyPath) -> None:
+        classes = self._knowledge.classes(self._knowledge.thing(said) or said)
+        named = [name for name in self._objects if name.lower() == said.lower()]
+        of_class = [name for name, kind in self._objects.items() if kind in classes]
+        if not named and not of_class:
+            hint = suggestion(said, [*self._objects, *self._objects.values()])
+            raise self._source.error((*path, "object"), f"there is no {said!r} in the world", hint)
+        self.moves.append({"name": (named or of_class)[0], "at": event.at, "to": self._rest(event.to, (*path, "to"))})
+
+    def _rest(self, to: Any, path: KeyPath) -> str | Spot:
+        """The surface that is meant, or the point."""
+        if not isinstance(to, str):
+            x, y, z = to
+            return x, y, z
+        place = self._knowledge.place(to)
+        if place is None or place not in self._knowledge.surfaces:
+            what = f"{to!r} is no surface" if place is not None else f"unknown surface {to!r}"
+            hint = suggestion(to, self._knowledge.spellings(self._knowledge.surfaces), shown=self._knowledge.surfaces)
+            raise self._source.error(path, what, hint)
+        return place
+
+
+def _stops(to: Any) -> list[Stop]:
+    """Where a person goes, one after the other."""
+    single = isinstance(to, str) or isinstance(to[0], float | int)
+    return [each if isinstance(each, Stop) else Stop(at=each, pause=0.0) for each in ((to,) if single else to)]

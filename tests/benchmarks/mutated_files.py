@@ -22,10 +22,10 @@ import cv2
 import numpy as np
 
 from executive.app.evaluate.evaluation_file import load_evaluation
+from executive.app.scenarios import read_scenario
 from executive.language.parser import load_parser
 from executive.mission.load import for_robot, load_mission, overridden
 from executive.mission.resolve import mission_from_file
-from executive.mission.scenario_file import load_scenario, scenario_of
 from executive.mission.stack_file import load_stack
 from executive.testing.skill_test import load_skill_tests
 from executive.tree.compiler import compile_mission
@@ -119,8 +119,7 @@ def scenarios() -> Callable[[Path], None]:
     people = {rule.name: rule.route is not None for rule in rules.people}
 
     def read(path: Path) -> None:
-        file, source = load_scenario(path)
-        scenario_of(file, source, knowledge, cameras=CAMERAS, objects=objects, people=people)
+        read_scenario(path, knowledge, cameras=CAMERAS, objects=objects, people=people)
 
     return read
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from executive.app.scenarios import read_scenario
 from executive.mission.request import Request
-from executive.mission.scenario_file import load_scenario, scenario_of
 from executive.words.knowledge import Door, Knowledge, Person, Place, Pose, SurfaceFacts, ThingFacts
 from skills.files.errors import InputError
 
@@ -27,7 +27,7 @@ def read(tmp_path):
         path = tmp_path / "scenario.yaml"
         path.write_text(text, encoding="utf-8")
         people = {"Robin": False, "Kim": True}
-        return scenario_of(*load_scenario(path), KNOWLEDGE, cameras=("hand",), objects=OBJECTS, people=people)
+        return read_scenario(path, KNOWLEDGE, cameras=("hand",), objects=OBJECTS, people=people)
 
     return made
 

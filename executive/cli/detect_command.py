@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 from rich.console import Console
 
 from executive.app.pictures import detector_of, drawn, read_picture, write_picture
@@ -20,6 +18,7 @@ from skills.detection import Detection, Detector
 from skills.files.errors import InputError
 from skills.perception.detector.onnx_detector import DetectorOptions
 from skills.quantities import Share
+from skills.robot import Picture
 
 __all__ = ["detect"]
 
@@ -29,9 +28,11 @@ MOST_PIXELS_TOGETHER: Final = 8_000_000
 
 @dataclass(frozen=True)
 class Looked:
-    """What came of one file: what was found, its share of the time (ms), or why it could not be looked at."""
+    """A picture file, and where it is drawn: what was found, its share of the time (ms), or why it cannot be read."""
 
     file: Path
+    drawing: Path | None
+    picture: Picture | None = None
     found: tuple[Detection, ...] = ()
     ms: float = 0.0
     error: InputError | None = None
@@ -39,7 +40,8 @@ class Looked:
     def to_json(self) -> dict[str, Any]:
         """As JSON values; `error` only where there is one."""
         found = [
-            {"class": one.class_name, "score": round(one.score, 4), "box": _rounded(one.box)} for one in self.found
+            {"class": one.class_name, "score": round(one.score, 4), "box": [round(value, 2) for value in one.box]}
+            for one in self.found
         ]
         values: dict[str, Any] = {"file": str(self.file), "detections": found, "ms": round(self.ms, 3)}
         return values if self.error is None else {**values, "error": str(self.error)}
@@ -57,8 +59,8 @@ def detect(
     A picture that cannot be read does not keep the others from being looked at; the exit status is 2 then.
     """
     detector = detector_of(model, DetectorOptions(threshold=threshold))
-    names = _drawing_names(images, draw) if draw is not None else {}
-    looked = [one for group in _groups(images) for one in _look(detector, group, names)]
+    names: Sequence[Path | None] = [None] * len(images) if draw is None else _drawing_names(images, draw)
+    looked = [one for group in _groups(zip(images, names, strict=True)) for one in _look(detector, group)]
     for one in looked:
         if one.error is not None:
             typer.echo(f"errand: {one.error}", err=True)
@@ -68,23 +70,16 @@ def detect(
     finish([one.to_json() for one in looked], as_json, good=good, otherwise=BAD_INPUT)
 
 
-@dataclass(frozen=True)
-class _Read:
-    """A file, which is the k-th, and its picture, or why there is none."""
-
-    k: int
-    file: Path
-    picture: NDArray[np.uint8] | None = None
-    error: InputError | None = None
-
-
-def _groups(images: Sequence[Path]) -> Iterator[list[_Read]]:
+def _groups(files: Iterable[tuple[Path, Path | None]]) -> Iterator[list[Looked]]:
     """The files read, in groups that are looked at together: some pictures, or one that is very large."""
-    group, pixels = list[_Read](), 0
-    for k, file in enumerate(images):
-        group.append(_read(k, file))
-        picture = group[-1].picture
-        pixels += 0 if picture is None else picture.shape[0] * picture.shape[1]
+    group, pixels = list[Looked](), 0
+    for file, drawing in files:
+        try:
+            picture = read_picture(file)
+            pixels += picture.shape[0] * picture.shape[1]
+            group.append(Looked(file, drawing, picture))
+        except InputError as error:
+            group.append(Looked(file, drawing, error=error))
         if len(group) >= MOST_TOGETHER or pixels >= MOST_PIXELS_TOGETHER:
             yield group
             group, pixels = [], 0
@@ -92,35 +87,29 @@ def _groups(images: Sequence[Path]) -> Iterator[list[_Read]]:
         yield group
 
 
-def _read(k: int, file: Path) -> _Read:
-    try:
-        return _Read(k, file, read_picture(file))
-    except InputError as error:
-        return _Read(k, file, error=error)
-
-
-def _look(detector: Detector, group: Sequence[_Read], drawings: Mapping[int, Path]) -> list[Looked]:
+def _look(detector: Detector, group: Sequence[Looked]) -> Iterator[Looked]:
     """What is seen in each file, drawn where wished. Raises InputError when a drawing cannot be written."""
     pictures = [one.picture for one in group if one.picture is not None]
     begun = time.perf_counter()
     found = iter(detector.detect(pictures))
     ms = 1000.0 * (time.perf_counter() - begun) / max(1, len(pictures))
-    looked = [
-        Looked(one.file, error=one.error) if one.picture is None else Looked(one.file, next(found), ms) for one in group
-    ]
-    for read, seen in zip(group, looked, strict=True):
-        if read.picture is not None and read.k in drawings:
-            write_picture(drawings[read.k], drawn(read.picture, seen.found))
-    return looked
+    for one in group:
+        if one.picture is None:
+            yield one
+            continue
+        seen = next(found)
+        if one.drawing is not None:
+            write_picture(one.drawing, drawn(one.picture, seen))
+        yield replace(one, picture=None, found=seen, ms=ms)
 
 
-def _drawing_names(images: Sequence[Path], folder: Path) -> dict[int, Path]:
+def _drawing_names(images: Sequence[Path], folder: Path) -> Sequence[Path]:
     """Where each picture is drawn: under its own name, numbered where two have the same."""
     names = list[Path]()
     for image in images:
         stems = [image.stem, *(f"{image.stem}-{k}" for k in range(2, len(images) + 1))]
         names.append(next(folder / f"{stem}.png" for stem in stems if folder / f"{stem}.png" not in names))
-    return dict(enumerate(names))
+    return names
 
 
 def _show(console: Console, looked: Sequence[Looked]) -> None:
@@ -131,7 +120,3 @@ def _show(console: Console, looked: Sequence[Looked]) -> None:
         for k, row in enumerate(rows):
             table.append((str(one.file) if k == 0 else "", *row, f"{one.ms:.1f}" if k == 0 and not one.error else ""))
     show_table(console, ("picture", "class", "score", "box (u0, v0, u1, v1)", "ms"), table)
-
-
-def _rounded(box: tuple[float, float, float, float]) -> list[float]:
-    return [round(value, 2) for value in box]

@@ -21,11 +21,11 @@ from executive.record.schemas import TRANSITIONS
 from executive.run.outcome import Finding, RunResult, Said
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.tree.node_view import NodeView
-from executive.view.collapse import DRAWN_NODES, executed_tree, fold_to
 from executive.view.formats import to_svg
 from executive.view.html import render
 from executive.view.map_picture import map_picture
 from executive.view.styles import ROBOT_COLOURS, NodeStyle, Styles, style_of
+from executive.view.text import DRAWN_NODES, executed_tree, fold_to
 from executive.words.geometry import inside
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectObservation

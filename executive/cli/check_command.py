@@ -17,8 +17,7 @@ from executive.cli.output import BAD_INPUT, console_for, finish
 from executive.mission.request import Request
 from executive.tree.estimate import Estimate
 from executive.tree.node_view import node_view
-from executive.view.collapse import fold_to
-from executive.view.text import to_rich
+from executive.view.text import fold_to, to_rich
 from skills.files.errors import InputError, count_text, one_line
 
 SHOWN_NODES: Final = 40

@@ -20,10 +20,9 @@ from executive.cli.output import console_for, show_table, terminal_answerer, wri
 from executive.record.history import Entry, History, read_history, timeline
 from executive.record.schemas import ERRORS
 from executive.tree.node_view import NodeView, node_view, to_json
-from executive.view.collapse import DRAWN_NODES, MANY_NODES, fold_below, fold_to
 from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.styles import style_of
-from executive.view.text import printable, to_text
+from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, printable, to_text
 from skills.files.errors import InputError
 from skills.files.outside import is_file
 from skills.quantities import Count, Delay, Port, Tries, Wait

@@ -6,23 +6,28 @@ Write a class in a test file and pytest runs all of it:
         skill = Wave
         inputs = WaveInputs(times=2)
 
-`bench` may be overridden to put the robot elsewhere. The case must end in success when nothing goes wrong.
+`bench` may be overridden to put the robot elsewhere. The case must end in success when nothing goes wrong. Files
+`*.skilltest.yaml` are collected for pytest, and may ask for the suite.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from pathlib import Path
 from typing import Any, ClassVar
 
+import pytest
 from py_trees.common import Status
 
 from executive.testing.bench import SkillBench, SkillRun, scripted_bench
+from executive.testing.skill_test import BenchMakers, SkillTestFile, bench_of_setup, carry_out, load_skill_tests
 from skills.api import Cause, Skill
-from skills.faults.kinds import SENSE_VERBS, VERBS, Call, Effect, InjectedFault
+from skills.faults.kinds import SENSE_VERBS, STANDARD_FAULTS, VERBS, Call, Effect, FaultKind, InjectedFault
 from skills.faults.words import Fault
+from skills.files.errors import InputError
 from skills.robot import Capabilities
 from skills.testing.robot import ScriptedRobot
 
@@ -194,8 +199,78 @@ class SkillSuite:
         return SuiteCase(self.skill, self.inputs, lambda: self.bench(capabilities), self.samples)
 
 
-def _raise_findings(found: Iterator[str]) -> None:
+def _raise_findings(found: Iterable[str]) -> None:
     """Raises AssertionError with all findings, if there are any."""
     sentences = list(found)
     if sentences:
         raise AssertionError("\n".join(sentences))
+
+
+class SkillTestSettings:
+    """Settings of all skill tests of a session; a conftest may add to `fault_kinds` or replace benches in `makers`."""
+
+    def __init__(self, skills: Mapping[str, type[Skill[Any]]], makers: BenchMakers, capabilities: Capabilities) -> None:
+        self.skills, self.makers, self.capabilities = dict(skills), dict(makers), capabilities
+        self.fault_kinds: list[FaultKind] = [*STANDARD_FAULTS]
+
+
+class SkillTestModule(pytest.File):
+    """One file of skill tests."""
+
+    settings: SkillTestSettings
+
+    def collect(self) -> Iterable[pytest.Item]:
+        """The tests, and the parts of the suite if the file asks for them. A broken file is one error with its line."""
+        try:
+            tests = load_skill_tests(self.path, self.settings.skills, self.settings.fault_kinds)
+        except InputError as error:
+            raise self.CollectError(str(error)) from error
+        for index, test in enumerate(tests.tests):
+            yield self._item(tests, index, test.name, partial(self._carried_out, tests, index))
+            if tests.suite and test.expect.outcome == "success" and not test.faults:
+                case = self._case(tests, index)
+                for name, part in PARTS.items():
+                    yield self._item(tests, index, f"{test.name}: {name}", partial(part, case))
+
+    def _item(self, tests: SkillTestFile, index: int, name: str, findings: Callable[[], Iterable[str]]) -> pytest.Item:
+        item: SkillTestItem = SkillTestItem.from_parent(self, name=name, tests=tests, index=index, findings=findings)
+        return item
+
+    def _carried_out(self, tests: SkillTestFile, index: int) -> Iterator[str]:
+        """The report of a test that did not meet its expectation."""
+        settings = self.settings
+        trial = carry_out(tests, index, settings.skills[tests.skill], settings.makers, settings.fault_kinds)
+        if trial.differences:
+            yield trial.report()
+
+    def _case(self, tests: SkillTestFile, index: int) -> SuiteCase:
+        """A test for all parts of the suite, which share the run without faults; the robot is a scripted one."""
+        test, skill = tests.tests[index], self.settings.skills[tests.skill]
+        make = partial(bench_of_setup, self.settings.capabilities, test.robot or tests.robot, test.world or tests.world)
+        return SuiteCase(skill, tests.inputs(index, skill), make)
+
+
+class SkillTestItem(pytest.Item):
+    """A test, or a part of the suite, at one line of a file of skill tests; it fails where `findings` has any."""
+
+    def __init__(
+        self, *, tests: SkillTestFile, index: int, findings: Callable[[], Iterable[str]], **options: Any
+    ) -> None:
+        super().__init__(**options)
+        self.tests, self.index, self.findings = tests, index, findings
+
+    def runtest(self) -> None:
+        """Runs it. Raises pytest's exception of a failure."""
+        found = "\n".join(self.findings())
+        if found:
+            pytest.fail(found, pytrace=False)
+
+    def reportinfo(self) -> tuple[Path, int, str]:
+        """Where it stands: file, line (from 0), name."""
+        return self.path, self.tests.line(self.index) - 1, self.name
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        """A plain report for a failed test, and a traceback for a defect."""
+        if isinstance(excinfo.value, pytest.fail.Exception | InputError):
+            return f"{self.path}:{self.tests.line(self.index)}: skill '{self.tests.skill}'\n{excinfo.value}"
+        return super().repr_failure(excinfo, style)

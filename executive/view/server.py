@@ -11,23 +11,22 @@ import json
 import secrets
 import socket
 import threading
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Final
 
-from starlette.applications import Starlette
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import FileResponse, JSONResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from executive.view.feed import Feed
 from executive.view.html import PAGE_FOLDER
 from executive.view.page_control import Action, RefusedError
-from executive.view.serving import MAX_BODY, ServingThread, body_of
+from executive.view.serving import MAX_BODY, Server, body_of
 from skills.files.errors import InputError
 from skills.files.texts import json_object
 
@@ -48,18 +47,18 @@ class PageContent:
     recording: Path | None = None
 
 
-class PageServer:
-    """A running server of the page. Use it as a context manager, or call `close`."""
+class PageServer(Server):
+    """A running server of the page."""
 
     def __init__(self, content: PageContent, *, port: int = 0) -> None:
         """Starts serving; `port` 0 takes a free one. Raises OSError if the port is taken."""
         self._content = content
         self._token = secrets.token_urlsafe(24)
-        self._socket = socket.create_server((HOST, port))
-        self.port: int = self._socket.getsockname()[1]
+        opened = socket.create_server((HOST, port))
+        self.port: int = opened.getsockname()[1]
         self._closing = False
         self._wakers: set[asyncio.Event] = set()
-        self._serving = ServingThread(self._app(), self._socket, ws_max_size=MAX_BODY, ws="websockets-sansio")
+        super().__init__(self._routes(), opened, ws_max_size=MAX_BODY, ws="websockets-sansio")
         content.feed.listen(self._wake)
 
     def offer_recording(self, recording: Path) -> None:
@@ -75,36 +74,27 @@ class PageServer:
     def close(self) -> None:
         """Stops serving; idempotent."""
         self._closing = True
-        self._serving.end()
         self._wake()
-        self._serving.join()
-
-    def __enter__(self) -> PageServer:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        super().close()
 
     def _wake(self) -> None:
         """Wakes all websockets; from any thread."""
-        self._serving.call_soon(self._wake_all)
+        self.call_soon(self._wake_all)
 
     def _wake_all(self) -> None:
         for waker in self._wakers:
             waker.set()
 
-    def _app(self) -> Starlette:
+    def _routes(self) -> Sequence[BaseRoute]:
         guarded = self._guarded
-        return Starlette(
-            routes=[
-                Route("/", guarded(self._page)),
-                Route("/picture/{number:int}", guarded(self._picture)),
-                Route(f"/{RECORDING_ADDRESS}", guarded(self._recording)),
-                Route("/action/{name}", guarded(self._act), methods=["POST"]),
-                WebSocketRoute("/feed", self._send),
-                Mount("/page", StaticFiles(directory=PAGE_FOLDER)),
-            ]
-        )
+        return [
+            Route("/", guarded(self._page)),
+            Route("/picture/{number:int}", guarded(self._picture)),
+            Route(f"/{RECORDING_ADDRESS}", guarded(self._recording)),
+            Route("/action/{name}", guarded(self._act), methods=["POST"]),
+            WebSocketRoute("/feed", self._send),
+            Mount("/page", StaticFiles(directory=PAGE_FOLDER)),
+        ]
 
     def _allowed(self, connection: HTTPConnection) -> bool:
         """Whether host, origin and token are right. Browsers always send the origin of actions."""

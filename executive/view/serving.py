@@ -6,29 +6,30 @@ import asyncio
 import secrets
 import socket
 import threading
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from http import HTTPStatus
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, Self
 
 import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
-from starlette.routing import Route
+from starlette.routing import BaseRoute, Route
 
-__all__ = ["CallError", "CallServer", "Called"]
+__all__ = ["MAX_BODY", "CallError", "CallServer", "Called", "Server", "body_of"]
 
 START_LIMIT_S: Final = 10.0
 MAX_BODY: Final = 20_000
 
 
-class ServingThread:
-    """A thread that serves an application until `end`."""
+class Server:
+    """A running server of some routes, in a thread of its own. Use it as a context manager, or call `close`."""
 
-    def __init__(self, app: Starlette, opened: socket.socket, **settings: Any) -> None:
+    def __init__(self, routes: Sequence[BaseRoute], opened: socket.socket, **settings: Any) -> None:
         """Starts serving on an open socket; `settings` are uvicorn's."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ready = threading.Event()
+        app = Starlette(routes=routes)
         config = uvicorn.Config(app, log_level="error", access_log=False, lifespan="off", **settings)
         self._socket, self._server = opened, uvicorn.Server(config)
         self._thread = threading.Thread(target=self._serve, name="errand-server", daemon=True)
@@ -40,13 +41,16 @@ class ServingThread:
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(callback)
 
-    def end(self) -> None:
-        """Ends the thread once it has answered the open requests."""
+    def close(self) -> None:
+        """Answers the open requests and stops serving; idempotent."""
         self._server.should_exit = True
-
-    def join(self) -> None:
-        """Waits until the thread has ended."""
         self._thread.join(START_LIMIT_S)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def _serve(self) -> None:
         asyncio.run(self._serve_in_loop())
@@ -85,8 +89,11 @@ class Called(Protocol):
         """Returns the answer's JSON object, in a thread of its own. Raises CallError."""
 
 
-class CallServer:
-    """A running server for calls. Use it as a context manager, or call `close`."""
+class CallServer(Server):
+    """A running server for calls: `POST /missions/NAME` with `Authorization: Bearer TOKEN` starts a mission.
+
+    It checks the token before anything else, and stores nothing of a request but the values in its JSON body.
+    """
 
     def __init__(self, called: Called, *, token: str, host: str, port: int) -> None:
         """Starts serving; `port` 0 takes a free one. Raises OSError if the address is taken, or not of this machine."""
@@ -94,14 +101,7 @@ class CallServer:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         opened = socket.create_server((host, port), family=family)
         self.host, self.port = host, int(opened.getsockname()[1])
-        app = Starlette(routes=[Route("/missions/{name}", self._guarded(self._call), methods=["POST"])])
-        self._serving = ServingThread(app, opened)
-
-    def __enter__(self) -> CallServer:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        super().__init__([Route("/missions/{name}", self._call, methods=["POST"])], opened)
 
     @property
     def url(self) -> str:
@@ -109,23 +109,12 @@ class CallServer:
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"http://{host}:{self.port}/missions/"
 
-    def close(self) -> None:
-        """Answers the open calls and stops serving; idempotent."""
-        self._serving.end()
-        self._serving.join()
-
-    def _guarded(self, handler: Callable[[Request], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
-        async def endpoint(request: Request) -> Response:
-            scheme, _, given = request.headers.get("authorization", "").partition(" ")
-            right = secrets.compare_digest(given.strip().encode(), self._token.encode())
-            if scheme.lower() != "bearer" or not right:
-                said = {"error": "the token is missing or wrong: send 'Authorization: Bearer TOKEN'"}
-                return JSONResponse(said, HTTPStatus.UNAUTHORIZED, {"WWW-Authenticate": "Bearer"})
-            return await handler(request)
-
-        return endpoint
-
     async def _call(self, request: Request) -> Response:
+        scheme, _, given = request.headers.get("authorization", "").partition(" ")
+        right = secrets.compare_digest(given.strip().encode(), self._token.encode())
+        if scheme.lower() != "bearer" or not right:
+            said = {"error": "the token is missing or wrong: send 'Authorization: Bearer TOKEN'"}
+            return JSONResponse(said, HTTPStatus.UNAUTHORIZED, {"WWW-Authenticate": "Bearer"})
         body = await body_of(request)
         if body is None:
             said = {"error": f"the body is larger than {MAX_BODY} bytes"}

@@ -17,7 +17,7 @@ import pytest
 if TYPE_CHECKING:
     from executive.cli.testing.small_plant import SmallPlant
     from executive.testing.bench import SkillBench
-    from executive.testing.collect import SkillTestSettings
+    from executive.testing.suite import SkillTestSettings
     from skills.api import SkillContext
     from skills.robot import Capabilities
     from skills.testing.clock import VirtualClock
@@ -34,7 +34,7 @@ class Hooks:
     def pytest_errand_skill_tests(settings: Any) -> None:
         """Change what all skill tests of the session share, before the first is collected.
 
-        `settings` is an `executive.testing.collect.SkillTestSettings`: append to `fault_kinds`, add to `skills`, put
+        `settings` is an `executive.testing.suite.SkillTestSettings`: append to `fault_kinds`, add to `skills`, put
         other benches into `makers`.
         """
 
@@ -48,7 +48,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     """Collect the tests of a `*.skilltest.yaml` file."""
     if not file_path.name.endswith(SUFFIX):
         return None
-    from executive.testing.collect import SkillTestModule
+    from executive.testing.suite import SkillTestModule
 
     module: SkillTestModule = SkillTestModule.from_parent(parent, path=file_path)
     module.settings = _settings(parent.config)
@@ -58,8 +58,8 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 def _settings(config: pytest.Config) -> SkillTestSettings:
     """What the session's skill tests share, made when the first is collected."""
     if _SETTINGS not in config.stash:
-        from executive.testing.collect import SkillTestSettings
-        from executive.testing.trial import scripted_maker
+        from executive.testing.skill_test import scripted_maker
+        from executive.testing.suite import SkillTestSettings
         from executive.tree.registry import installed_skills
         from skills.files.errors import InputError
 

@@ -6,8 +6,7 @@ from typing import ClassVar
 
 import pytest
 
-from executive.testing.skill_test import load_skill_tests
-from executive.testing.trial import carry_out, scripted_maker
+from executive.testing.skill_test import carry_out, load_skill_tests, scripted_maker
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError
 from skills.robot import Pose2D

@@ -7,9 +7,8 @@ from py_trees.common import Status
 
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.snapshot import NodeState
-from executive.view.collapse import executed_tree, fold_below, fold_to
 from executive.view.formats import to_svg
-from executive.view.text import to_text
+from executive.view.text import executed_tree, fold_below, fold_to, to_text
 from skills.api import Cause
 
 DONE, IDLE = NodeState(Status.SUCCESS), NodeState()

@@ -6,8 +6,8 @@ from collections import Counter
 import pytest
 
 from executive.tree.node_view import node_view
-from executive.view.collapse import fold_below
 from executive.view.formats import to_btcpp
+from executive.view.text import fold_below
 from skills.api import Cause, Failed
 
 CONTROLS = {"Sequence", "Fallback", "Control"}

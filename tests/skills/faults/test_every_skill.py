@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.testing.skill_test import load_skill_tests
-from executive.testing.trial import carry_out, scripted_maker
+from executive.testing.skill_test import carry_out, load_skill_tests, scripted_maker
 from executive.tree.registry import built_in_skills
 from skills.api import Cause
 from skills.faults.kinds import STANDARD_FAULTS

@@ -15,7 +15,7 @@ from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON, QUIET, STORE, takes_request
 from executive.cli.output import console_for, finish, plain_lines, show_table, terminal_answerer
-from executive.cli.wake_check import refuse_unaddressed
+from executive.cli.run_command import refuse_unaddressed
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
 from executive.store.missions import STORE as STORE_NAME

@@ -19,11 +19,11 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Final, Generic, Protocol, TypeVar
 
+from executive.record.announce import versions
 from skills.files.errors import InputError
 
 __all__ = ["Finished", "LocalWorkers", "Pool", "Workers", "installed_code", "local_cluster", "scheduler_at"]
@@ -65,24 +65,19 @@ class Workers(Protocol):
         """Have each item worked on once, and give each as it ends. What the function raises is raised here."""
 
 
+@dataclass(frozen=True)
 class LocalWorkers:
-    """Processes on this machine, which keep what they have imported and loaded from item to item.
+    """So many processes on this machine, which keep what they have imported and loaded from item to item.
 
     One that dies is replaced, and its item is begun again by another.
     """
 
-    def __init__(self, count: int) -> None:
-        self._count = count
-
-    @property
-    def count(self) -> int:
-        """The number of processes."""
-        return self._count
+    count: int
 
     def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:
         """As `Workers` says; closing the iterator ends the processes."""
         waiting = deque((item, 0) for item in items)
-        idle = [_Process() for _ in range(min(self._count, len(items)))]
+        idle = [_Process() for _ in range(min(self.count, len(items)))]
         running: dict[Future[Any], tuple[_Process, Item, int]] = {}
         try:
             while waiting or running:
@@ -341,18 +336,11 @@ class Pool:
 @cache
 def installed_code() -> str:
     """The version, and a hash of all files of the code, the models and the worlds, and of the libraries' versions."""
-    made = hashlib.sha256()
+    made, known = hashlib.sha256(), versions((*_LIBRARIES, "spot-errand"))
     for package in _PACKAGES:
         for path in sorted((_ROOT / package).rglob("*")):
             if path.is_file() and "__pycache__" not in path.parts and path.suffix != ".pyc":
                 made.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
     for library in _LIBRARIES:
-        made.update(f"{library} {_version(library)}\n".encode())
-    return f"{_version('spot-errand')}+{made.hexdigest()[:_LETTERS]}"
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"
+        made.update(f"{library} {known[library]}\n".encode())
+    return f"{known['spot-errand']}+{made.hexdigest()[:_LETTERS]}"

@@ -7,7 +7,7 @@ import pytest
 
 from executive.app.prepare import prepare
 from executive.app.worlds import open_world
-from executive.cli.wake_check import refuse_unaddressed
+from executive.cli.run_command import refuse_unaddressed
 from executive.mission.request import Request
 from executive.words.robots import RobotConfig
 from skills.files.errors import InputError

@@ -6,8 +6,6 @@ Two runs of one seed give equal logs: wall times stand in a topic of their own, 
 from __future__ import annotations
 
 import base64
-import dataclasses
-import enum
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,6 +17,7 @@ from typing import Any, BinaryIO, Final
 import cv2
 import numpy as np
 from mcap.writer import Writer
+from pydantic_core import to_jsonable_python
 
 from executive.record.schemas import BOXES, DETECTIONS, PATH, TOPIC, WALL, Schema, schema_of, stamp
 from executive.run.outcome import RunResult
@@ -156,19 +155,13 @@ class EventLog(RunVisitor):
 
 def plain_values(value: Any) -> Any:
     """A value as JSON has it: dataclasses become objects, arrays lists, enums their values, NaN and infinity null."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain_values(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): plain_values(item) for key, item in value.items()}
+    return to_jsonable_python(value, inf_nan_mode="null", fallback=_plain)
+
+
+def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
-        return plain_values(value.tolist())
-    if isinstance(value, list | tuple | set | frozenset):
-        return [plain_values(item) for item in value]
-    if isinstance(value, enum.Enum):
-        return plain_values(value.value)
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, bool | int | str) else str(value)
+        return value.tolist()
+    return dict(value) if isinstance(value, Mapping) else str(value)
 
 
 def drawable(topic: str, message: Message, now_s: float) -> Iterator[tuple[str, Message]]:

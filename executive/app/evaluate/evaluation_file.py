@@ -40,7 +40,6 @@ __all__ = [
     "MissionEntry",
     "VariationsFile",
     "evaluation_at_seeds",
-    "first_seeds",
     "is_evaluation",
     "load_evaluation",
     "seed_range",
@@ -112,44 +111,27 @@ def _conditions(asked: Request, *, each_fault: bool) -> Sequence[tuple[str, Requ
     return [("no fault", plain), *alone]
 
 
-def seed_range(text: str) -> tuple[int, ...]:
-    """Seeds from "1-20", "3" or "1,4,7-9".
-
-    Raises:
-        InputError: anything else.
-    """
-    try:
-        seeds = tuple(seed for part in text.split(",") for seed in _span(part))
-    except ValueError as error:
-        raise InputError(f"'{text}' is no range of seeds", hint="write it like 1-20 or 1,4,7") from error
-    if not seeds:
-        raise InputError(f"'{text}' holds no seed", hint="write it like 1-20")
-    return seeds
-
-
-def first_seeds(text: str, count: int) -> tuple[int, ...]:
-    """The first `count` seeds from text whose last range may have no end: "8001-" or "3,8001-".
+def seed_range(text: str, count: int | None = None) -> tuple[int, ...]:
+    """Seeds from "1-20", "3" or "1,4,7-9"; of a `count` the first so many, where the last range may be open: "8001-".
 
     Raises:
         InputError: it is no range of seeds, or holds fewer.
     """
-    before, _, last = text.rpartition(",")
-    begun, dash, end = last.partition("-")
-    if dash and not end.strip():
-        listed = seed_range(before) if before else ()
-        seeds = (*listed, *range(first := seed_range(begun)[0], first + count))
-    else:
-        seeds = seed_range(text)
-    if len(seeds) < count:
-        raise InputError(
-            f"'{text}' holds {len(seeds)} seeds, fewer than {count}", hint="leave its end open, as in 8001-"
-        )
-    return seeds[:count]
-
-
-def _span(part: str) -> range:
-    first, dash, last = part.partition("-")
-    return range(int(first), int(last if dash else first) + 1)
+    seeds, parts = list[int](), text.split(",")
+    try:
+        for part in parts:
+            first, dash, last = part.partition("-")
+            if count is not None and dash and not last.strip() and part is parts[-1]:
+                last = f"{int(first) + count - 1}"
+            seeds += range(int(first), int(last if dash else first) + 1)
+    except ValueError as error:
+        raise InputError(f"'{text}' is no range of seeds", hint="write it like 1-20 or 1,4,7") from error
+    if not seeds:
+        raise InputError(f"'{text}' holds no seed", hint="write it like 1-20")
+    if count is not None and len(seeds) < count:
+        what = f"'{text}' holds {len(seeds)} seeds, fewer than {count}"
+        raise InputError(what, hint="leave its end open, as in 8001-")
+    return tuple(seeds[:count])
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from executive.app.evaluate.case import Evaluation, RunSpec
-from executive.app.evaluate.evaluation_file import MOST_RUNS, first_seeds
+from executive.app.evaluate.evaluation_file import MOST_RUNS, seed_range
 from executive.app.feasibility import abilities_in
 from executive.app.worlds import knowledge_of, open_world
 from executive.mission.request import Request
@@ -57,7 +57,7 @@ def random_missions(count: int, worlds: str, seeds: str) -> Evaluation:
         raise InputError(f"--worlds {worlds} names a world twice", hint="name each once")
     if count > MOST_RUNS:
         raise InputError(f"these are {count} runs, more than {MOST_RUNS}", hint="give several ranges of seeds in turn")
-    chosen = first_seeds(seeds, count)
+    chosen = seed_range(seeds, count)
     if len(set(chosen)) < count:
         raise InputError(f"--seeds {seeds} names a seed twice", hint="name each once")
     named = f"--random-missions {count} --worlds {worlds} --seeds {seeds}"

@@ -87,7 +87,7 @@ def test_nothing_else_is_served(server, calls, method, name):
 
 
 def test_the_server_listens_only_at_its_own_address(server):
-    assert server._serving._socket.getsockname()[0] == "127.0.0.1"
+    assert server._socket.getsockname()[0] == "127.0.0.1"
 
 
 def test_an_address_that_is_taken_is_an_error():

@@ -26,8 +26,6 @@ from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import Coordinate, Delay, Height, Speed
 from skills.robot import FloatArray
 
-__all__ = ["EventFile", "ScenarioFile", "read_scenario", "with_events", "with_scenario"]
-
 DIRECTIONS: Final = 36
 _STEP_M: Final = 0.01
 _BEYOND_M: Final = 0.5

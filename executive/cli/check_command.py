@@ -22,8 +22,6 @@ from skills.files.errors import InputError, count_text, one_line
 
 SHOWN_NODES: Final = 40
 
-__all__ = ["check"]
-
 
 @takes_request("world", "given", "stack", "start", "robots")
 def check(

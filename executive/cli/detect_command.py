@@ -20,8 +20,6 @@ from skills.perception.detector.onnx_detector import DetectorOptions
 from skills.quantities import Share
 from skills.robot import Picture
 
-__all__ = ["detect"]
-
 MOST_TOGETHER: Final = 8
 MOST_PIXELS_TOGETHER: Final = 8_000_000
 

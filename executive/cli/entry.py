@@ -24,8 +24,6 @@ from typer.main import get_command
 
 from skills.files.errors import MOST_LETTERS, InputError, listing, one_line
 
-__all__ = ["COMMANDS_GROUP", "app", "as_command", "command_line", "help_lines", "loaded", "main", "plugin_command"]
-
 _COLLECTED_AFTER: Final = (30_000, 20, 50)
 """So many new objects, collections of young ones, and of middle-aged ones: imports make many objects that all stay."""
 

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from executive.app.evaluate.results import Evaluated, ResultsFile
     from executive.app.evaluate.summary import Group, StandingRow
 
-__all__ = ["command_of", "evaluate", "report"]
-
 RESULTS: Final = "results.sqlite"
 
 

@@ -19,8 +19,6 @@ from executive.words.robots import robot_called
 from skills.files.errors import InputError
 from skills.files.outside import is_folder
 
-__all__ = ["fleet"]
-
 fleet = typer.Typer(
     name="fleet",
     help="What is queued, given out among several robots.",

@@ -31,8 +31,6 @@ from executive.words.mission import DEFAULT_WORLD
 from executive.words.robots import RobotConfig, display_name
 from skills.files.errors import InputError, listing
 
-__all__ = ["answer_line", "called_robots", "hear_request", "heard_sentence", "listen", "listener_for", "show_hearing"]
-
 _METER_WIDTH = 24
 _QUIETEST_DB = -60.0
 

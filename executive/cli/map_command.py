@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from skills.mapping.survey import Survey
     from skills.robot import Pose2D
 
-__all__ = ["map_group"]
-
 TICK_S: Final = 0.05
 TOLD_EVERY_S: Final = 10.0
 DRAWN_EVERY_S: Final = 1.5

@@ -15,8 +15,6 @@ from executive.app.mission_files import FOLDER, shipped_missions
 from executive.cli.output import console_for, show_table, writing
 from skills.files.errors import InputError
 
-__all__ = ["init", "missions", "new_skill", "render_skill"]
-
 _FOR_EDITORS: Final = "# yaml-language-server"
 _TEMPLATES: Final = Path(__file__).parent / "skill_template"
 _SUFFIX: Final = ".template"

@@ -10,8 +10,6 @@ import typer
 from skills.files.errors import one_line
 from skills.quantities import Quantity, QuantityError, number_in, range_text
 
-__all__ = ["LearningRate", "Minutes", "NumberReader", "quantity_argument", "quantity_option"]
-
 LearningRate = Annotated[float, Quantity(ge=1e-6, le=0.1)]
 Minutes = Annotated[float, Quantity(ge=0.01, le=100_000.0, unit="min")]
 

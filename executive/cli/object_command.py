@@ -17,8 +17,6 @@ from skills.files.errors import InputError, count_text
 from skills.perception.class_forms import class_forms
 from skills.quantities import Factor, Mass
 
-__all__ = ["object_group"]
-
 PICTURE_PX = (640, 480)
 
 object_group = typer.Typer(name="object", help="Objects of your own, made of any mesh.", rich_markup_mode=None)

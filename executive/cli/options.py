@@ -23,22 +23,6 @@ from executive.words.option import Option
 from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
 
-__all__ = [
-    "ANYWAY",
-    "AS_JSON",
-    "QUIET",
-    "START",
-    "STORE",
-    "VIEW",
-    "VIEW_FOR",
-    "VIEW_PORT",
-    "StartCommand",
-    "join_start",
-    "request_arguments",
-    "start_pose",
-    "takes_request",
-]
-
 _START: Final = "--start"
 _NUMERIC: Final = re.compile(r"[-+]?\.?\d[\d.,]*(?:e[-+]?\d+)?", re.IGNORECASE)
 

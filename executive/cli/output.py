@@ -23,21 +23,6 @@ if TYPE_CHECKING:
 
     from executive.language.questions import Answerer, ClarifyingQuestion
 
-__all__ = [
-    "BAD_INPUT",
-    "NOT_ACHIEVED",
-    "ask_at_terminal",
-    "console_for",
-    "finish",
-    "new_folder",
-    "plain_lines",
-    "print_json",
-    "refuse",
-    "show_table",
-    "terminal_answerer",
-    "writing",
-]
-
 NOT_ACHIEVED = 1
 BAD_INPUT = 2
 _OF_NAMES: Final = frozenset(

@@ -19,8 +19,6 @@ from executive.words.yaml_steps import steps_to_yaml
 from skills.files.errors import InputError
 from skills.files.outside import read_text
 
-__all__ = ["parse"]
-
 
 def parse(
     sentence: Annotated[str | None, typer.Argument(help="The sentence.", show_default=False)] = None,

@@ -23,8 +23,6 @@ from skills.files.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, r
 from skills.quantities import Duration
 from skills.stack import SLOTS
 
-__all__ = ["groups", "plugins"]
-
 _WORKERS: Final = 4
 _MORE_S: Final = 30.0
 """A process that loads a plug-in needs some time for itself."""

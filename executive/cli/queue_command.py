@@ -27,8 +27,6 @@ from executive.store.wakeup import WakeupPipe, wake_server
 from skills.files.errors import InputError, listing
 from skills.quantities import Count, Port, Wait
 
-__all__ = ["Out", "queue", "resume", "serve"]
-
 queue = typer.Typer(
     name="queue",
     help="Missions kept in a store, to be run one after another.",

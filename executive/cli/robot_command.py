@@ -38,8 +38,6 @@ from skills.stack import default_stack
 from skills.teleop.driver import Teleop, TeleopOptions
 from skills.teleop.keys import KEYS, asked_by, read_asked
 
-__all__ = ["warm_up"]
-
 HOLDER: Final = "teleop"
 SAVE_KEY: Final = "p"
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,39}")

@@ -20,8 +20,6 @@ from skills.files.yaml_source import read_yaml
 if TYPE_CHECKING:
     from executive.app.prepared import Prepared
 
-__all__ = ["refuse_unaddressed", "run"]
-
 
 @takes_request()
 def run(

@@ -10,9 +10,6 @@ from executive.mission.stack_file import load_stack
 from skills.files.yaml_scalars import yaml_of
 from skills.stack import plain
 
-__all__ = ["stack"]
-
-
 stack = typer.Typer(
     name="stack", help="What a robot uses: localiser, planners, controller, detector.", rich_markup_mode=None
 )

@@ -23,8 +23,6 @@ from skills.files.schema_errors import first_error
 from skills.quantities import Angle, Coordinate, Opening, Quantity
 from skills.robot import Picture, Pose2D
 
-__all__ = ["world"]
-
 MAX_BYTES: Final = 20_000_000
 WallHeight = Annotated[float, Quantity(ge=1.3, le=10.0, unit="m")]
 Out = Annotated[Path, typer.Option("--out", help="The world's folder; it is made.")]

@@ -22,8 +22,6 @@ from skills.estimate.grid_map import GridMap
 from skills.perception.class_forms import class_forms
 from skills.robot import Clock
 
-__all__ = ["announce", "command_type", "goal_position", "map_message", "versions"]
-
 PACKAGES: Final = ("spot-errand", "drake", "py-trees", "numpy")
 FREE, UNKNOWN, OCCUPIED = 255, 205, 0
 _NOTHING_ID: Final = 0

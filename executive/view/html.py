@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-__all__ = ["PAGE_FOLDER", "clock_text", "feed_of", "log_page", "render"]
-
 PAGE_FOLDER: Final = Path(__file__).parent / "page"
 _TEMPLATES: Final = Path(__file__).parent / "templates"
 _STYLE: Final = re.compile(r'<link rel="stylesheet" href="page/([\w.]+)">')

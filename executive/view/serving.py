@@ -16,8 +16,6 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route
 
-__all__ = ["MAX_BODY", "CallError", "CallServer", "Called", "Server", "body_of"]
-
 START_LIMIT_S: Final = 10.0
 MAX_BODY: Final = 20_000
 

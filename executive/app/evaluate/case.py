@@ -14,8 +14,6 @@ from typing import Final
 from executive.app.report import RunReport
 from executive.mission.request import Request
 
-__all__ = ["Case", "Evaluation", "Evidence", "RunSpec", "Standing"]
-
 FALSE_CLAIM: Final = "FALSE CLAIM"
 _ID_LETTERS: Final = 16
 _OF_THE_MACHINE: Final = ("wall_time_s", "real_time_factor", "log")

@@ -36,8 +36,6 @@ from executive.view.map_picture import map_picture
 from executive.words.variation import NO_VARIATION
 from skills.files.errors import InputError, Problems
 
-__all__ = ["Progress", "evaluate_runs", "evidence_of", "refuse_impossible_runs", "run_one", "steps_of"]
-
 Progress = Callable[[int], AbstractContextManager[Callable[[], None]]]
 """Shows how many of so many runs are done; what it gives is called after each."""
 LOGS: Final = "logs"

@@ -33,18 +33,6 @@ from skills.files.schema import Name, Text, validate
 from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import LongDuration, Seed
 
-__all__ = [
-    "CONDITION",
-    "EvaluationFile",
-    "FaultsFile",
-    "MissionEntry",
-    "VariationsFile",
-    "evaluation_at_seeds",
-    "is_evaluation",
-    "load_evaluation",
-    "seed_range",
-]
-
 MOST_RUNS: Final = 200_000
 CONDITION: Final = "condition"
 """The dimension by which runs with one fault or scenario alone vary."""

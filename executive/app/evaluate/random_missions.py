@@ -20,8 +20,6 @@ from skills.files.errors import InputError
 from skills.files.outside import is_file
 from skills.files.yaml_source import read_yaml
 
-__all__ = ["KINDS", "KnownWorld", "random_evaluation", "random_missions", "random_sentence"]
-
 _TABLE: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(Path(__file__).with_suffix(".yaml")).data
 KINDS: Final[Mapping[str, tuple[str, ...]]] = {kind: tuple(about["sentences"]) for kind, about in _TABLE.items()}
 """The sentences of each kind of mission, with slots for what the world has."""

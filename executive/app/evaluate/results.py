@@ -14,8 +14,6 @@ from executive.app.report import RunReport
 from executive.store.database import Database, FileKind, form
 from skills.files.errors import InputError
 
-__all__ = ["Evaluated", "ResultsFile"]
-
 RESULTS_FILE: Final = FileKind(
     name="results file",
     option="--results",

@@ -15,28 +15,6 @@ from executive.app.evaluate.case import Case, Evidence, RunSpec, Standing
 from executive.app.evaluate.results import Evaluated
 from executive.view.html import render
 
-__all__ = [
-    "CauseRow",
-    "Comparison",
-    "Group",
-    "Rate",
-    "StandingRow",
-    "TimeRow",
-    "causes_of",
-    "compared",
-    "fisher",
-    "groups_of",
-    "label_of",
-    "mcnemar",
-    "standing_rows",
-    "standings_json",
-    "summary_json",
-    "time_rows",
-    "to_look_at",
-    "to_page",
-    "totals_of",
-]
-
 _CONFIDENCE: Final = 0.95
 MOST_PICTURE_BYTES: Final = 40_000_000
 _ALL: Final = "all"

@@ -26,8 +26,6 @@ from typing import Any, Final, Generic, Protocol, TypeVar
 from executive.record.announce import versions
 from skills.files.errors import InputError
 
-__all__ = ["Finished", "LocalWorkers", "Pool", "Workers", "installed_code", "local_cluster", "scheduler_at"]
-
 MOST_DEATHS: Final = 3
 """Work with which so many workers have died is given up."""
 _ROOT: Final = Path(__file__).resolve().parents[3]

@@ -18,7 +18,7 @@ from executive.record.history import Event
 from executive.record.schemas import DESTINATION, TRANSITIONS
 from executive.run.visitor import RunVisitor
 from executive.store.resuming import told_before
-from executive.tree.behaviours.answer import ANSWER_TOPIC
+from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from executive.words.slug import slug
 from plant.pictures import (

@@ -14,10 +14,10 @@ from py_trees.common import Status
 from executive.record.schemas import SPEECH
 from executive.run.outcome import Execution, Finding, Said
 from executive.tree.behaviour import Explained
-from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.words.slug import slug
 from skills.api import Part
 from skills.robot import Clock

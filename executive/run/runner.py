@@ -26,7 +26,7 @@ from executive.run.visitor import (
     Visitors,
 )
 from executive.run.watchdog import VerbHung
-from executive.tree.behaviours.suspension import StoppableTime
+from executive.tree.behaviour import StoppableTime
 from executive.tree.compiler import CompiledTree
 from skills.api import Cause, Worker
 from skills.files.errors import disk_is_full

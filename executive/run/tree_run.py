@@ -13,14 +13,13 @@ from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.mission_history import Executions, Findings, claim, findings_in_words
 from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
-from executive.tree.behaviour import Explained, message_of
-from executive.tree.behaviours.answer import Answer
-from executive.tree.behaviours.suspension import suspend
+from executive.tree.behaviour import Explained, message_of, suspend
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import Endings, RunContext
 from executive.tree.node_view import node_view
 from executive.tree.nodes.decisions import Decide, buttons_of
 from executive.tree.nodes.policies import Skip
+from executive.tree.nodes.search import Answer
 from executive.tree.nodes.skill import SkillLeaf
 from executive.tree.nodes.wait import WaitFor
 from executive.tree.snapshot import Change, NodeState, Observed, Snapshot

@@ -19,13 +19,13 @@ from py_trees.common import Status
 
 from executive.run.mission_history import history_keys
 from executive.store.memory import Memory, Recollection, StepRecord
-from executive.tree.behaviour import Explained
-from executive.tree.behaviours.answer import Answer
-from executive.tree.behaviours.decorators import ExplainedDecorator, Guard
+from executive.tree.behaviour import Explained, ExplainedDecorator
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import RunContext
 from executive.tree.kinds import Changes, build, writes
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.guard import Guard
+from executive.tree.nodes.search import Answer
 from executive.tree.nodes.skill import Remembered
 from skills.api import Cause, Failed, Running, Skill, SkillContext, Step
 

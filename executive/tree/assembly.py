@@ -1,53 +1,112 @@
-"""From a mission's steps to the root of its tree, and a list of what its parts are to bring about."""
+"""From the steps of a mission to nodes: what is known at each point, and what the plans of all steps share."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
-from executive.mission.gripper import UNNAMED, after_command, is_same
-from executive.tree.board import Constant
-from executive.tree.compiling.flow import PYTHON_TYPES, Flow, answering, block_name, give, set_plan
-from executive.tree.compiling.part import Assembled, StepPart
-from executive.tree.compiling.skill_steps import skill_plan
-from executive.tree.compiling.trips import are_trips, refuse_several, trips_plan
-from executive.tree.goals import clearing_goals, command_goal, drive_goal, given_goal, lifted_goal, put_goal
-from executive.tree.kinds import block_plan
-from executive.tree.node import NodeSpec
-from executive.tree.nodes.clearing import clear_plan, is_clearing, refuse_everything
-from executive.tree.nodes.commands import step_plan
-from executive.tree.nodes.group import framed
-from executive.tree.nodes.policies import PolicyFrame, needs_way_back, under_policy
-from executive.tree.nodes.search import surfaces_elsewhere
-from executive.tree.plan import PICK_UPS, PlanBuilder, Registry, start_key
-from executive.words.command import START, Command, Task
-from executive.words.expression import kind_of, literal
-from executive.words.goal import GoalCondition, When
-from executive.words.knowledge import Knowledge, Pose
-from executive.words.leaf_steps import CallSkill, Do, Say, UseMission
-from executive.words.mission import Mission
+from executive.mission.certainty import refuse_certain_comparisons
+from executive.mission.gripper import InGripper, either
+from executive.tree.nodes.policies import under_policy
+from executive.tree.plan import PICK_UPS, Assembled, PlanBuilder, Registry
+from executive.words.command import START, Command
+from executive.words.condition import RANGES, READINGS
+from executive.words.expression import Expression, ExpressionError, Kind, Template, kind_of
+from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import CallSkill, UseMission
 from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
 from executive.words.step import Step
-from skills.api import Skill, Surface
-from skills.files.errors import InputError, Problems, SourceLine, listing
-from skills.quantities import Quantity
-from skills.robot import Pose2D
+from executive.words.steps import Group
+from skills.files.errors import InputError, Problems, SourceLine
 
-__all__ = ["Assembled", "StepPart", "assemble", "step_name"]
+__all__ = ["PYTHON_TYPES", "Assembler", "Flow", "Named", "StepPlan", "StepPlans", "step_name"]
 
-NO_POLICY: Final = Policy()
-_SKIPPING: Final = frozenset({"skip", "ask"})
-COUNTED: Final = Annotated[float, Quantity(ge=0.0, le=1_000.0)]
-"""How many objects a look counts."""
-_ANSWERS: Final[Mapping[str, tuple[str, type]]] = {"answer": ("key", bool), "count": ("count_key", float)}
-"""What a status check can give: the option of its answer node that names the key, and the type."""
+PYTHON_TYPES: Final[Mapping[Kind, type]] = {Kind.NUMBER: float, Kind.TEXT: str, Kind.TRUTH: bool}
+
+
+@dataclass(frozen=True)
+class Named:
+    """A value that steps may read: its blackboard key, its type, and its quantity where it has one."""
+
+    key: str
+    type: type
+    quantity: Any = None
+
+    def is_alike(self, kind: Any) -> bool:
+        """Whether its values and those of a type are of one kind for expressions, or of the same type."""
+        return self.type is kind or (kind_of(self.type) is kind_of(kind) and kind_of(kind) is not Kind.OTHER)
+
+    def is_same(self, other: Named | None) -> bool:
+        """Whether two values stand under one blackboard key and are of one type."""
+        return other is not None and other.key == self.key and other.is_alike(self.type)
+
+
+@dataclass
+class Flow:
+    """What is known at one point of a mission, when all goes well up to there.
+
+    `names` are the values that surely have been given by then, `kinds` the types of all that any step may have given,
+    by their blackboard keys; `declared` are those that always have one. `held` is what the gripper holds; `opening` as
+    long as it is what it held at first.
+    """
+
+    names: dict[str, Named] = field(default_factory=dict)
+    kinds: dict[str, Kind] = field(default_factory=dict)
+    declared: frozenset[str] = frozenset()
+    held: InGripper | None = None
+    opening: bool = True
+
+    def copy(self) -> Flow:
+        """The same, for a branch."""
+        return replace(self, names=dict(self.names))
+
+    def join(self, branches: Sequence[Flow]) -> None:
+        """Go on after one of several branches, nobody knows which."""
+        first, *others = branches
+        shared = {n: named for n, named in first.names.items() if all(named.is_same(b.names.get(n)) for b in others)}
+        for name, named in shared.items():
+            if any(branch.names[name].quantity != named.quantity for branch in others):
+                shared[name] = replace(named, quantity=None)
+        self.names.clear()
+        self.names.update(shared)
+        same = all(branch.held == first.held for branch in others)
+        self.held = first.held if same else either(*(each.held for each in branches))
+        self.opening = all(branch.opening for branch in branches)
+
+    def may_lack(self, before: Flow) -> None:
+        """Go on although the last step may have been skipped: what it gave may be missing."""
+        after = {name: named for name, named in self.names.items() if named.is_same(before.names.get(name))}
+        changed = {name for name, named in after.items() if before.names[name] != named}
+        self.names = after | {name: replace(after[name], quantity=None) for name in changed}
+
+    def keys_of(self, *each: Expression | Template) -> Mapping[str, str]:
+        """The blackboard keys of the values that expressions or texts read."""
+        read = {name for one in each for name in one.names}
+        return {name: self.names[name].key for name in sorted(read) if name in self.names}
+
+    def kind_of(self, expression: Expression, source: SourceLine | None) -> Kind:
+        """The type of an expression. Raises InputError: the names that are known do not fit it."""
+        try:
+            kind = expression.kind({**READINGS, **{name: kind_of(named.type) for name, named in self.names.items()}})
+        except ExpressionError as error:
+            raise InputError.at(source, f"'{expression}': {error.message}", hint=error.hint) from error
+        try:
+            refuse_certain_comparisons(expression, self.ranges)
+        except ExpressionError as error:
+            raise InputError.at(source, error.message, hint=error.hint) from error
+        return kind
+
+    @property
+    def ranges(self) -> Mapping[str, Any]:
+        """The quantities of all names that have one."""
+        return {**RANGES, **{name: each.quantity for name, each in self.names.items() if each.quantity is not None}}
 
 
 @dataclass(frozen=True)
 class _Item:
-    """One command, skill or used mission: its number on its level, and its step with that step's place, from 1."""
+    """One command, or one other step: its number on its level, and its step with that step's place, from 1."""
 
     number: int
     place: int
@@ -55,39 +114,9 @@ class _Item:
     command: Command | None = None
 
 
-def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> tuple[NodeSpec, tuple[StepPart, ...]]:
-    """The root of a mission's tree, and its parts in order.
-
-    Raises InputError: unknown names, ports wired wrongly, commands that cannot be carried out; all in `others`.
-    """
-    base = f"{slug(mission.robot_name)}/{slug(mission.name)}"
-    pick_ups = PICK_UPS if mission.pick_ups is None else mission.pick_ups
-    move_aside = mission.move_aside or 0
-    assembler = _Assembler(knowledge, registry, start_key(mission.robot_name, mission.name), pick_ups, move_aside)
-    builder = assembler.builder(base, mission.source)
-    steps = assembler.mission(mission, base)
-    remember = [builder.node("remember", "where it starts", part="remember-start", key=builder.start_key, keep=True)]
-    first = remember if _leads_back(mission) else []
-    if mission.is_empty and not _may_skip(steps.nodes):
-        return builder.sequence(mission.name, *first, *steps.nodes), steps.parts
-    frame = PolicyFrame(builder.at("whole"), mission.name, may_skip=False)
-    body = builder.node("sequence", "steps", *steps.nodes, part="steps")
-    whole = _under(Assembled((body,), steps.parts), mission, frame)
-    (body,) = whole.nodes
-    if _may_skip(whole.nodes):
-        paths = tuple(node.path_id for node in steps.nodes)
-        body = builder.node("summary", "tell what was skipped", body, part="summary", steps=paths)
-    return builder.sequence(mission.name, *first, body), whole.parts
-
-
-def step_name(command: Command) -> str:
-    """The step's name in path ids: the goal, else the object."""
-    return slug(command.goal or str(command.object or command.item or "anywhere"))
-
-
 @dataclass
-class _Assembler:
-    """Makes the subtrees of one mission.
+class Assembler:
+    """Makes the subtrees of one mission by the `plans` of its steps.
 
     `pick_ups` and `move_aside` count for steps that do not say otherwise; `flow` is what is known by then. Values that
     steps set have blackboard keys below `values_base`.
@@ -95,6 +124,7 @@ class _Assembler:
 
     knowledge: Knowledge
     registry: Registry
+    plans: StepPlans
     start_key: str
     pick_ups: int = PICK_UPS
     move_aside: int = 0
@@ -105,194 +135,108 @@ class _Assembler:
         """The builder of nodes that belong to no one command."""
         return PlanBuilder(self.knowledge, self.registry, path_id, self.start_key, Command(goal=START), source)
 
-    def mission(self, mission: Mission, base: str) -> Assembled:
-        """The subtrees of a mission's steps, under what is watched meanwhile, after its values are set."""
-        builder, outer = self.builder(base, mission.source), (self.values_base, self.flow.declared)
-        known = dict(self.flow.names)
-        first: tuple[NodeSpec, ...] = ()
-        self.values_base = f"{base}/values"
-        if mission.variables:
-            first = (self._declare(mission, builder),)
-        before = self.flow.copy()
-        steps = self.level(mission.steps, base)
-        if mission.is_framed:
-            row = replace(steps, nodes=(builder.node("sequence", "steps", *steps.nodes, part="all"),))
-            steps = framed(self, row, mission, builder.at("whole"), before)
-        self.values_base, self.flow.declared = outer
-        self.flow.names.update({name: known[name] for name in mission.variables or () if name in known})
-        return replace(steps, nodes=(*first, *steps.nodes))
-
     def level(self, steps: Sequence[Step], base: str) -> Assembled:
-        """The subtrees of steps: those under a policy each as one, the others' parts as they are."""
+        """The subtrees of steps in a row: those under a policy each as one, the others' parts as they are."""
         made, problems = Assembled(), Problems()
         for items, policy in _groups(steps):
             with problems:
                 before = self.flow.copy()
                 group = self._group(items, base)
-                if policy.on_failure in (OnFailure.SKIP, OnFailure.ASK):
+                if policy is not None and policy.on_failure in (OnFailure.SKIP, OnFailure.ASK):
                     self.flow.may_lack(before)
-                if not policy.is_empty:
+                if policy is not None:
                     builder = self.builder(f"{base}/step-{items[0].place}", items[0].step.source)
                     words = f"step {items[0].place}: {_words(items)}"
-                    if len(group.nodes) > 1:
-                        group = replace(group, nodes=(builder.sequence(words, *group.nodes),))
-                    group = _under(group, policy, PolicyFrame(builder, words))
+                    body = group.node if len(group.nodes) == 1 else builder.sequence(words, *group.nodes)
+                    group = replace(group, nodes=(under_policy(body, policy, builder, words),))
                 made += group
         problems.raise_any()
         return made
 
     def _group(self, items: Sequence[_Item], base: str) -> Assembled:
-        """The subtrees of items in a row; those that get and bring several objects are trips, all of them rounds."""
+        """The subtrees of items in a row; some plans are made of two."""
         made, problems, done = Assembled(), Problems(), 0
         for item, after in zip(items, (*items[1:], None), strict=True):
             if item.number <= done:
                 continue
-            following = None if after is None else after.command
             with problems:
-                if item.command is not None and following is not None and _go_together(item.command, following):
-                    done = item.number + 1
-                    made += self._pair(item, item.command, following, base)
-                else:
-                    made += self._item(item, following, base)
+                step = item.step
+                builder = self.builder(f"{base}/{item.number}-{_part(item)}", step.source)
+                if item.command is not None:
+                    following = None if after is None else after.command
+                    builder = replace(builder, command=item.command, following=following)
+                planned = self.plans[type(step)](self, step, builder)
+                done = item.number + planned.used - 1
+                made += planned
         problems.raise_any()
         return made
 
-    def _pair(self, item: _Item, get: Command, bring: Command, base: str) -> Assembled:
-        """The one subtree of two commands that get and bring several objects, or all."""
-        builder = self._command_builder(item, base)
-        goals: tuple[GoalCondition | None, ...]
-        if is_clearing(get, bring):
-            node, goals = clear_plan(builder, bring), clearing_goals(get, bring, self.knowledge)
-        else:
-            node = trips_plan(builder, bring)
-            got = command_goal(get, self.knowledge)
-            goals = (None if got is None else replace(got, when=When.SOME_TIME), command_goal(bring, self.knowledge))
-        held, opening = self.flow.held, self.flow.opening
-        self.flow.held, self.flow.opening = None, False
-        between = after_command(get, held, self.knowledge)
-        parts = (
-            StepPart(node.path_id, get, goal=goals[0], held=held, opening=opening),
-            StepPart(node.path_id, bring, goal=goals[1], held=between, opening=False),
-        )
-        return Assembled((node,), parts)
+    def row(self, steps: Sequence[Step], builder: PlanBuilder, name: str) -> Assembled:
+        """Steps in a row as one node at the builder's path id; the flow goes on after them."""
+        made = self.level(steps, builder.path_id)
+        return replace(made, nodes=(builder.sequence(name, *made.nodes, part="steps"),))
 
-    def _item(self, item: _Item, following: Command | None, base: str) -> Assembled:
-        """The subtree of one command, skill or used mission; `following` is the command right after it."""
-        step = item.step
-        match step:
-            case UseMission():
-                return self._used(step, f"{base}/{item.number}-{slug(step.words)}")
-            case CallSkill():
-                return self._skill(step, f"{base}/{item.number}-{slug(step.skill)}")
-        if not isinstance(step, Do | Say):
-            return block_plan(self, step, self.builder(f"{base}/{item.number}-{block_name(step)}", step.source))
-        flow = self.flow
-        builder = replace(self._command_builder(item, base), avoided=_goals(following, self.knowledge))
-        refuse_several(builder)
-        refuse_everything(builder)
-        command, held, opening = builder.command, flow.held, flow.opening
-        carried = None if held is None else held.thing
-        in_gripper = is_same(held, command.object, self.knowledge)
-        builder = replace(builder, in_gripper=in_gripper, carried=carried)
-        node = self._giving(step, command, step_plan(builder), builder)
-        flow.held = after_command(command, held, self.knowledge)
-        flow.opening = opening and command.task is not Task.GRASP and flow.held == held and not _lets_go(command)
-        goal = command_goal(command, self.knowledge, _elsewhere(builder))
-        return Assembled(
-            (node,), (StepPart(builder.path_id, command, goal=goal, held=held, opening=opening, node=node.path_id),)
-        )
+    def branch(self, steps: Sequence[Step], builder: PlanBuilder, name: str, before: Flow) -> tuple[Assembled, Flow]:
+        """A branch that begins with the flow `before`, and the flow after it; the own flow stays as it is."""
+        here, self.flow = self.flow, before.copy()
+        made = self.row(steps, builder, name) if steps else Assembled()
+        self.flow, after = here, self.flow
+        return made, after
 
-    def _skill(self, step: CallSkill, path_id: str) -> Assembled:
-        """The leaf of a skill on its own."""
-        flow, builder = self.flow, self.builder(path_id, step.source)
-        leaf = skill_plan(
-            step,
-            path_id,
-            knowledge=self.knowledge,
-            registry=self.registry,
-            names={name: named.key for name, named in flow.names.items()},
-            gives_to=lambda name, key, kind: give(self, name, key, kind, builder),
-        )
-        skill: type[Skill[Any]] = leaf.options["skill"]
-        part = StepPart(path_id, skill=skill, goal=self._skill_goal(leaf), held=flow.held, opening=flow.opening)
-        flow.held = {None: flow.held, True: UNNAMED, False: None}[skill.gripper_after]
-        flow.opening = flow.opening and skill.gripper_after is None
-        return Assembled((leaf,), (part,))
+    def give(self, name: str | None, key: str, kind: type, builder: PlanBuilder, quantity: Any = None) -> str:
+        """Let later steps read a value under `name` (None: none); the key that it goes to.
 
-    def _skill_goal(self, leaf: NodeSpec) -> GoalCondition | None:
-        """What a skill on its own is to bring about; None: nothing that a referee can see, or not known before."""
-        inputs = {port: each.value for port, each in leaf.options["inputs"].items() if isinstance(each, Constant)}
-        match leaf.name:
-            case "navigate" if isinstance(pose := inputs.get("goal"), Pose2D):
-                return drive_goal(Pose(x=pose.x_m, y=pose.y_m, yaw=pose.yaw_rad))
-            case "grasp":
-                return lifted_goal()
-            case "place" if isinstance(surface := inputs.get("surface"), Surface):
-                return put_goal(self.knowledge, surface.name) if surface.name in self.knowledge.surfaces else None
-            case "hand_over":
-                return given_goal(self.knowledge.person(str(inputs.get("person", ""))))
-        return None
+        That is the key under which the name has been given before, so that a loop's steps read what its later ones
+        give; else `key`, or where that is empty the name's own.
 
-    def _giving(self, step: Do | Say, command: Command, node: NodeSpec, builder: PlanBuilder) -> NodeSpec:
-        """The subtree of a status check whose answer later steps read. Raises InputError: it gives no such thing."""
-        keys: dict[str, str] = {}
-        for port, name in (step.gives or {}).items():
-            known = ("answer", "count") if command.object_count != 1 else ("answer",)
-            if command.task is not Task.FIND or port not in known:
-                said = listing(known) if command.task is Task.FIND else "no answer"
-                hint = "write {answer: NAME} beside a question, or {count: NAME} beside one that counts"
-                raise InputError.at(step.source, f"this step gives {said}, not '{port}'", hint=hint)
-            option, kind = _ANSWERS[port]
-            counted = COUNTED if port == "count" else None
-            keys[option] = give(self, name, builder.key(port), kind, builder, counted)
-        return answering(node, keys) if keys else node
+        Raises InputError: the name is no word, is that of a reading, or has another type elsewhere: steps may be
+        repeated.
+        """
+        if name is None:
+            return key
+        flow, key = self.flow, key or f"{self.values_base}/{name}"
+        if not name.isidentifier() or name in READINGS or name in ("true", "false"):
+            hint = "use letters, digits and underscores, and no name of a reading"
+            raise InputError.at(builder.source, f"'{name[:60]}' cannot be the name of a value", hint=hint)
+        known = flow.names.get(name)
+        if known is not None and (name in flow.declared or known.is_alike(kind)):
+            key = known.key
+        if flow.kinds.setdefault(key, kind_of(kind)) is not kind_of(kind):
+            told = "is declared as" if name in flow.declared else "is elsewhere"
+            what = f"'{name}' {told} {flow.kinds[key]}, and gets {kind_of(kind)}"
+            raise InputError.at(builder.source, what, hint="use another name")
+        flow.names[name] = Named(key, kind, None if name in flow.declared else quantity)
+        return key
 
-    def _declare(self, mission: Mission, builder: PlanBuilder) -> NodeSpec:
-        """The leaf that gives a mission's values as they are at the beginning."""
-        flow, values = self.flow, {}
-        for name, value in (mission.variables or {}).items():
-            key = give(self, name, f"{self.values_base}/{name}", PYTHON_TYPES[kind_of(value)], builder)
-            values[key] = literal(value)
-        flow.declared = frozenset(mission.variables or ())
-        return set_plan(builder, values, flow.names, "values", "values at the beginning")
-
-    def _used(self, step: UseMission, base: str) -> Assembled:
-        """The subtree of a mission that a step uses."""
-        used: Mission = step.mission
-        try:
-            steps = self.mission(used, base)
-        except InputError as error:
-            raise error if step.source is None else error.within(step.source.file, step.source.line) from error
-        builder = self.builder(base, step.source)
-        body = replace(steps, nodes=(builder.sequence(used.name, *steps.nodes),))
-        return _under(body, used, PolicyFrame(builder.at("whole"), used.name, may_skip=False))
-
-    def _command_builder(self, item: _Item, base: str) -> PlanBuilder:
-        command = item.command
-        if command is None:
-            raise InputError("a step has no commands", hint="give it 'say', a command, a skill or a file to use")
-        builder = self.builder(f"{base}/{item.number}-{step_name(command)}", item.step.source)
-        own = item.step
-        return replace(
-            builder,
-            command=command,
-            anywhere=not isinstance(own, Do | Say) or own.elsewhere is not False,
-            pick_ups=self.pick_ups if own.pick_ups is None else own.pick_ups,
-            move_aside=self.move_aside if own.move_aside is None else own.move_aside,
-        )
+    def check_template(self, text: Template, builder: PlanBuilder) -> None:
+        """Raises InputError: an expression of the text does not fit the values that are known."""
+        for expression in text.expressions:
+            self.flow.kind_of(expression, builder.source)
 
 
-def _lets_go(command: Command) -> bool:
-    """Whether a command ends with nothing in the gripper."""
-    return command.item is not None or command.task is Task.PLACE
+StepPlan = Callable[[Assembler, Any, PlanBuilder], Assembled]
+StepPlans = Mapping[type[Step], StepPlan]
+"""The plan of each kind of step."""
 
 
-def _go_together(get: Command, bring: Command) -> bool:
-    """Whether two commands in a row are one: trips for several objects, or rounds for all."""
-    return are_trips(get, bring) or is_clearing(get, bring)
+def step_name(command: Command) -> str:
+    """The name of a command's step in path ids: the goal, else the object."""
+    return slug(command.goal or str(command.object or command.item or "anywhere"))
 
 
-def _groups(steps: Sequence[Step]) -> Iterator[tuple[tuple[_Item, ...], Policy]]:
+def _part(item: _Item) -> str:
+    """What an item is called in path ids."""
+    match item.step:
+        case UseMission():
+            return slug(item.step.words)
+        case CallSkill(skill=skill):
+            return slug(skill)
+        case Group(name=name) if name:
+            return slug(name)
+    return item.step.key if item.command is None else step_name(item.command)
+
+
+def _groups(steps: Sequence[Step]) -> Iterator[tuple[tuple[_Item, ...], Policy | None]]:
     """Items that belong together: those of one step under a policy, or of steps in a row without any."""
     number, free = 1, []
     for place, step in enumerate(steps, start=1):
@@ -303,45 +247,11 @@ def _groups(steps: Sequence[Step]) -> Iterator[tuple[tuple[_Item, ...], Policy]]
             free += items
             continue
         if free:
-            yield tuple(free), NO_POLICY
+            yield tuple(free), None
         free = []
         yield tuple(items), step
     if free:
-        yield tuple(free), NO_POLICY
-
-
-def _goals(command: Command | None, knowledge: Knowledge) -> frozenset[str]:
-    """The surfaces to which a command brings what is fetched before."""
-    place = None if command is None or command.goal is None else knowledge.place(command.goal)
-    return frozenset() if place is None else frozenset(knowledge.surfaces_in(place))
-
-
-def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
-    """Where else the object of a command to get it may be found."""
-    command, knowledge = builder.command, builder.knowledge
-    if command.task is not Task.GRASP or command.object is None or command.goal is None or not builder.anywhere:
-        return ()
-    name = knowledge.thing(command.object.name) or command.object.name
-    return surfaces_elsewhere(knowledge, name, builder.place(command.goal), builder.avoided)
-
-
-def _under(body: Assembled, policy: Policy, frame: PolicyFrame) -> Assembled:
-    """One node under its policy."""
-    (below,) = body.nodes
-    node = under_policy(below, policy, frame)
-    return Assembled((node,), body.parts)
-
-
-def _may_skip(nodes: Sequence[NodeSpec]) -> bool:
-    return any(below.kind in _SKIPPING for node in nodes for below in node.walk())
-
-
-def _leads_back(mission: Mission) -> bool:
-    """Whether something in a mission leads back to where the robot stands at its beginning."""
-    steps = list(mission.walk())
-    used = (step.mission for step in steps if isinstance(step, UseMission))
-    policies: tuple[Policy, ...] = (mission, *steps, *used)
-    return any(map(needs_way_back, policies)) or any(command.goal == START for command in mission.commands)
+        yield tuple(free), None
 
 
 def _words(items: Sequence[_Item]) -> str:

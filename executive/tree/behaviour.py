@@ -1,14 +1,26 @@
-"""What every node of ours carries beside its status: a stable path id, a cause and one sentence."""
+"""What all nodes of ours are made of: a stable path id, a cause and one sentence; leaves, decorators and composites.
+
+A page of `executive.tree.nodes` defines a kind of node as a class with a `kind`; being there registers it. Its fields
+are the options of its specs, and what the run lends: `child` or `children`, `context`, and any field of the context.
+
+Suspending a tree touches no status and no memory: a composite stays at its child, a retry at its attempt. Only the
+running nodes that are `Suspendable` are told; each goes on by itself when it is ticked the next time. Time that passes
+while a node is suspended does not count against its limit.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol, dataclass_transform, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
+from py_trees.composites import Composite
+from py_trees.decorators import Decorator
 
-from skills.api import Cause
+from skills.api import Cause, Failed
+from skills.robot import Clock
 
 
 class Explained:
@@ -35,17 +47,34 @@ class Explained:
         self.message = f"stopped while: {self.message}" if self.message else "stopped"
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
-class ExplainedNode(Explained):
-    """An explained node of ours: it takes what its spec says by keywords."""
+@dataclass_transform(kw_only_default=True, eq_default=False, field_specifiers=(field,))
+class _TakesKeywords:
+    """Makes each class below a dataclass of keywords."""
 
+    def __init_subclass__(cls) -> None:
+        dataclass(kw_only=True, eq=False, repr=False)(cls)
+
+
+class ExplainedNode(_TakesKeywords, Explained):
+    """An explained node of ours; `kind` is what its specs call it."""
+
+    kind: ClassVar[str] = ""
     path_id: str
     name: str
     cause: Cause | None = field(default=None, init=False)
     message: str = field(default="", init=False)
 
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Of the options, the blackboard keys that such a node writes, and the type of each value."""
+        return {}
 
-@dataclass(kw_only=True, eq=False, repr=False)
+    def fail(self, failure: Failed) -> Status:
+        """FAILURE for a reason of one's own."""
+        self.cause, self.message = failure.cause, failure.message
+        return Status.FAILURE
+
+
 class ExplainedLeaf(ExplainedNode, Behaviour):
     """One without children."""
 
@@ -61,6 +90,129 @@ class ExplainedLeaf(ExplainedNode, Behaviour):
             self.stop(status)
         self.status = status
         yield self
+
+    def say(self, message: str, status: Status = Status.SUCCESS) -> Status:
+        """The status with a sentence and no cause."""
+        self.cause, self.message = None, message
+        return status
+
+
+class ExplainedDecorator(ExplainedNode, Decorator):
+    """A decorator that takes its child's explanation unless it has its own."""
+
+    child: Behaviour
+
+    def __post_init__(self) -> None:
+        Decorator.__init__(self, self.name, self.child)
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Tick the child, then judge. As the library's, which also writes debug texts and checks the status' type."""
+        if self.status != Status.RUNNING:
+            self.initialise()
+        yield from self.decorated.tick()
+        status = self.update()
+        if status != Status.RUNNING:
+            self.stop(status)
+        self.status = status
+        yield self
+
+    def stop(self, new_status: Status) -> None:
+        """Interrupted while running: stop the child and say so. Reset: reset the child too."""
+        interrupted = new_status == Status.INVALID and self.status == Status.RUNNING
+        super().stop(new_status)
+        if interrupted:
+            self.explain_cancelled()
+        elif new_status == Status.INVALID:
+            self.clear_explanation()
+
+    def pass_on(self) -> Status:
+        """The child's status and explanation as they are."""
+        failed = self.decorated.status == Status.FAILURE
+        self.cause, self.message = (cause_of(self.decorated) if failed else None), message_of(self.decorated)
+        return self.decorated.status
+
+
+class MemoryComposite(ExplainedNode, Composite):
+    """Ticks its children one after the other, as `_following` says, and never goes back to one that is done."""
+
+    goes_on_after: ClassVar[tuple[Status, ...]] = (Status.SUCCESS,)
+    least: ClassVar[int] = 1
+    children: list[Behaviour]
+    taken_up: bool = field(default=False, init=False)
+    """Set before the first tick of a mission that goes on after a restart: nothing is forgotten then."""
+    _index: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        if len(self.children) < self.least:
+            raise ValueError(f"{self.path_id}: a {type(self).__name__} needs at least one child")
+        Composite.__init__(self, self.name, list(self.children))
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Tick the present child, and those that follow it in the same tick."""
+        if self.status != Status.RUNNING:
+            self._restart()
+        while True:
+            child = self.current_child = self.children[self._index]
+            if not self._passes_over(child):
+                yield from child.tick()
+            following = None if child.status == Status.RUNNING else self._following(child)
+            if following is None:
+                break
+            self._index = following
+        self._take_over(child)
+        yield self
+
+    def stop(self, new_status: Status = Status.INVALID) -> None:
+        """Interrupted while running: stop what runs and keep the rest in sight. Else: reset all children."""
+        if new_status == Status.INVALID:
+            interrupted = self.status == Status.RUNNING
+            for child in self.children:
+                if not interrupted or child.status == Status.RUNNING:
+                    child.stop(Status.INVALID)
+            if interrupted:
+                self.explain_cancelled()
+            else:
+                self.clear_explanation()
+        self.status = new_status
+        self.iterator = self.tick()
+
+    def _passes_over(self, child: Behaviour) -> bool:
+        return False
+
+    def _following(self, child: Behaviour) -> int | None:
+        """The number of the child that is ticked next in the same tick, once the present one is done; None: none."""
+        goes_on = child.status in self.goes_on_after and self._index + 1 < len(self.children)
+        return self._index + 1 if goes_on else None
+
+    def _restart(self) -> None:
+        self._index = 0
+        self.clear_explanation()
+        self._reset_children()
+
+    def _reset_children(self) -> None:
+        for child in self.children:
+            child.stop(Status.INVALID)
+
+    def _take_over(self, child: Behaviour) -> None:
+        """Take the child's status, and its explanation where there is something to explain."""
+        status = child.status if child.status != Status.INVALID else Status.FAILURE
+        self.cause, self.message = self._explanation(child) if status == Status.FAILURE else (None, message_of(child))
+        if status == Status.RUNNING:
+            self.status = status
+        else:
+            self.stop(status)
+
+    def _explanation(self, child: Behaviour) -> tuple[Cause, str]:
+        return cause_of(child), message_of(child)
+
+    def _go_on(self, message: str) -> None:
+        """RUNNING with this sentence."""
+        self.status, self.cause, self.message = Status.RUNNING, None, message
+
+    def _end(self, cause: Cause | None, message: str) -> None:
+        """SUCCESS, or FAILURE with a cause."""
+        self.cause, self.message = cause, message
+        self.stop(Status.SUCCESS if cause is None else Status.FAILURE)
 
 
 def cause_of(node: Behaviour) -> Cause:
@@ -78,3 +230,61 @@ def message_of(node: Behaviour) -> str:
     """The node's sentence; for a foreign node its feedback message, else its name and status."""
     message = node.message if isinstance(node, Explained) else node.feedback_message
     return message or f"{node.name} {'failed' if node.status == Status.FAILURE else 'goes on'}"
+
+
+@runtime_checkable
+class Conditional(Protocol):
+    """A child that a selector passes over untouched when it does not apply: that is no failure."""
+
+    def applies(self) -> bool:
+        """Whether there is any sense in ticking it now."""
+
+
+@runtime_checkable
+class Suspendable(Protocol):
+    """A node that must be told when it will not be ticked for a while."""
+
+    def suspend(self) -> None:
+        """Let go of the robot and stop counting time until the next tick. Idempotent; never raises."""
+
+
+def suspend(root: Behaviour, *, sparing: Behaviour | None = None) -> None:
+    """Suspend all running nodes of a tree: motion that its leaves began is stopped, their place is kept.
+
+    The node `sparing` and those below it are let go on. Tick the tree again to go on: each suspended skill is told to
+    `resume`, which begins it anew unless it knows better. Stop it to give it up. Call it again freely.
+    """
+    spared = set() if sparing is None else set(sparing.iterate())
+    for node in root.iterate():
+        if node not in spared and node.status == Status.RUNNING and isinstance(node, Suspendable):
+            node.suspend()
+
+
+class StoppableTime:
+    """Seconds of the robot's clock since a start, without those in which it was stopped."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._start_s = clock.now()
+        self._stopped_s: float | None = None
+
+    @property
+    def stopped(self) -> bool:
+        """True between `stop` and `go_on`."""
+        return self._stopped_s is not None
+
+    def elapsed_s(self) -> float:
+        """Seconds that counted so far."""
+        until_s = self._clock.now() if self._stopped_s is None else self._stopped_s
+        return until_s - self._start_s
+
+    def stop(self) -> None:
+        """Count no more; idempotent."""
+        if self._stopped_s is None:
+            self._stopped_s = self._clock.now()
+
+    def go_on(self) -> None:
+        """Count again from here; does nothing unless stopped."""
+        if self._stopped_s is not None:
+            self._start_s += self._clock.now() - self._stopped_s
+            self._stopped_s = None

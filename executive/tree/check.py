@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from executive.mission.gripper import InGripper, cannot_take, objection
-from executive.tree.compiler import CompiledTree, StepPart
+from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, estimate_tree
+from executive.tree.plan import StepPart
 from executive.words.command import START, Task
 from executive.words.geometry import area_m2
 from executive.words.knowledge import Knowledge

@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from executive.tree.assembly import StepPart, assemble, step_name
-from executive.tree.compiling.wiring import check_wiring
+from executive.tree.assembly import Assembler
+from executive.tree.board import Binding, Constant, FromBoard, FromBoardOr
 from executive.tree.context import RunContext
-from executive.tree.kinds import build
+from executive.tree.kinds import PLANS, build, writes
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decisions import buttons_of
 from executive.tree.nodes.doors import doorway
+from executive.tree.nodes.group import mission_plan
 from executive.tree.nodes.interrupts import watched
-from executive.tree.plan import PlanBuilder, Registry, start_key
-from executive.words.command import Command
+from executive.tree.nodes.policies import AskOperator, Skip, under_policy
+from executive.tree.plan import PICK_UPS, PlanBuilder, Registry, StepPart, start_key
+from executive.tree.types import assignable, conforms, describe_type, field_types, required
+from executive.words.command import START, Command
 from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import UseMission
 from executive.words.mission import Mission
+from executive.words.policy import OnFailure, Policy
+from executive.words.slug import slug
 from executive.words.step import Step
-from skills.files.errors import InputError
+from skills.files.errors import InputError, suggestion
 from skills.perception.doorway import Doorway
 
-__all__ = ["CompiledTree", "StepPart", "compile_mission", "step_name"]
+__all__ = ["CompiledTree", "StepPart", "compile_mission"]
 
 
 @dataclass(frozen=True)
@@ -74,9 +82,94 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
     """
     if not mission.steps:
         raise InputError(f"the mission '{mission.name}' has no commands", hint="add at least one step")
-    body, parts = assemble(mission, knowledge=knowledge, registry=registry)
-    start = start_key(mission.robot_name, mission.name)
-    root = watched(PlanBuilder(knowledge, registry, body.path_id, start, Command(), mission.source), body)
+    base, start = f"{slug(mission.robot_name)}/{slug(mission.name)}", start_key(mission.robot_name, mission.name)
+    pick_ups = PICK_UPS if mission.pick_ups is None else mission.pick_ups
+    assembler = Assembler(knowledge, registry, PLANS, start, pick_ups, mission.move_aside or 0)
+    builder, steps = assembler.builder(base, mission.source), mission_plan(assembler, mission, base)
+    root = watched(builder, _whole(mission, builder, steps.nodes))
     check_wiring(root)
     doors = tuple(doorway(knowledge, door) for door in knowledge.doors)
-    return CompiledTree(mission.robot_name, mission.name, mission.commands, root, parts, mission.steps, doors)
+    return CompiledTree(mission.robot_name, mission.name, mission.commands, root, steps.parts, mission.steps, doors)
+
+
+def _whole(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec, ...]) -> NodeSpec:
+    """A mission's steps under its policy."""
+    remember = builder.node("remember", "where it starts", part="remember-start", key=builder.start_key, keep=True)
+    first = [remember] if _leads_back(mission) else []
+    if mission.is_empty and not any(map(_may_skip, steps)):
+        return builder.sequence(mission.name, *first, *steps)
+    body = builder.sequence("steps", *steps, part="steps")
+    whole = under_policy(body, mission, builder.at("whole"), mission.name, may_skip=False)
+    if _may_skip(whole):
+        paths = tuple(node.path_id for node in steps)
+        whole = builder.node("summary", "tell what was skipped", whole, part="summary", steps=paths)
+    return builder.sequence(mission.name, *first, whole)
+
+
+def _may_skip(node: NodeSpec) -> bool:
+    return any(below.kind in (Skip.kind, AskOperator.kind) for below in node.walk())
+
+
+def _leads_back(mission: Mission) -> bool:
+    """Whether something in a mission leads back to where the robot stands at its beginning."""
+    steps = list(mission.walk())
+    used = (step.mission for step in steps if isinstance(step, UseMission))
+    policies: tuple[Policy, ...] = (mission, *steps, *used)
+    returns = any(policy.on_failure is OnFailure.RETURN for policy in policies)
+    return returns or any(command.goal == START for command in mission.commands)
+
+
+def check_wiring(root: NodeSpec) -> None:
+    """Check all ports of a tree.
+
+    Raises InputError: an input port without a value, an unknown port, a value of a wrong type, a blackboard key that no
+    earlier node writes, an output bound to a port that the skill does not have, or a path id used twice.
+    """
+    written: dict[str, Any] = {}
+    seen: set[str] = set()
+    for node in root.walk():
+        if node.path_id in seen:
+            raise _error(node, "two nodes have this path id", "give the steps different names")
+        seen.add(node.path_id)
+        if node.kind == "skill":
+            for message, hint in _faults(node, written):
+                raise _error(node, message, hint)
+        written.update(writes(node))
+
+
+def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """What is wrong with one skill's ports, and the hint."""
+    skill, inputs, outputs = (node.options[key] for key in ("skill", "inputs", "outputs"))
+    types = field_types(skill.Inputs)
+    for name in required(skill.Inputs):
+        if name not in inputs:
+            yield f"input port '{name}' has no value", f"give it a {describe_type(types[name])}"
+    for port, binding in inputs.items():
+        if port not in types:
+            yield f"there is no input port '{port}'", suggestion(port, types, f"known: {', '.join(types)}")
+        else:
+            yield from _misfit(port, binding, types[port], written)
+    for port in outputs:
+        if port not in skill.outputs:
+            yield f"there is no output port '{port}'", f"known: {', '.join(skill.outputs) or 'none'}"
+
+
+def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """What is wrong with one bound input."""
+    wanted = f"give it a {describe_type(kind)}"
+    if isinstance(binding, Constant) and not conforms(binding.value, kind):
+        yield f"input port '{port}' got {binding.value!r}", wanted
+    if isinstance(binding, FromBoardOr) and not conforms(binding.default, kind):
+        yield f"input port '{port}' has the default {binding.default!r}", wanted
+    if not isinstance(binding, FromBoard) or (isinstance(binding, FromBoardOr) and binding.key not in written):
+        return
+    if binding.key not in written:
+        yield f"input port '{port}' reads '{binding.key}', which nothing before it writes", wanted
+        return
+    given = binding.gives or written[binding.key]
+    if not assignable(given, kind):
+        yield f"input port '{port}' reads '{binding.key}', a {describe_type(given)}", wanted
+
+
+def _error(node: NodeSpec, message: str, hint: str) -> InputError:
+    return InputError.at(node.source, f"{node.path_id}: {message}", hint=hint)

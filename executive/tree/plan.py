@@ -1,4 +1,4 @@
-"""Builds the node specs of one step's subtree: what all subtrees of one mission share, and short ways to make nodes."""
+"""Builds the node specs of one step's subtree, and says what its parts are to bring about."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final
 
+from executive.mission.gripper import InGripper
 from executive.tree.board import Binding, Constant, FromBoard
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.registry import missing
 from executive.words.command import Command, Task
+from executive.words.goal import GoalCondition
 from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
 from executive.words.slug import slug
 from skills.api import Cause, Part, Skill, Surface, Thing
@@ -42,6 +44,42 @@ def after(*causes: Cause, of: NodeSpec | None = None, own: bool = False) -> Trig
 
 
 @dataclass(frozen=True)
+class StepPart:
+    """A part of a mission with something to show for it: a command, or a skill on its own.
+
+    `path_id` is that of its subtree, `node` that of its outermost node where it is another; `skill` the skill on its
+    own, `goal` what it must bring about (None: nothing that a referee can see). `held` is what the gripper holds before
+    it; with `opening`, that is what it held when the mission began.
+    """
+
+    path_id: str
+    command: Command | None = None
+    skill: type[Skill[Any]] | None = None
+    goal: GoalCondition | None = None
+    held: InGripper | None = None
+    opening: bool = True
+    node: str = ""
+
+
+@dataclass(frozen=True)
+class Assembled:
+    """Nodes in a row, and what they are to bring about, in order; of how many commands (`used`) they are made."""
+
+    nodes: tuple[NodeSpec, ...] = ()
+    parts: tuple[StepPart, ...] = ()
+    used: int = 1
+
+    def __add__(self, other: Assembled) -> Assembled:
+        return Assembled(self.nodes + other.nodes, self.parts + other.parts)
+
+    @property
+    def node(self) -> NodeSpec:
+        """The only node."""
+        (node,) = self.nodes
+        return node
+
+
+@dataclass(frozen=True)
 class PlanBuilder:
     """Makes the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start.
 
@@ -49,7 +87,7 @@ class PlanBuilder:
     in `avoided`: what lies there is where it is to go. With `in_gripper` an earlier step has grasped the object;
     `carried` is what an earlier step has grasped, whatever this one is about.
     What falls on the way is picked up again `pick_ups` times at most; of what stands in the way of an object that is to
-    be taken, `move_aside` others are moved aside at most.
+    be taken, `move_aside` others are moved aside at most. `following` is the command right after this one.
     """
 
     knowledge: Knowledge
@@ -64,6 +102,7 @@ class PlanBuilder:
     carried: Thing | None = None
     pick_ups: int = PICK_UPS
     move_aside: int = 0
+    following: Command | None = None
 
     def at(self, *parts: str) -> PlanBuilder:
         """The builder of a subtree below."""
@@ -78,9 +117,9 @@ class PlanBuilder:
         path_id = f"{self.path_id}/{part}" if part else self.path_id
         return NodeSpec(kind, path_id, name, MappingProxyType(options), children, self.source)
 
-    def sequence(self, name: str, *steps: NodeSpec) -> NodeSpec:
-        """A sequence at this path id."""
-        return self.node("sequence", name, *steps)
+    def sequence(self, name: str, *steps: NodeSpec, part: str = "") -> NodeSpec:
+        """A sequence at this path id, or at the `part` below it."""
+        return self.node("sequence", name, *steps, part=part)
 
     def skill(
         self, name: str, inputs: Mapping[str, object] | None = None, outputs: Mapping[str, str] | None = None
@@ -108,6 +147,11 @@ class PlanBuilder:
         nodes, when = tuple(node for node, _ in recoveries), tuple(rule for _, rule in recoveries)
         options = {"recoveries": when, "attempts": attempts, "forgets": forgets}
         return self.node("recover", name, attempt, *nodes, part=part, **options)
+
+    def tidied(self, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:
+        """Work after which the arm is stowed, whatever came of it."""
+        name = "stow the arm if it fails" if only_after_failure else "stow the arm in the end"
+        return self.node("afterwards", name, work, self.skill(STOW), only_after_failure=only_after_failure)
 
     def pause(self, part: str, name: str, duration_s: float) -> NodeSpec:
         """A leaf that waits on the robot's clock."""
@@ -159,6 +203,13 @@ class PlanBuilder:
         if not classes:
             raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.thing_names()))
         return classes
+
+    def known(self, thing: Thing | None) -> Thing:
+        """The object that the command is about. Raises InputError: it names none, or none that is known."""
+        if thing is None:
+            raise self.error("the command names no object", "say what it is about")
+        self.classes(thing.name)
+        return thing
 
     def sought(self, name: str) -> tuple[str, ...]:
         """What the robot looks for when it is to take an object of that name: its classes, or `THING` for any object.

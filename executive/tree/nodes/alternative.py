@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from typing import Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.mission.gripper import either
-from executive.tree.behaviour import cause_of, message_of
-from executive.tree.compiling.flow import Assembler, BlockPlans, branch_of
-from executive.tree.compiling.part import Assembled
-from executive.tree.node import NodeKind
-from executive.tree.nodes.composites import MemoryComposite
+from executive.tree.assembly import Assembler, StepPlans
+from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.nodes.policies import FINAL_CAUSES
-from executive.tree.plan import PlanBuilder
+from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import steps as model
 
 
@@ -26,35 +22,27 @@ class Try(MemoryComposite):
     the second in the same tick; its status, and the sentences of both.
     """
 
-    def tick(self) -> Iterator[Behaviour]:
-        """Tick the first child; when it has failed, the second."""
-        if self.status != Status.RUNNING:
-            self._restart()
-        first, instead = self.children
-        if self._index == 0:
-            self.current_child = first
-            yield from first.tick()
-            if first.status == Status.FAILURE and cause_of(first) not in FINAL_CAUSES:
-                self._index = 1
+    kind = "try"
+
+    def _following(self, child: Behaviour) -> int | None:
+        failed = child.status == Status.FAILURE and cause_of(child) not in FINAL_CAUSES
+        return 1 if self._index == 0 and failed else None
+
+    def _take_over(self, child: Behaviour) -> None:
+        super()._take_over(child)
         if self._index == 1:
-            self.current_child = instead
-            yield from instead.tick()
-        self._take_over(self.children[self._index])
-        if self._index == 1:
-            self.message = f"{self.message}, since {message_of(first)}"
-        yield self
+            self.message = f"{self.message}, since {message_of(self.children[0])}"
 
 
 def _plan(assembler: Assembler, block: model.Try, builder: PlanBuilder) -> Assembled:
     flow = assembler.flow
-    tried, after_tried = branch_of(assembler, block.steps, builder.at("try"), "try", flow)
+    tried, after_tried = assembler.branch(block.steps, builder.at("try"), "try", flow)
     midway = flow.copy()
     if after_tried.held != flow.held:
         midway.held, midway.opening = either(flow.held, after_tried.held), False
-    other, after_other = branch_of(assembler, block.otherwise, builder.at("else"), "else", midway)
+    other, after_other = assembler.branch(block.otherwise, builder.at("else"), "else", midway)
     flow.join([after_tried, after_other])
     return Assembled((builder.node("try", "else the other", *tried.nodes, *other.nodes),), (*tried.parts, *other.parts))
 
 
-KINDS: Final[Mapping[str, NodeKind]] = {"try": NodeKind(Try, ("children",))}
-PLANS: Final[BlockPlans] = {model.Try: _plan}
+PLANS: Final[StepPlans] = {model.Try: _plan}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 from py_trees.common import Status
@@ -12,9 +11,9 @@ from py_trees.common import Status
 from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.board import FromBoard
 from executive.tree.context import RunContext
-from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.node import NodeSpec
 from executive.tree.plan import PlanBuilder
-from skills.api import FLOOR, Cause, ObjectObservation, Surface, Thing
+from skills.api import FLOOR, Cause, Failed, ObjectObservation, Surface, Thing
 from skills.geometry import compose
 from skills.quantities import Coordinate, Length
 from skills.robot import Pose2D
@@ -25,7 +24,6 @@ Circle = tuple[Coordinate, Coordinate, Length]
 SETTLE_S: Final = 0.5
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class InTheWay(ExplainedLeaf):
     """Says what stands in the way of an object, and notes where to put it. SUCCESS at once.
 
@@ -35,6 +33,7 @@ class InTheWay(ExplainedLeaf):
     (`clear_key`), where it would be in the way again. FAILURE with PRECONDITION: nobody knows what it stands on.
     """
 
+    kind = "in the way"
     thing: str
     blocking_key: str
     wanted_key: str
@@ -46,6 +45,12 @@ class InTheWay(ExplainedLeaf):
     context: RunContext
     clear_m: float = 0.25
 
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The keys of the object, its surface, the pose and the circles."""
+        types = {"obstacle_key": ObjectObservation, "surface_key": Surface, "pose_key": Pose2D}
+        return {options[name]: kind for name, kind in types.items()} | {options["clear_key"]: tuple[Circle, ...]}
+
     def update(self) -> Status:
         """Write where it is, and where it must not be put."""
         board = self.context.board
@@ -55,15 +60,12 @@ class InTheWay(ExplainedLeaf):
         floor = floor_square(Pose2D(x, y, 0.0), 0.0, _FLOOR_HALF_M)
         surface = next((each for each in (*self.surfaces, floor) if each.name == obstacle.surface), None)
         if surface is None:
-            self.cause, self.message = Cause.PRECONDITION, f"it is not known what the {obstacle.thing} stands on"
-            return Status.FAILURE
+            return self.fail(Failed(Cause.PRECONDITION, f"it is not known what the {obstacle.thing} stands on"))
         board.put(self.obstacle_key, obstacle)
         board.put(self.surface_key, surface)
         board.put(self.pose_key, self.context.pose())
         board.put(self.clear_key, _way_circles(wanted, self.context.pose(), self.clear_m))
-        self.cause = None
-        self.message = f"the {obstacle.thing} is in the way of the {self.thing}; it is moved aside"
-        return Status.SUCCESS
+        return self.say(f"the {obstacle.thing} is in the way of the {self.thing}; it is moved aside")
 
 
 def floor_square(pose: Pose2D, ahead_m: float, half_m: float) -> Surface:
@@ -78,17 +80,6 @@ def _way_circles(wanted: ObjectObservation, pose: Pose2D, radius_m: float) -> tu
     off_x, off_y = pose.x_m - x, pose.y_m - y
     steps = max(1, round(math.hypot(off_x, off_y) / _STEP_M))
     return tuple((x + k / steps * off_x, y + k / steps * off_y, radius_m) for k in range(steps + 1))
-
-
-def _written(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The keys of the object, its surface, the pose and the circles."""
-    circles = tuple[Circle, ...]
-    return {
-        options["obstacle_key"]: ObjectObservation,
-        options["surface_key"]: Surface,
-        options["pose_key"]: Pose2D,
-        options["clear_key"]: circles,
-    }
 
 
 def can_move_aside(builder: PlanBuilder) -> bool:
@@ -147,6 +138,3 @@ def move_aside_plan(
         ),
         below.node("selector", "go back to where it stood, or go on from here", there, here, part="there"),
     )
-
-
-KINDS: Final[Mapping[str, NodeKind]] = {"in the way": NodeKind(InTheWay, ("context",), writes=_written)}

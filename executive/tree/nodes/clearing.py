@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Final
+from dataclasses import field, replace
+from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import cause_of, message_of
+from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.board import Board, FromBoardOr
-from executive.tree.node import NodeKind, NodeSpec
-from executive.tree.nodes.commands import put_down_plan
-from executive.tree.nodes.composites import MemoryComposite
-from executive.tree.nodes.pick_up import pick_up_plan, tidied
+from executive.tree.node import NodeSpec
+from executive.tree.nodes.carry import put_down_plan
+from executive.tree.nodes.pick_up import pick_up_plan
 from executive.tree.nodes.policies import FINAL_CAUSES
 from executive.tree.nodes.search import detect_plan, look_plans, required_surfaces, where
 from executive.tree.plan import PlanBuilder
@@ -35,7 +34,6 @@ MOST_OBJECTS: Final = 12
 MOST_MISSES: Final = 3
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class ForEachFound(MemoryComposite):
     """A look (the first child, which writes what it found under `key`), and what is done with each object it finds.
 
@@ -49,6 +47,7 @@ class ForEachFound(MemoryComposite):
     was done ("moved", "to the bench"), `where` where nothing is left.
     """
 
+    kind = "for each found"
     key: str
     done: str
     missed: str
@@ -62,33 +61,30 @@ class ForEachFound(MemoryComposite):
     _failures: int = field(default=0, init=False)
     _why: str = field(default="", init=False)
 
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The keys of the objects that were done, and missed."""
+        return {options["done"]: Seen, options["missed"]: Seen}
+
     def tick(self) -> Iterator[Behaviour]:
-        """Tick the look, or what is done with the object that it found."""
-        if self.status != Status.RUNNING:
-            self._restart()
-        look, action = self.children
-        if self._index == 0:
-            if look.status != Status.RUNNING:
-                self._reset_children()
-            self.current_child = look
-            yield from look.tick()
-            if look.status == Status.SUCCESS and len(self._noted(self.done)) < self.limit:
-                self._index = 1
-        if self._index == 1:
-            self.current_child = action
-            yield from action.tick()
-        self._judge(look, action)
-        yield self
+        """Look anew in each round; until then the results of the round before are to be seen."""
+        if self._index == 0 and self.children[0].status != Status.RUNNING:
+            self._reset_children()
+        yield from super().tick()
+
+    def _following(self, child: Behaviour) -> int | None:
+        found = child.status == Status.SUCCESS and len(self._noted(self.done)) < self.limit
+        return 1 if self._index == 0 and found else None
 
     def _restart(self) -> None:
         super()._restart()
         self._failures, self._why = 0, "before the restart"
         self.board.forget(self.forgets)
 
-    def _judge(self, look: Behaviour, action: Behaviour) -> None:
-        child = self.children[self._index]
+    def _take_over(self, child: Behaviour) -> None:
+        look, action = self.children
         if child.status == Status.RUNNING:
-            self.status, self.cause, self.message = Status.RUNNING, None, message_of(child)
+            self._go_on(message_of(child))
         elif child is action:
             self._action_ended(action)
         elif look.status == Status.SUCCESS:
@@ -116,13 +112,9 @@ class ForEachFound(MemoryComposite):
         else:
             self._next_round(f"looks again, since {why}")
 
-    def _reset_children(self) -> None:
-        """Not in the tick in which the round before ended: its results are to be seen."""
-        for child in self.children:
-            child.stop(Status.INVALID)
-
     def _next_round(self, said: str) -> None:
-        self._index, self.status, self.cause, self.message = 0, Status.RUNNING, None, said
+        self._index = 0
+        self._go_on(said)
 
     def _nothing_left(self) -> None:
         """The end: all that was found was done, unless an object is gone that was missed."""
@@ -142,10 +134,6 @@ class ForEachFound(MemoryComposite):
     def _noted(self, key: str) -> Seen:
         noted: Seen = self.board.get(key) if key in self.board else ()
         return noted
-
-    def _end(self, cause: Cause | None, message: str) -> None:
-        self.cause, self.message = cause, message
-        self.stop(Status.SUCCESS if cause is None else Status.FAILURE)
 
 
 def _apart_m(one: ObjectObservation, other: ObjectObservation) -> float:
@@ -183,7 +171,7 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     again = detect_plan(builder.at("find"), thing, surfaces, key, extra)
     around = tuple(map(builder.surface, surfaces))
     carry = replace(builder.at("bring"), command=bring)
-    put = tidied(carry.at("tidy"), put_down_plan(carry, thing, to)[0], only_after_failure=True)
+    put = carry.at("tidy").tidied(put_down_plan(carry, thing, to)[0], only_after_failure=True)
     take = pick_up_plan(builder, thing, again, key, around, seen=True)
     move = builder.at("move").sequence("move it", take, put)
     return builder.node(
@@ -208,12 +196,3 @@ def refuse_everything(builder: PlanBuilder) -> None:
     if any(thing is not None and thing.name == EVERYTHING for thing in (command.item, command.object)):
         hint = "say from where to where in one step: 'move everything from the desk to the shelf'"
         raise builder.error("everything cannot be taken in one go", hint)
-
-
-KINDS: Final[Mapping[str, NodeKind]] = {
-    "for each found": NodeKind(
-        ForEachFound,
-        ("children", "board", "robot"),
-        writes=lambda options: {options["done"]: Seen, options["missed"]: Seen},
-    ),
-}

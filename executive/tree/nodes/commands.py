@@ -1,44 +1,124 @@
-"""The subtree of each kind of command: take hold of, look whether, carry, go."""
+"""Commands: take hold of, look whether, carry, go, wait, charge; and two that are made of trips or rounds."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
-from typing import Final
+from dataclasses import replace
+from typing import Annotated, Final
 
-from executive.tree.board import FromBoard
+from executive.mission.gripper import after_command, is_same
+from executive.tree.assembly import Assembler, StepPlans
+from executive.tree.goals import clearing_goals, command_goal, surfaces_to_search
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.fallen import unless_fallen
-from executive.tree.nodes.guard import Holds, HoldsNothingElse
-from executive.tree.nodes.interrupts import dock_plan
-from executive.tree.nodes.pick_up import go_near_plan, held_plan, known_held_plan, pick_up_plan, tidied
+from executive.tree.nodes.carry import carried_along_plan, carry_plan, goal_in_words, goal_pose
+from executive.tree.nodes.clearing import clear_plan, is_clearing, refuse_everything
+from executive.tree.nodes.dock import charge_plan
+from executive.tree.nodes.guard import HoldsNothingElse
+from executive.tree.nodes.pick_up import go_near_plan, held_plan, known_held_plan, pick_up_plan
 from executive.tree.nodes.search import (
-    look_plans,
-    people_looks,
+    answering,
+    find_plan,
+    refuse_several,
     required_surfaces,
     search_plan,
     surfaces_elsewhere,
-    tally_of,
     where,
 )
-from executive.tree.plan import PlanBuilder, pose_2d
-from executive.words.command import START, TIME_UNITS_S, Task
-from executive.words.geometry import inside
-from executive.words.knowledge import ANYBODY, ANYTHING
+from executive.tree.plan import Assembled, PlanBuilder, StepPart
+from executive.words.command import START, TIME_UNITS_S, Command, Task
+from executive.words.goal import GoalCondition, When
+from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import Do, Say
 from skills.api import Thing
-from skills.detect.words import numbered, plural
-from skills.robot import Pose2D
+from skills.files.errors import InputError, listing
+from skills.quantities import Quantity
 
+MAX_TRIPS: Final = 20
 LONGEST_WAIT_S: Final = 3600.0
 
 
-def step_plan(builder: PlanBuilder) -> NodeSpec:
-    """The subtree of the builder's command.
+COUNTED: Final = Annotated[float, Quantity(ge=0.0, le=1_000.0)]
+"""How many objects a look counts."""
+_ANSWERS: Final[Mapping[str, tuple[str, type]]] = {"answer": ("key", bool), "count": ("count_key", float)}
+"""What a status check can give: the option of its answer node that names the key, and the type."""
 
-    Raises InputError: an unknown place or object, or a command that cannot be carried out.
-    """
-    return _BY_TASK[builder.command.task](builder)
+
+def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembled:
+    """The subtree of one command, or of two in a row that get and bring several objects, or all."""
+    if not step.commands:
+        raise InputError("a step has no commands", hint="give it 'say', a command, a skill or a file to use")
+    builder = replace(
+        builder,
+        anywhere=step.elsewhere is not False,
+        pick_ups=assembler.pick_ups if step.pick_ups is None else step.pick_ups,
+        move_aside=assembler.move_aside if step.move_aside is None else step.move_aside,
+    )
+    command, following, flow, knowledge = builder.command, builder.following, assembler.flow, builder.knowledge
+    if following is not None and (are_trips(command, following) or is_clearing(command, following)):
+        return _pair_plan(assembler, builder, following)
+    held, opening = flow.held, flow.opening
+    builder = replace(
+        builder,
+        avoided=_goals(following, knowledge),
+        in_gripper=is_same(held, command.object, knowledge),
+        carried=None if held is None else held.thing,
+    )
+    refuse_several(builder)
+    refuse_everything(builder)
+    node = _giving(assembler, step, _BY_TASK[command.task](builder), builder)
+    flow.held = after_command(command, held, knowledge)
+    lets_go = command.item is not None or command.task is Task.PLACE
+    flow.opening = opening and command.task is not Task.GRASP and flow.held == held and not lets_go
+    goal = command_goal(command, knowledge, _elsewhere(builder))
+    part = StepPart(builder.path_id, command, goal=goal, held=held, opening=opening, node=node.path_id)
+    return Assembled((node,), (part,))
+
+
+def _pair_plan(assembler: Assembler, builder: PlanBuilder, bring: Command) -> Assembled:
+    """The one subtree of two commands that get and bring several objects, or all."""
+    get, flow, knowledge = builder.command, assembler.flow, builder.knowledge
+    goals: tuple[GoalCondition | None, ...]
+    if is_clearing(get, bring):
+        node, goals = clear_plan(builder, bring), clearing_goals(get, bring, knowledge)
+    else:
+        node, got = trips_plan(builder, bring), command_goal(get, knowledge)
+        goals = (None if got is None else replace(got, when=When.SOME_TIME), command_goal(bring, knowledge))
+    held, opening = flow.held, flow.opening
+    flow.held, flow.opening = None, False
+    parts = (
+        StepPart(node.path_id, get, goal=goals[0], held=held, opening=opening),
+        StepPart(node.path_id, bring, goal=goals[1], held=after_command(get, held, knowledge), opening=False),
+    )
+    return Assembled((node,), parts, used=2)
+
+
+def _giving(assembler: Assembler, step: Do | Say, node: NodeSpec, builder: PlanBuilder) -> NodeSpec:
+    """The subtree of a status check whose answer later steps read. Raises InputError: it gives no such thing."""
+    command, keys = builder.command, dict[str, str]()
+    for port, name in (step.gives or {}).items():
+        known = ("answer", "count") if command.object_count != 1 else ("answer",)
+        if command.task is not Task.FIND or port not in known:
+            said = listing(known) if command.task is Task.FIND else "no answer"
+            hint = "write {answer: NAME} beside a question, or {count: NAME} beside one that counts"
+            raise InputError.at(step.source, f"this step gives {said}, not '{port}'", hint=hint)
+        option, kind = _ANSWERS[port]
+        keys[option] = assembler.give(name, builder.key(port), kind, builder, COUNTED if port == "count" else None)
+    return answering(node, keys) if keys else node
+
+
+def _goals(command: Command | None, knowledge: Knowledge) -> frozenset[str]:
+    """The surfaces to which a command brings what is fetched before."""
+    place = None if command is None or command.goal is None else knowledge.place(command.goal)
+    return frozenset() if place is None else frozenset(knowledge.surfaces_in(place))
+
+
+def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
+    """Where else the object of a command to get it may be found."""
+    command, knowledge = builder.command, builder.knowledge
+    if command.task is not Task.GRASP or command.object is None or command.goal is None or not builder.anywhere:
+        return ()
+    name = knowledge.thing(command.object.name) or command.object.name
+    return surfaces_elsewhere(knowledge, name, builder.place(command.goal), builder.avoided)
 
 
 def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
@@ -49,7 +129,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     earlier step grasped, be it that this step failed, is not looked for, unless the gripper is empty. While it holds
     another object, nothing is looked for: PRECONDITION.
     """
-    thing = _required(builder, builder.command.object)
+    thing = builder.known(builder.command.object)
     if builder.command.item is not None:
         raise builder.error("the one gripper cannot take hold of a second object", "put the first one down before")
     place = None if builder.command.goal is None else builder.place(builder.command.goal)
@@ -72,78 +152,6 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     )
 
 
-def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
-    """Look at the surfaces of the place and answer yes or no; where it is asked where or how many, tell that, too.
-
-    The answer goes to `answer_key`, which is a key of this subtree unless one is given.
-
-    The first object that is seen ends the search, unless they are to be counted: then all surfaces are looked at.
-    People are looked for in rooms.
-    """
-    command, knowledge = builder.command, builder.knowledge
-    place = None if command.goal is None else builder.place(command.goal)
-    counting, key = command.object_count != 1, builder.key("detection")
-    person = None if command.object is None else knowledge.somebody(command.object.name)
-    if person is not None:
-        what = "somebody" if person == ANYBODY else person
-        asked = what if command.object_count == 1 else _asked_for(person, command.object_count)
-        looks = people_looks(builder.at("search"), person, place, key, tallied=counting)
-    else:
-        thing = _required(builder, command.object)
-        what, asked = str(thing), _asked_for(str(thing), command.object_count)
-        whole_room = place is None or place in knowledge.places
-        extra = {"floor": whole_room, "count": 0 if counting else 1}
-        surfaces = required_surfaces(builder, thing, place)
-        looks = look_plans(builder.at("search"), thing, surfaces, key, extra, tallied=counting)
-    below = builder.at("search")
-    search = below.node("round" if counting else "selector", f"look for {what}", *(look for _, look in looks))
-    leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
-    tallies = {look.children[-1].path_id: tally_of(look.children[-1]) for _, look in looks if counting}
-    spot = where(knowledge, place)
-    denied = f"{'not' if command.object_count > 1 or person in knowledge.people else 'no'} {asked} {spot}"
-    if what == ANYTHING:
-        asked, denied = "something", f"nothing {spot}"
-    elif person == ANYBODY and not counting:
-        denied = f"nobody {spot}"
-    named = "is" if person in knowledge.people else "are there" if counting and what != ANYTHING else "is there"
-    answer = builder.node(
-        "answer",
-        f"{named} {asked} {spot}?",
-        search,
-        question=asked if place is None else f"{asked} {spot}",
-        denied=denied,
-        looks=MappingProxyType(leaves),
-        key=answer_key or builder.key("answer"),
-        tells=place is None,
-        tallies=MappingProxyType(tallies),
-        needed=max(1, command.object_count),
-        yes_or_no=what != ANYTHING,
-    )
-    return tidied(builder.at("tidy"), answer)
-
-
-def _asked_for(thing: str, count: int) -> str:
-    """What a question is about: "beer", "two beers", or "beers" for any number."""
-    if count == 1:
-        return thing
-    return numbered(count, thing) if count else plural(thing)
-
-
-def carry_plan(builder: PlanBuilder) -> NodeSpec:
-    """Carry the item to a person, to the start, or to a surface of a place."""
-    command = builder.command
-    item = _required(builder, command.item or command.object)
-    goal = command.goal
-    if goal is None:
-        raise builder.error(f"it is not said where to take the {item}", "name a place or a person")
-    if goal == START:
-        return _hand_over_plan(builder, item, FromBoard(builder.start_key), _person_at_start(builder))
-    person = builder.knowledge.person(goal)
-    if person is not None:
-        return _hand_over_plan(builder, item, person_pose(builder, person, command.goal_at), person)
-    return _put_down_plan(builder, item, builder.place(goal))
-
-
 def go_plan(builder: PlanBuilder) -> NodeSpec:
     """Go to a place, a person or the start; with an item in the gripper, carry it."""
     command = builder.command
@@ -151,25 +159,9 @@ def go_plan(builder: PlanBuilder) -> NodeSpec:
         return carry_plan(builder)
     if command.goal is None:
         raise builder.error("the command asks for nothing", "name a place to go to, or an object")
-    to = _called(builder, command.goal)
-    way = go_near_plan(builder, _goal_pose(builder, command.goal), to)
-    return builder.sequence(f"go to {to}", _carried_along(builder, way, f"to {to}"))
-
-
-def _carried_along(builder: PlanBuilder, way: NodeSpec, to: str) -> NodeSpec:
-    """A way on which what an earlier step has grasped stays in the gripper; it is picked up again where it falls.
-
-    An earlier step that failed and was passed over has grasped nothing: then there is nothing to watch.
-    """
-    if builder.carried is None:
-        return way
-    guard = _holding(builder.at("carried"), builder.carried, to, way, until_put_down=True)
-    return unless_fallen(builder.at("carry-on"), builder.carried, to, guard, (guard,))
-
-
-def _called(builder: PlanBuilder, goal: str) -> str:
-    """A goal as it is called in a sentence."""
-    return goal if builder.knowledge.person(goal) else f"the {goal}"
+    to = goal_in_words(builder, command.goal)
+    way = go_near_plan(builder, goal_pose(builder, command.goal), to)
+    return builder.sequence(f"go to {to}", carried_along_plan(builder, way, f"to {to}"))
 
 
 def wait_plan(builder: PlanBuilder) -> NodeSpec:
@@ -187,98 +179,9 @@ def wait_plan(builder: PlanBuilder) -> NodeSpec:
     pause = builder.pause("wait", f"wait {duration_s:g} s", duration_s)
     if command.goal is None:
         return builder.sequence("wait here", pause)
-    goal, to = _goal_pose(builder, command.goal), _called(builder, command.goal)
-    way = _carried_along(builder, go_near_plan(builder, goal, to), f"to {to}")
+    goal, to = goal_pose(builder, command.goal), goal_in_words(builder, command.goal)
+    way = carried_along_plan(builder, go_near_plan(builder, goal, to), f"to {to}")
     return builder.sequence(f"wait at {to}", way, pause)
-
-
-def charge_plan(builder: PlanBuilder) -> NodeSpec:
-    """Go to the dock and charge there. Raises InputError: anything else is said with it."""
-    command, facts = builder.command, builder.knowledge
-    if any(part is not None for part in (command.item, command.goal, command.object)):
-        raise builder.error("the robot charges itself, at its dock", "say 'do: charge' alone")
-    if facts.dock is None:
-        raise builder.error("this world has no dock to charge at", "add 'dock' to its knowledge")
-    return dock_plan(builder, pose_2d(facts.dock), facts.battery.charged)
-
-
-def person_pose(builder: PlanBuilder, person: str, at: str | None) -> Pose2D:
-    """Where to stand to meet a person: the pose of the place where they are, turned to them when that is known."""
-    facts = builder.knowledge.people[person]
-    place = builder.place(at or facts.at)
-    stand = builder.knowledge.place_pose(place)
-    if facts.pose is None or builder.knowledge.room(place) != builder.knowledge.room(builder.place(facts.at)):
-        return pose_2d(stand)
-    return Pose2D(stand.x, stand.y, math.atan2(facts.pose.y - stand.y, facts.pose.x - stand.x))
-
-
-def _goal_pose(builder: PlanBuilder, goal: str) -> Pose2D | FromBoard:
-    if goal == START:
-        return FromBoard(builder.start_key)
-    person = builder.knowledge.person(goal)
-    if person is not None:
-        return person_pose(builder, person, builder.command.goal_at)
-    return pose_2d(builder.knowledge.place_pose(builder.place(goal)))
-
-
-def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
-    """Carry it there and hold it out; the gripper opens when the person takes it."""
-    to = "the start" if isinstance(pose, FromBoard) else person
-    ports = {"person": person, **({"thing": str(item)} if builder.has_ports("hand_over", ("thing",)) else {})}
-    way = _holding(builder, item, f"to {to}", go_near_plan(builder, pose, to))
-    hand_over = builder.skill("hand_over", ports)
-    give = _holding(builder.at("give"), item, f"to {to}", hand_over, until_put_down=True)
-    bring = builder.at("bring").sequence(f"bring it to {person}", way, give)
-    return unless_fallen(builder.at("carry-on"), item, f"to {to}", bring, (way, give), (hand_over,))
-
-
-def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:
-    """Put down in a place; what is dropped on the way is picked up again."""
-    put, guards = put_down_plan(builder, item, place)
-    skills = tuple(guard.children[0] for guard in guards if guard.children[0].kind == "skill")
-    return unless_fallen(builder.at("carry-on"), item, f"to the {place}", put, guards, skills)
-
-
-def put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> tuple[NodeSpec, tuple[NodeSpec, ...]]:
-    """Any surface of the place will do: the next one is tried when one does not work. With it, the guards of the ways.
-
-    Raises InputError: the place has no surfaces.
-    """
-    surfaces = builder.knowledge.surfaces_in(place)
-    if not surfaces:
-        raise builder.error(
-            f"'{place}' has no surface to put the {item} on", "add one under 'surfaces' in the knowledge"
-        )
-    to = f"to the {place}"
-    ways = tuple(_put_on_plan(builder.at(name), item, name, to) for name in surfaces)
-    put = builder.node("selector", f"put {item} down {where(builder.knowledge, place)}", *ways)
-    return put, tuple(guard for way in ways for guard in way.children)
-
-
-def _put_on_plan(builder: PlanBuilder, item: Thing, surface: str, to: str) -> NodeSpec:
-    """Carry it there and put it down; both under guards."""
-    view, carry = pose_2d(builder.knowledge.surfaces[surface].viewpoints[0]), builder.at("carry")
-    place = builder.skill("place", {"surface": builder.surface(surface)})
-    return builder.sequence(
-        f"put it on {surface}",
-        _holding(carry, item, to, go_near_plan(carry, view, f"the {surface}")),
-        _holding(builder.at("put"), item, to, place, until_put_down=True),
-    )
-
-
-def _holding(builder: PlanBuilder, item: Thing, to: str, below: NodeSpec, *, until_put_down: bool = False) -> NodeSpec:
-    """A guard: what is carried stays in the gripper, perhaps until it is put down."""
-    condition = Holds(str(item), to, until_put_down, builder.sought(item.name), item.attributes)
-    return builder.node("guard", f"holding {item}", below, condition=condition)
-
-
-def _person_at_start(builder: PlanBuilder) -> str:
-    """The one person who is known to be in the room of the start; else whoever stands there."""
-    knowledge = builder.knowledge
-    start = (knowledge.start.x, knowledge.start.y)
-    rooms = [name for name, place in knowledge.places.items() if inside(place.polygon, start)]
-    there = [name for name, facts in knowledge.people.items() if knowledge.room(builder.place(facts.at)) in rooms]
-    return there[0] if len(there) == 1 else "person"
 
 
 def _required(builder: PlanBuilder, thing: Thing | None) -> Thing:
@@ -286,6 +189,48 @@ def _required(builder: PlanBuilder, thing: Thing | None) -> Thing:
         raise builder.error("the command names no object", "say what it is about")
     builder.classes(thing.name)
     return thing
+
+
+def are_trips(get: Command, bring: Command | None) -> bool:
+    """True when two commands in a row ask to get several objects and to bring as many of them somewhere."""
+    if bring is None or get.task is not Task.GRASP or get.object is None or get.object_count < 2:
+        return False
+    carried, count = (bring.item, bring.item_count) if bring.task is None else (bring.object, bring.object_count)
+    return bring.task in (None, Task.PLACE) and carried == get.object and count == get.object_count
+
+
+def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
+    """Get one and bring it there, as often as was said; `builder` is that of the command to get them.
+
+    Raises InputError: too many; to a person, who takes one; no place to take them from, or
+    one where those that were brought would be found again.
+    """
+    get, goal = builder.command, bring.goal
+    count, thing = get.object_count, get.object
+    several = f"{count} of '{thing}'"
+    if count > MAX_TRIPS:
+        raise builder.error(f"{several} are too many trips", f"ask for {MAX_TRIPS} at most")
+    if goal == START or (goal is not None and builder.knowledge.person(goal) is not None):
+        hint = "name a place with a surface to put them on"
+        raise builder.error(f"{several} cannot be handed over: a person takes one object", hint)
+    if get.goal is None:
+        raise builder.error(f"it is not said where to take {several} from", "name the place")
+    brought = set(builder.knowledge.surfaces_in(builder.place(goal))) if goal is not None else set()
+    if thing is not None and brought & set(surfaces_to_search(builder.knowledge, thing.name, builder.place(get.goal))):
+        hint = "name the surface that they are to be taken from"
+        raise builder.error(
+            f"{several} that lie in the {get.goal} already cannot be told from those brought there", hint
+        )
+    trips = tuple(_trip(builder, bring, number) for number in range(1, count + 1))
+    return builder.sequence(f"bring {count} {thing} to {goal}, one at a time", *trips)
+
+
+def _trip(builder: PlanBuilder, bring: Command, number: int) -> NodeSpec:
+    """Get one object and bring it."""
+    trip = builder.at(f"trip-{number}")
+    get_one = replace(trip.at("get"), command=replace(builder.command, object_count=1))
+    bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))
+    return trip.sequence(f"trip {number}", grasp_plan(get_one, anywhere=False), carry_plan(bring_one))
 
 
 _BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {
@@ -296,3 +241,4 @@ _BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {
     Task.CHARGE: charge_plan,
     None: go_plan,
 }
+PLANS: Final[StepPlans] = {Do: _plan, Say: _plan}

@@ -1,4 +1,4 @@
-"""What a mission decides by while it runs: decisions as plain data, and the nodes that make them.
+"""What a mission decides by while it runs: a condition as data, the looks that it takes, and the nodes that decide.
 
 A decision is true, false, or not known yet (None): a look that it takes has not been taken.
 """
@@ -7,20 +7,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Final, Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite
 
-from executive.tree.behaviour import ExplainedNode, cause_of, message_of
+from executive.mission.certainty import refuse_certain
+from executive.tree.assembly import Flow
+from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.context import RunContext
-from executive.tree.node import NodeKind, NodeSpec
-from executive.tree.nodes.guard import Condition, Verdict, Waiting
-from executive.words.condition import READINGS
-from executive.words.expression import Expression, ExpressionError, Value
+from executive.tree.goals import command_goal, door_goal
+from executive.tree.node import NodeSpec
+from executive.tree.nodes import guard
+from executive.tree.nodes.doors import door_plan
+from executive.tree.nodes.guard import Verdict, Waiting
+from executive.tree.nodes.search import find_plan, refuse_several
+from executive.tree.plan import PlanBuilder, StepPart
+from executive.words.condition import (
+    READINGS,
+    AllOf,
+    AnyOf,
+    ButtonPressed,
+    Condition,
+    DoorOpen,
+    Look,
+    Not,
+    ValueIs,
+    parts_of,
+)
+from executive.words.expression import ExpressionError, Kind, Value
 from skills.api import Cause, Failed
+from skills.files.errors import InputError
 
 DAY_S: Final = 86_400.0
 Keys = Mapping[str, str]
@@ -92,116 +110,60 @@ class _Values(Mapping[str, Value]):
         return sum(1 for _ in self)
 
 
-class Decision(Protocol):
-    """Something that is true, false or not known yet."""
-
-    def holds(self, view: View) -> bool | None:
-        """Whether it holds now. Raises ExpressionError: an expression has no value."""
-
-
 @dataclass(frozen=True)
-class ValueHolds:
-    """An expression of values and readings."""
+class Decision:
+    """A condition, and where its values and the answers of its looks, in their order, stand on the blackboard."""
 
-    expression: Expression
+    condition: Condition
     keys: Keys = field(default_factory=dict)
+    answers: tuple[str, ...] = ()
 
     def holds(self, view: View) -> bool | None:
-        """Its value."""
-        return bool(self.expression.value(view.values(self.keys)))
+        """Whether it holds now; None before a look that it needs. Raises ExpressionError: something has no value."""
+        return self._holds(self.condition, view, iter(self.answers))
 
+    def _holds(self, condition: Condition, view: View, answers: Iterator[str]) -> bool | None:
+        match condition:
+            case ValueIs(expression=expression):
+                return bool(expression.value(view.values(self.keys)))
+            case ButtonPressed(button=button):
+                return view.pressed(button)
+            case Not(part=part):
+                found = self._holds(part, view, answers)
+                return None if found is None else not found
+            case AllOf(parts=parts) | AnyOf(parts=parts):
+                held = [self._holds(part, view, answers) for part in parts]
+                decisive = isinstance(condition, AnyOf)
+                return decisive if decisive in held else None if None in held else not decisive
+        key, board = next(answers), view.context.board
+        return bool(board.get(key)) if key in board else None
 
-@dataclass(frozen=True)
-class AnswerIs:
-    """The answer of a look, under a blackboard key; one that is up to `max_age_s` old is not asked for again."""
-
-    key: str
-    max_age_s: float = 0.0
-
-    def holds(self, view: View) -> bool | None:
-        """The answer; None before the look."""
-        return bool(view.context.board.get(self.key)) if self.key in view.context.board else None
-
-
-@dataclass(frozen=True)
-class Pressed:
-    """A button has been pressed."""
-
-    button: str
-
-    def holds(self, view: View) -> bool | None:
-        """Whether it has."""
-        return view.pressed(self.button)
-
-
-@dataclass(frozen=True)
-class AllHold:
-    """All of several; false as soon as one is."""
-
-    parts: tuple[Decision, ...]
-
-    def holds(self, view: View) -> bool | None:
-        """False when one is, else None when one is not known."""
-        found = [part.holds(view) for part in self.parts]
-        return False if False in found else None if None in found else True
-
-
-@dataclass(frozen=True)
-class AnyHolds:
-    """One of several; true as soon as one is."""
-
-    parts: tuple[Decision, ...]
-
-    def holds(self, view: View) -> bool | None:
-        """True when one is, else None when one is not known."""
-        found = [part.holds(view) for part in self.parts]
-        return True if True in found else None if None in found else False
-
-
-@dataclass(frozen=True)
-class DoesNotHold:
-    """The opposite."""
-
-    part: Decision
-
-    def holds(self, view: View) -> bool | None:
-        """The opposite, where it is known."""
-        found = self.part.holds(view)
-        return None if found is None else not found
+    @property
+    def looks(self) -> tuple[tuple[str, Look | DoorOpen], ...]:
+        """The looks that it takes, by the keys of their answers."""
+        looks = (part for part in parts_of(self.condition) if isinstance(part, Look | DoorOpen))
+        return tuple(zip(self.answers, looks, strict=True))
 
 
 def buttons_of(node: NodeSpec) -> Iterator[str]:
     """The buttons that a node decides by."""
     condition = node.options.get("condition")
     decision = condition.decision if isinstance(condition, MustHold) else node.options.get("decision")
-    yield from (part.button for part in _parts(decision) if isinstance(part, Pressed))
-
-
-def _parts(decision: Any) -> Iterator[Any]:
-    """What a decision is made of, in order."""
-    match decision:
-        case AllHold(parts) | AnyHolds(parts):
-            for part in parts:
-                yield from _parts(part)
-        case DoesNotHold(part):
-            yield from _parts(part)
-        case _:
-            yield decision
+    if isinstance(decision, Decision):
+        yield from (part.button for part in parts_of(decision.condition) if isinstance(part, ButtonPressed))
 
 
 @dataclass
-class MustHold(Condition):
+class MustHold(guard.Condition):
     """A decision that must be true while nodes run; PRECONDITION when it is not, ERROR where it has no value."""
 
     decision: Decision
     words: str
     _view: View | None = field(default=None, init=False, repr=False, compare=False)
 
-    def for_run(self, context: RunContext) -> MustHold:
-        """A copy that counts from now."""
-        mine = MustHold(self.decision, self.words, stale=self.stale)
-        mine._view = View(context)
-        return mine
+    def run_begins(self, context: RunContext) -> None:
+        """Count time and presses from now."""
+        self._view = View(context)
 
     def judged(self, context: RunContext) -> Verdict:
         """A failure when it does not hold."""
@@ -226,12 +188,6 @@ class MustNotBegin(MustHold):
 
     _called: bool = field(default=False, init=False, repr=False, compare=False)
 
-    def for_run(self, context: RunContext) -> MustNotBegin:
-        """A copy that counts from now."""
-        mine = MustNotBegin(self.decision, self.words, stale=self.stale)
-        mine._view = View(context)
-        return mine
-
     def begin(self, context: RunContext) -> None:
         """The steps begin: nothing was called yet."""
         super().begin(context)
@@ -252,8 +208,7 @@ class MustNotBegin(MustHold):
         return Failed(Cause.PRECONDITION, self.words) if holds and not self._called else None
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
-class Decide(ExplainedNode, Composite):
+class Decide(MemoryComposite):
     """Decides, and takes the looks (its children) one after the other only as long as the decision needs them.
 
     A look that has begun is taken to its end. Decided: SUCCESS, the answer under `key`. A look RUNNING: RUNNING. A look
@@ -262,100 +217,114 @@ class Decide(ExplainedNode, Composite):
     their `max_age_s`; the n-th child is the look for the n-th answer of the decision.
     """
 
+    kind = "decide"
+    least = 0
     decision: Decision
     words: str
     key: str
     context: RunContext
-    children: list[Behaviour]
-    _next: int = field(default=0, init=False)
     _given_s: dict[str, float] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        Composite.__init__(self, self.name, list(self.children))
+        super().__post_init__()
         self.view = View(self.context)
-        self._answers = [part for part in _parts(self.decision) if isinstance(part, AnswerIs)]
+
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The key of the answer."""
+        return {options["key"]: bool}
 
     def tick(self) -> Iterator[Behaviour]:
         """Decide, or take the next look."""
         looks = self.status == Status.RUNNING
         if not looks:
             self._restart()
-        while True:
-            if not looks and self._decided():
+        while looks or not self._decided():
+            if self._index == len(self.children):
+                self._end(Cause.ERROR, f"it cannot be told whether {self.words}")
                 break
-            looked, looks = looks, False
-            if self._next == len(self.children):
-                self._end(Failed(Cause.ERROR, f"it cannot be told whether {self.words}"))
-                break
-            child = self.current_child = self.children[self._next]
-            if not looked and self._known(self._next):
-                self._next += 1
-                continue
-            yield from child.tick()
-            if child.status == Status.RUNNING:
-                self.status, self.cause, self.message = Status.RUNNING, None, message_of(child)
-                break
-            if child.status != Status.SUCCESS:
-                self._end(Failed(cause_of(child), f"cannot tell whether {self.words}: {message_of(child)}"))
-                break
-            self._note(self._next)
-            self._next += 1
+            if looks or self.decision.answers[self._index] not in self.context.board:
+                child = self.current_child = self.children[self._index]
+                yield from child.tick()
+                if child.status == Status.RUNNING:
+                    self._go_on(message_of(child))
+                    break
+                if child.status != Status.SUCCESS:
+                    self._end(cause_of(child), f"cannot tell whether {self.words}: {message_of(child)}")
+                    break
+                self._given_s[self.decision.answers[self._index]] = self.context.clock.now()
+            looks = False
+            self._index += 1
         yield self
 
-    def stop(self, new_status: Status = Status.INVALID) -> None:
-        """Stop the look that is taken."""
-        interrupted = new_status == Status.INVALID and self.status == Status.RUNNING
-        for child in self.children:
-            if new_status == Status.INVALID and (not interrupted or child.status == Status.RUNNING):
-                child.stop(Status.INVALID)
-        if interrupted:
-            self.explain_cancelled()
-        elif new_status == Status.INVALID:
-            self.clear_explanation()
-        self.status = new_status
-        self.iterator = self.tick()
-
     def _restart(self) -> None:
-        self._next = 0
-        self.clear_explanation()
-        self.context.board.forget(answer.key for answer in self._answers if not self._fresh(answer))
-        for child in self.children:
-            child.stop(Status.INVALID)
+        super()._restart()
+        self.context.board.forget(key for key, look in self.decision.looks if not self._fresh(key, look.max_age_s))
 
-    def _fresh(self, answer: AnswerIs) -> bool:
+    def _fresh(self, key: str, max_age_s: float) -> bool:
         """Whether an answer of an earlier time need not be asked for again."""
-        given_s = self._given_s.get(answer.key)
-        old_s = math.inf if given_s is None else self.context.clock.now() - given_s
-        return answer.max_age_s > 0.0 and old_s <= answer.max_age_s
-
-    def _known(self, number: int) -> bool:
-        """Whether the answer of a look is there."""
-        return number < len(self._answers) and self._answers[number].key in self.context.board
-
-    def _note(self, number: int) -> None:
-        """Note when a look has given its answer."""
-        if number < len(self._answers):
-            self._given_s[self._answers[number].key] = self.context.clock.now()
+        old_s = self.context.clock.now() - self._given_s.get(key, -math.inf)
+        return max_age_s > 0.0 and old_s <= max_age_s
 
     def _decided(self) -> bool:
         """Whether it has come to an end."""
         try:
             holds = self.decision.holds(self.view)
         except ExpressionError as error:
-            self._end(Failed(Cause.PRECONDITION, f"{self.words}: {error.message}"))
+            self._end(Cause.PRECONDITION, f"{self.words}: {error.message}")
             return True
         if holds is None:
             return False
         self.context.board.put(self.key, holds)
-        self.cause, self.message = None, f"{'yes' if holds else 'no'}: {self.words}"
-        self.stop(Status.SUCCESS)
+        self._end(None, f"{'yes' if holds else 'no'}: {self.words}")
         return True
 
-    def _end(self, failure: Failed) -> None:
-        self.cause, self.message = failure.cause, failure.message
-        self.stop(Status.FAILURE)
+
+def decide_plan(flow: Flow, condition: Condition, builder: PlanBuilder) -> tuple[NodeSpec, str, tuple[StepPart, ...]]:
+    """The node that decides, the key of its answer, and the checks that it makes.
+
+    Raises InputError: an expression that is not true or false, an unknown name, or something that cannot be looked for.
+    """
+    decision, key, words = decision_of(flow, condition, builder), builder.key("decided"), str(condition)
+    looks = [look_plan(builder, number, look, answer) for number, (answer, look) in enumerate(decision.looks, start=1)]
+    nodes = (node for node, _ in looks)
+    node = builder.node("decide", f"{words}?", *nodes, decision=decision, words=words, key=key)
+    return node, key, tuple(part for _, part in looks)
 
 
-KINDS: Final[Mapping[str, NodeKind]] = {
-    "decide": NodeKind(Decide, ("children", "context"), writes=lambda options: {options["key"]: bool}),
-}
+def look_plan(builder: PlanBuilder, number: int, look: Look | DoorOpen, key: str) -> tuple[NodeSpec, StepPart]:
+    """A look of a decision, and what it is to find out."""
+    below = builder.at(f"look-{number}")
+    if isinstance(look, DoorOpen):
+        part = StepPart(below.path_id, goal=door_goal(builder.knowledge, look.between))
+        return door_plan(below, look.between, key), part
+    below = replace(below, command=look.command)
+    refuse_several(below)
+    goal = command_goal(look.command, builder.knowledge)
+    return find_plan(below, key), StepPart(below.path_id, look.command, goal=goal)
+
+
+def decision_of(flow: Flow, condition: Condition, builder: PlanBuilder) -> Decision:
+    """The decision of a condition whose looks stand at the builder. Raises InputError, as `decide_plan`."""
+    source, parts = builder.source, list(parts_of(condition))
+    expressions = [part.expression for part in parts if isinstance(part, ValueIs)]
+    for expression in expressions:
+        if flow.kind_of(expression, source) is not Kind.TRUTH:
+            hint = "compare it with something, as in 'count > 2'"
+            raise InputError.at(source, f"'{expression}' is not true or false", hint=hint)
+    try:
+        refuse_certain(condition, flow.ranges)
+    except ExpressionError as error:
+        raise InputError.at(source, error.message, hint=error.hint) from error
+    looks = sum(isinstance(part, Look | DoorOpen) for part in parts)
+    answers = tuple(builder.at(f"look-{number}").key("answer") for number in range(1, looks + 1))
+    return Decision(condition, flow.keys_of(*expressions), answers)
+
+
+def instant_decision(flow: Flow, condition: Condition, builder: PlanBuilder) -> Decision:
+    """The decision of a condition that is watched. Raises InputError: it takes a look, or as `decision_of`."""
+    look = next((part for part in parts_of(condition) if isinstance(part, Look | DoorOpen)), None)
+    if look is not None:
+        hint = "look once with 'if', or again and again with 'repeat: {until: ..}'"
+        raise InputError.at(builder.source, f"'{look}' takes a look, and cannot be watched meanwhile", hint=hint)
+    return decision_of(flow, condition, builder)

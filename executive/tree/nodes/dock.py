@@ -1,17 +1,39 @@
-"""Charging at the dock: the plan of the block."""
+"""Charging at the dock: the plans of the command and of the block."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from executive.tree.compiling.flow import Assembler, BlockPlans
-from executive.tree.compiling.part import Assembled, StepPart
+from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.goals import command_goal
-from executive.tree.nodes.interrupts import dock_plan
-from executive.tree.plan import PlanBuilder, pose_2d
+from executive.tree.node import NodeSpec
+from executive.tree.nodes.recovery import Recovery
+from executive.tree.plan import Assembled, PlanBuilder, StepPart, after, pose_2d
 from executive.words import leaf_steps as model
 from executive.words.command import Command, Task
+from skills.api import Cause
 from skills.files.errors import InputError
+from skills.robot import Pose2D
+
+
+def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
+    """Stand on the dock and charge; where it does not charge, back off and dock again."""
+    charge = builder.skill("charge", {"level": level})
+    attempt = builder.at("attempt").sequence(
+        "dock and charge", builder.navigate(dock, "the dock", exactly=True), charge
+    )
+    again = Recovery((after(Cause.POSTCONDITION, of=charge),), uses=2)
+    return builder.recover("charge at the dock", attempt, (builder.at("again").skill("back_off"), again), attempts=3)
+
+
+def charge_plan(builder: PlanBuilder) -> NodeSpec:
+    """Go to the dock and charge there. Raises InputError: anything else is said with it."""
+    command, facts = builder.command, builder.knowledge
+    if any(part is not None for part in (command.item, command.goal, command.object)):
+        raise builder.error("the robot charges itself, at its dock", "say 'do: charge' alone")
+    if facts.dock is None:
+        raise builder.error("this world has no dock to charge at", "add 'dock' to its knowledge")
+    return dock_plan(builder, pose_2d(facts.dock), facts.battery.charged)
 
 
 def _plan(assembler: Assembler, block: model.Dock, builder: PlanBuilder) -> Assembled:
@@ -25,4 +47,4 @@ def _plan(assembler: Assembler, block: model.Dock, builder: PlanBuilder) -> Asse
     return Assembled((node,), (StepPart(node.path_id, command, goal=command_goal(command, facts)),))
 
 
-PLANS: Final[BlockPlans] = {model.Dock: _plan}
+PLANS: Final[StepPlans] = {model.Dock: _plan}

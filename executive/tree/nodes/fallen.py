@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import field
 from typing import Any, Final
 
 import numpy as np
@@ -21,14 +21,14 @@ from py_trees.common import Status
 from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.board import BesideBoard, FromBoard
 from executive.tree.context import RunContext
-from executive.tree.node import NodeKind, NodeSpec
+from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import floor_square
 from executive.tree.nodes.pick_up import LOOK_AGAIN_S, held_plan, pick_up_plan
 from executive.tree.nodes.recovery import Recovery
 from executive.tree.nodes.search import detect_plan
 from executive.tree.plan import PlanBuilder, after
-from executive.words.geometry import distance_m
-from skills.api import FLOOR, Cause, Surface, Thing
+from executive.words.geometry import Point, distance_m, inside
+from skills.api import FLOOR, Cause, Failed, Surface, Thing
 from skills.geometry import compose
 from skills.quantities import Coordinate, Height
 from skills.robot import Pose2D
@@ -44,7 +44,6 @@ ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
 """Where else the floor is looked at from: forward and left of where the object was lost (m)."""
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class Fallen(ExplainedLeaf):
     """Notes where the robot has lost what it carried, and says what happened. SUCCESS after `settle_s`.
 
@@ -55,6 +54,7 @@ class Fallen(ExplainedLeaf):
     set it down (`set_down_key`), and all else is written anew for there: it is picked up from where it is set down.
     """
 
+    kind = "fallen"
     thing: str
     to: str
     pose_key: str
@@ -71,6 +71,13 @@ class Fallen(ExplainedLeaf):
     set_down_half_m: float = 0.3
     settle_s: float = 0.3
 
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The keys of the pose, of the point and of the pieces of floor."""
+        surfaces = {options[key]: tuple[Surface, ...] for key in ("floor_key", "around_key")}
+        spot = tuple[Coordinate, Coordinate, Height]
+        return {options["pose_key"]: Pose2D, options["spot_key"]: spot, options["set_down_key"]: Surface, **surfaces}
+
     def initialise(self) -> None:
         """Write where it is looked for: where the robot stands just now."""
         self.clear_explanation()
@@ -83,8 +90,7 @@ class Fallen(ExplainedLeaf):
     def update(self) -> Status:
         """Feel for a moment whether the gripper still holds something."""
         if self.context.clock.now() < self._end_s:
-            self.message = f"feels whether the {self.thing} is still held"
-            return Status.RUNNING
+            return self.say(f"feels whether the {self.thing} is still held", Status.RUNNING)
         towards = self._towards_free_floor()
         self.context.board.put(self.set_down_key, floor_square(towards, self.set_down_ahead_m, self.set_down_half_m))
         slipped = self.context.robot.gripper().holding
@@ -92,8 +98,7 @@ class Fallen(ExplainedLeaf):
             self._write(towards, self.set_down_ahead_m)
         happened = "slips in the gripper" if slipped else "fell"
         then = "is set down and gripped anew" if slipped else "is picked up again"
-        self.cause, self.message = None, f"the {self.thing} {happened} on the way {self.to}; it {then}"
-        return Status.SUCCESS
+        return self.say(f"the {self.thing} {happened} on the way {self.to}; it {then}")
 
     def _write(self, pose: Pose2D, ahead_m: float) -> None:
         """Write where the object lies: so far (m) before the body at a pose."""
@@ -116,11 +121,40 @@ class Fallen(ExplainedLeaf):
         return turned[int(np.argmax(clear_m >= self.set_down_half_m))]
 
 
-def _written(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The keys of the pose, of the point and of the pieces of floor."""
-    surfaces = {options[key]: tuple[Surface, ...] for key in ("floor_key", "around_key")}
-    spot = tuple[Coordinate, Coordinate, Height]
-    return {options["pose_key"]: Pose2D, options["spot_key"]: spot, options["set_down_key"]: Surface, **surfaces}
+class SurfacesNear(ExplainedLeaf):
+    """Writes those of some surfaces to the blackboard that lie within `within_m` of the robot, the nearest first.
+
+    `rooms` has the outline of each surface's room by the surface's name. Where surfaces of the robot's own room are
+    near, others do not count: a wall hides them.
+    SUCCESS when there are some. FAILURE with POSTCONDITION when there are none: `otherwise` says what that means.
+    """
+
+    kind = "surfaces near"
+    surfaces: Sequence[Surface]
+    within_m: float
+    key: str
+    otherwise: str
+    context: RunContext
+    rooms: Mapping[str, Sequence[Point]] = field(default_factory=dict)
+
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The key of the surfaces."""
+        return {options["key"]: tuple[Surface, ...]}
+
+    def update(self) -> Status:
+        """Look which surfaces are near."""
+        pose = self.context.pose()
+        here = (pose.x_m, pose.y_m)
+        near = sorted((distance_m(surface.polygon_W, here), k) for k, surface in enumerate(self.surfaces))
+        close = tuple(self.surfaces[k] for distance, k in near if distance <= self.within_m)
+        found = tuple(surface for surface in close if inside(self.rooms.get(surface.name, ()), here)) or close
+        if found:
+            self.context.board.put(self.key, found)
+            return self.say(f"near here: {', '.join(surface.name for surface in found)}")
+        spot = f"({pose.x_m:.2f}, {pose.y_m:.2f}) m"
+        what = f"there is no surface within {self.within_m:g} m of {spot}; {self.otherwise}"
+        return self.fail(Failed(Cause.POSTCONDITION, what))
 
 
 def unless_fallen(
@@ -233,6 +267,3 @@ def _near_plan(builder: PlanBuilder, item: Thing, detection: str) -> NodeSpec:
     )
     look = detect_plan(builder, item, FromBoard(near), detection)
     return builder.sequence(f"look for {item} on the surfaces near", surfaces, look)
-
-
-KINDS: Final[Mapping[str, NodeKind]] = {"fallen": NodeKind(Fallen, ("context",), writes=_written)}

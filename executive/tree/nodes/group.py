@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from executive.tree.assembly import PYTHON_TYPES, Assembler, Flow, StepPlans
 from executive.tree.behaviour import cause_of, message_of
-from executive.tree.compiling.decisions import instant_decision
-from executive.tree.compiling.flow import Assembler, BlockPlans, Flow, row
-from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.context import RunContext
 from executive.tree.goals import held_goal
-from executive.tree.node import NodeKind
-from executive.tree.nodes.decisions import MustHold, MustNotBegin
+from executive.tree.node import NodeSpec
+from executive.tree.nodes.decisions import MustHold, MustNotBegin, instant_decision
 from executive.tree.nodes.interrupts import HANDLING
+from executive.tree.nodes.policies import under_policy
 from executive.tree.nodes.recovery import Afterwards
-from executive.tree.plan import PlanBuilder
+from executive.tree.nodes.values import set_plan
+from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import steps as model
 from executive.words.condition import AllOf, Condition, ValueIs
+from executive.words.expression import Expression, Template, kind_of, literal
+from executive.words.leaf_steps import UseMission
 from executive.words.mission import Mission
+from skills.files.errors import InputError
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class Always(Afterwards):
     """Something to be done (the first child), and what is done in the end (the second), however it ended.
 
@@ -34,6 +35,7 @@ class Always(Afterwards):
     Stopped from outside once it has begun: the run still does the second, before anything else (`RunContext.endings`).
     """
 
+    kind = "always"
     context: RunContext
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
@@ -53,16 +55,16 @@ class Always(Afterwards):
         self.status = new_status
         self.iterator = self.tick()
 
-    def _sum_up(self, first: Behaviour, then: Behaviour) -> None:
-        super()._sum_up(first, then)
+    def _take_over(self, child: Behaviour) -> None:
+        super()._take_over(child)
+        first, then = self.children
         if first.status == Status.SUCCESS and then.status == Status.FAILURE:
-            self.cause, self.message = cause_of(then), f"{message_of(first)}, but then: {message_of(then)}"
-            self.stop(Status.FAILURE)
+            self._end(cause_of(then), f"{message_of(first)}, but then: {message_of(then)}")
 
 
 def _plan(assembler: Assembler, block: model.Group, builder: PlanBuilder) -> Assembled:
     before = assembler.flow.copy()
-    body = row(assembler, block.steps, builder, block.name or "group")
+    body = assembler.row(block.steps, builder, block.name or "group")
     return framed(assembler, body, block, builder, before)
 
 
@@ -70,14 +72,14 @@ def framed(
     assembler: Assembler, body: Assembled, group: model.Group | Mission, builder: PlanBuilder, before: Flow
 ) -> Assembled:
     """Steps under what is watched meanwhile, and with what is always done in the end; `before` is their flow."""
-    (node,), parts = body.nodes, body.parts
+    node, parts = body.node, body.parts
     if group.when:
         after, calls = assembler.flow, []
         for number, handler in enumerate(group.when, start=1):
             below = builder.at(f"when-{number}")
-            decision = instant_decision(handler.condition, below, before.names)
+            decision = instant_decision(before, handler.condition, below)
             assembler.flow = before.copy()
-            work = row(assembler, handler.steps, below, f"when {handler.condition}")
+            work = assembler.row(handler.steps, below, f"when {handler.condition}")
             parts += work.parts
             calls.append(
                 below.node(
@@ -93,14 +95,14 @@ def framed(
         node = builder.node("interrupts", f"{node.name}, watched", *calls, node, part="watched")
     if group.while_ is not None:
         holds = group.while_.holds
-        decision = instant_decision(holds, builder.at("while"), before.names)
+        decision = instant_decision(before, holds, builder.at("while"))
         condition = MustHold(decision, str(holds))
         node = builder.node("guard", f"while {holds}", node, part="while", condition=condition)
         if _is_holding(holds):
             parts = (StepPart(node.path_id, goal=held_goal()), *parts)
     if group.always:
         assembler.flow.join([before.copy(), assembler.flow.copy()])
-        last = row(assembler, group.always, builder.at("always"), "in the end")
+        last = assembler.row(group.always, builder.at("always"), "in the end")
         parts += last.parts
         node = builder.node("always", "in the end, whatever happens", node, *last.nodes, part="whatever-happens")
     return Assembled((node,), parts)
@@ -116,5 +118,43 @@ def _is_holding(condition: Condition) -> bool:
     return False
 
 
-KINDS: Final[Mapping[str, NodeKind]] = {"always": NodeKind(Always, ("children", "context"))}
-PLANS: Final[BlockPlans] = {model.Group: _plan}
+def mission_plan(assembler: Assembler, mission: Mission, base: str) -> Assembled:
+    """The subtrees of a mission's steps, under what is watched meanwhile, after its values are set."""
+    builder, flow = assembler.builder(base, mission.source), assembler.flow
+    outer, known = (assembler.values_base, flow.declared), dict(flow.names)
+    assembler.values_base = f"{base}/values"
+    first = (_declare(assembler, mission, builder),) if mission.variables else ()
+    before = assembler.flow.copy()
+    steps = assembler.level(mission.steps, base)
+    if mission.is_framed:
+        row = replace(steps, nodes=(builder.sequence("steps", *steps.nodes, part="all"),))
+        steps = framed(assembler, row, mission, builder.at("whole"), before)
+    assembler.values_base, assembler.flow.declared = outer
+    assembler.flow.names.update({name: known[name] for name in mission.variables or () if name in known})
+    return replace(steps, nodes=(*first, *steps.nodes))
+
+
+def _declare(assembler: Assembler, mission: Mission, builder: PlanBuilder) -> NodeSpec:
+    """The leaf that gives a mission's values as they are at the beginning."""
+    values, kinds = dict[str, Expression | Template](), dict[str, type]()
+    for name, value in (mission.variables or {}).items():
+        kind = PYTHON_TYPES[kind_of(value)]
+        key = assembler.give(name, f"{assembler.values_base}/{name}", kind, builder)
+        values[key], kinds[key] = literal(value), kind
+    assembler.flow.declared = frozenset(mission.variables or ())
+    return set_plan(assembler.flow, builder, values, kinds, "values", "values at the beginning")
+
+
+def _use_plan(assembler: Assembler, step: UseMission, builder: PlanBuilder) -> Assembled:
+    """The subtree of a mission that a step uses."""
+    used: Mission = step.mission
+    try:
+        steps = mission_plan(assembler, used, builder.path_id)
+    except InputError as error:
+        raise error if step.source is None else error.within(step.source.file, step.source.line) from error
+    body = builder.sequence(used.name, *steps.nodes)
+    whole = under_policy(body, used, builder.at("whole"), used.name, may_skip=False)
+    return Assembled((whole,), steps.parts)
+
+
+PLANS: Final[StepPlans] = {model.Group: _plan, UseMission: _use_plan}

@@ -9,10 +9,14 @@ from __future__ import annotations
 import copy
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.tree.behaviour import ExplainedDecorator, suspend
 from executive.tree.context import RunContext
 from executive.words.policy import StaleData
 from skills.api import Cause, Failed, Thing
@@ -66,7 +70,12 @@ class Condition(ABC):
 
     def for_run(self, context: RunContext) -> Self:
         """A copy for a run that begins now."""
-        return copy.copy(self)
+        mine = copy.copy(self)
+        mine.run_begins(context)
+        return mine
+
+    def run_begins(self, context: RunContext) -> None:  # noqa: B027 - most conditions need not know
+        """The run begins for which this is a copy."""
 
     def begin(self, context: RunContext) -> None:
         """The subtree starts anew: forget for how long something was so."""
@@ -129,12 +138,6 @@ class Holds(Condition):
     def stamp_s(self, context: RunContext) -> float:
         """The gripper's stamp."""
         return context.robot.gripper().stamp_s
-
-    def for_run(self, context: RunContext) -> Self:
-        """A copy with a watch of its own."""
-        mine = copy.copy(self)
-        mine._watch = hold_watch(context.robot.capabilities())
-        return mine
 
     def begin(self, context: RunContext) -> None:
         """The subtree starts anew: nothing has been held yet."""
@@ -298,14 +301,52 @@ class NotAfter(Condition):
     limit_s: float
     _begun_s: float = field(default=0.0, init=False, repr=False, compare=False)
 
-    def for_run(self, context: RunContext) -> Self:
-        """A copy that counts from now."""
-        mine = copy.copy(self)
-        mine._begun_s = context.clock.now()
-        return mine
+    def run_begins(self, context: RunContext) -> None:
+        """Count from now."""
+        self._begun_s = context.clock.now()
 
     def judged(self, context: RunContext) -> Verdict:
         """A failure when the time is over."""
         if context.clock.now() - self._begun_s <= self.limit_s:
             return None
         return Failed(Cause.TIMEOUT, f"more than {self.limit_s:g} s have passed since the mission began")
+
+
+class Guard(ExplainedDecorator):
+    """A condition above actions, looked at before every tick.
+
+    Condition violated: child halted, FAILURE with the condition's cause. Condition waiting: child suspended, RUNNING.
+    Child SUCCESS that the condition contradicts (`violated_at_end`): FAILURE with its cause. Else as the child.
+    """
+
+    kind = "guard"
+    condition: Condition
+    context: RunContext
+    _looked: bool = field(default=False, init=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.condition = self.condition.for_run(self.context)
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Look at the condition, then tick the child."""
+        if self.status != Status.RUNNING:
+            self.condition.begin(self.context)
+        self._looked = True
+        verdict = self.condition.violated(self.context)
+        if verdict is None:
+            yield from super().tick()
+            return
+        if isinstance(verdict, Waiting):
+            suspend(self.decorated)
+            self.status, self.cause, self.message = Status.RUNNING, None, verdict.message
+        else:
+            self.stop(self.fail(verdict))
+        yield self
+
+    def update(self) -> Status:
+        """As the child, unless the condition contradicts its success."""
+        status = self.pass_on()
+        done, self._looked = self._looked and status == Status.SUCCESS, False
+        contradicts = self.condition.violated_at_end(self.context) if done else None
+        return status if contradicts is None else self.fail(contradicts)

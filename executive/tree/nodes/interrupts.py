@@ -8,27 +8,24 @@ dock and charge, find out where the robot is), and the mission goes on where it 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import field
 from typing import Any, ClassVar, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import ExplainedLeaf, cause_of, message_of
-from executive.tree.behaviours.decorators import ExplainedDecorator
-from executive.tree.behaviours.suspension import suspend
+from executive.tree.behaviour import ExplainedDecorator, ExplainedLeaf, MemoryComposite, cause_of, message_of, suspend
 from executive.tree.board import FromBoard
 from executive.tree.context import RunContext
-from executive.tree.node import NodeKind, NodeSpec
-from executive.tree.nodes.composites import MemoryComposite
+from executive.tree.node import NodeSpec
+from executive.tree.nodes.dock import dock_plan
 from executive.tree.nodes.guard import BatteryForWork, Condition, KnowsPlace, NoStopButton, OwnLease, Waiting
 from executive.tree.nodes.recovery import Recovery
 from executive.tree.nodes.skill import SkillLeaf
 from executive.tree.plan import PlanBuilder, after, pose_2d
 from executive.words.knowledge import Pose
 from skills.api import Cause, Failed
-from skills.robot import Pose2D
 
 HANDLING: Final = frozenset({"grasp", "place", "hand_over", "stow"})
 """Skills that an interrupt lets come to their end, since an object is half held meanwhile."""
@@ -37,13 +34,13 @@ MOST_RELOCALISATIONS: Final = 5
 LOST_PATIENCE_S: Final = 2.0
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class Monitor(ExplainedLeaf):
     """Looks at a condition at every tick.
 
     Holds: SUCCESS. Waiting: RUNNING, the mission stands still. Violated: FAILURE with the condition's cause.
     """
 
+    kind = "monitor"
     waiting: ClassVar[str] = ""
     condition: Condition
     context: RunContext
@@ -63,18 +60,11 @@ class Monitor(ExplainedLeaf):
     def update(self) -> Status:
         """Look."""
         verdict = self.condition.violated(self.context)
-        if verdict is None:
-            self.cause, self.message = None, "holds"
-            return Status.SUCCESS
-        self.message = verdict.message
-        if isinstance(verdict, Waiting):
-            self.cause = None
-            return Status.RUNNING
-        self.cause = verdict.cause
-        return Status.FAILURE
+        if isinstance(verdict, Failed):
+            return self.fail(verdict)
+        return self.say("holds") if verdict is None else self.say(verdict.message, Status.RUNNING)
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class Interrupt(ExplainedDecorator):
     """Work that is done between two ticks of the mission when it is called for, `uses` times at most.
 
@@ -83,6 +73,7 @@ class Interrupt(ExplainedDecorator):
     While the mission runs a skill named in `spares` the call waits, unless `urgent` is violated, too.
     """
 
+    kind = "interrupt"
     condition: Condition
     urgent: Condition | None = None
     spares: frozenset[str]
@@ -152,6 +143,8 @@ class Interrupts(MemoryComposite):
     With nothing to do, the mission is ticked, and its status, cause and sentence are taken over.
     """
 
+    kind = "interrupts"
+
     def tick(self) -> Iterator[Behaviour]:
         """Look at the watches in order; tick the first that has to do, else the mission."""
         watches: list[Any] = self.children[:-1]
@@ -179,12 +172,11 @@ class Interrupts(MemoryComposite):
             for child in below:
                 if child.status == Status.RUNNING:
                     child.stop(Status.INVALID)
-            self.cause, self.message = cause_of(watch), message_of(watch)
-            self.stop(Status.FAILURE)
+            self._end(cause_of(watch), message_of(watch))
             return
         for child in below:
             suspend(child)
-        self.status, self.cause, self.message = Status.RUNNING, None, watch.waiting or message_of(watch)
+        self._go_on(watch.waiting or message_of(watch))
 
 
 def watched(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
@@ -224,16 +216,6 @@ def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
     )
 
 
-def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
-    """Stand on the dock and charge; where it does not charge, back off and dock again."""
-    charge = builder.skill("charge", {"level": level})
-    attempt = builder.at("attempt").sequence(
-        "dock and charge", builder.navigate(dock, "the dock", exactly=True), charge
-    )
-    again = Recovery((after(Cause.POSTCONDITION, of=charge),), uses=2)
-    return builder.recover("charge at the dock", attempt, (builder.at("again").skill("back_off"), again), attempts=3)
-
-
 def _relocalising(builder: PlanBuilder, work: NodeSpec) -> NodeSpec:
     """Work after which the robot finds out where it is when it did not know, and works on."""
     lost = Recovery((after(Cause.PRECONDITION, Cause.EXECUTION),))
@@ -251,10 +233,3 @@ def _lost_plan(builder: PlanBuilder) -> NodeSpec:
         uses=MOST_RELOCALISATIONS,
         condition=KnowsPlace(patience_s=LOST_PATIENCE_S),
     )
-
-
-KINDS: Final[Mapping[str, NodeKind]] = {
-    "monitor": NodeKind(Monitor, ("context",)),
-    "interrupt": NodeKind(Interrupt, ("child", "context")),
-    "interrupts": NodeKind(Interrupts, ("children",)),
-}

@@ -108,7 +108,7 @@ def pick_up_plan(
         part="attempts",
         forgets=(near, tried) if seen else (key, near, tried, blocking),
     )
-    return tidied(builder.at("tidy"), attempts, only_after_failure=True)
+    return builder.at("tidy").tidied(attempts, only_after_failure=True)
 
 
 def _grasp_plan(builder: PlanBuilder, near: str, tried: str, blocking: str | None) -> NodeSpec:
@@ -149,9 +149,3 @@ def known_held_plan(builder: PlanBuilder, thing: Thing) -> NodeSpec:
 def _tucked(builder: PlanBuilder, thing: Thing) -> NodeSpec:
     """Draw the arm in under a guard that the gripper holds the object."""
     return builder.node("guard", f"holding {thing}", tuck_plan(builder), part="held", condition=Holds(str(thing)))
-
-
-def tidied(builder: PlanBuilder, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:
-    """Work after which the arm is stowed, whatever came of it."""
-    name = "stow the arm if it fails" if only_after_failure else "stow the arm in the end"
-    return builder.node("afterwards", name, work, builder.skill("stow"), only_after_failure=only_after_failure)

@@ -6,39 +6,102 @@ it, go back). So each attempt has its own time, and when a guard is violated the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field
+from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained, message_of
-from executive.tree.behaviours.decorators import ExplainedDecorator
+from executive.tree.behaviour import (
+    ExplainedDecorator,
+    ExplainedLeaf,
+    MemoryComposite,
+    StoppableTime,
+    cause_of,
+    message_of,
+)
 from executive.tree.board import FromBoard
 from executive.tree.context import RunContext
-from executive.tree.node import NodeKind, NodeSpec
-from executive.tree.nodes.composites import MemorySequence
+from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import BatteryAtLeast, Condition, KnowsPlace, NotAfter
 from executive.tree.plan import PlanBuilder
 from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
 from skills.api import Asked, Cause, Failed, Question
+from skills.robot import Clock, Pose2D
 
 FINAL_CAUSES: Final = frozenset({Cause.ERROR, Cause.CANCELLED})
 """A defect and somebody's request to stop are neither skipped, nor asked about, nor tried again."""
 RETRY: Final = "retry"
 SKIP: Final = "skip"
 STOP: Final = "stop"
-RETRIED_CAUSES: Final = frozenset(Cause) - FINAL_CAUSES
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
+class Timeout(ExplainedDecorator):
+    """A limit on the robot's clock.
+
+    Child FAILURE: FAILURE with its cause. Time over: child halted, FAILURE with TIMEOUT, even when it succeeded just
+    now. Else as the child. Time in which the tree is suspended does not count.
+    """
+
+    kind = "timeout"
+    limit_s: float
+    clock: Clock
+
+    def initialise(self) -> None:
+        """Start the time."""
+        self._time = StoppableTime(self.clock)
+
+    def suspend(self) -> None:
+        """Stop counting until the next tick."""
+        self._time.stop()
+
+    def update(self) -> Status:
+        """The child's status, unless the time is over."""
+        self._time.go_on()
+        late = self._time.elapsed_s() > self.limit_s
+        if late and self.decorated.status != Status.FAILURE:
+            return self.fail(Failed(Cause.TIMEOUT, f"not done within {self.limit_s:g} s"))
+        return self.pass_on()
+
+
+class Retry(ExplainedDecorator):
+    """Tries again, but only after failures of given causes.
+
+    Child RUNNING or SUCCESS: the same. Child FAILURE of another cause, or no attempts left: FAILURE with its cause.
+    Else RUNNING, and at the next tick the child starts anew from its first step with nothing remembered.
+    """
+
+    kind = "retry"
+    attempts: int
+    causes: frozenset[Cause]
+    attempt: int = field(default=1, init=False)
+
+    def initialise(self) -> None:
+        """Count from the first attempt."""
+        self.attempt = 1
+
+    def update(self) -> Status:
+        """The child's status, unless another attempt is due."""
+        status = self.pass_on()
+        if status != Status.FAILURE:
+            return status
+        if self.cause in self.causes and self.attempt < self.attempts:
+            self.attempt += 1
+            self.cause, self.message = None, f"attempt {self.attempt} of {self.attempts}, since {self.message}"
+            return Status.RUNNING
+        if self.attempt > 1:
+            self.message = f"{self.message} (after {self.attempt} attempts)"
+        return Status.FAILURE
+
+
 class Skip(ExplainedDecorator):
     """A step that may fail; `step` is the step in words.
 
     Child FAILURE: SUCCESS, and `skipped` says why; but FAILURE when its cause is ERROR or CANCELLED. Else as the child.
     """
 
+    kind = "skip"
     step: str
     skipped: str | None = field(default=None, init=False)
 
@@ -60,7 +123,6 @@ class Skip(ExplainedDecorator):
         return Status.SUCCESS
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class AskOperator(Skip):
     """A step about which the operator is asked when it fails.
 
@@ -69,6 +131,7 @@ class AskOperator(Skip):
     A failure with cause ERROR or CANCELLED is passed on without a question. Else as the child.
     """
 
+    kind = "ask"
     options: tuple[str, ...]
     default: str
     limit_s: float
@@ -117,50 +180,40 @@ class AskOperator(Skip):
             super().stop(self.fail(self._failure))
 
 
-class GoBack(MemorySequence):
+class GoBack(MemoryComposite):
     """A route back after a failure: two children, the first what is to be done, the second the route back.
 
     First child RUNNING or SUCCESS: the same. First child FAILURE: the second is ticked, RUNNING while it runs; at its
     end FAILURE with the first's cause and sentence, and whether the robot is back.
     """
 
-    def tick(self) -> Iterator[Behaviour]:
-        """Tick what is to be done, or the route back."""
-        if self.status != Status.RUNNING:
-            self._restart()
+    kind = "go back"
+
+    def _following(self, child: Behaviour) -> int | None:
+        return None
+
+    def _take_over(self, child: Behaviour) -> None:
         action, way_back = self.children
-        child = action if self._index == 0 else way_back
-        self.current_child = child
-        yield from child.tick()
-        if child is action and action.status == Status.FAILURE and self._may_go_back(action):
-            self._index, self.status = 1, Status.RUNNING
-            self.message = f"goes back, since {message_of(action)}"
+        if child is action and action.status == Status.FAILURE and cause_of(action) not in FINAL_CAUSES:
+            self._index = 1
+            self._go_on(f"goes back, since {message_of(action)}")
         elif child is action:
-            self._take_over(action)
+            super()._take_over(action)
         elif way_back.status == Status.RUNNING:
             self.message = f"goes back ({message_of(way_back)})"
         else:
-            self._end(action, way_back)
-        yield self
-
-    def _may_go_back(self, action: Behaviour) -> bool:
-        return not (isinstance(action, Explained) and action.cause in FINAL_CAUSES)
-
-    def _end(self, action: Behaviour, way_back: Behaviour) -> None:
-        back = way_back.status == Status.SUCCESS
-        told = "is back where it started" if back else f"could not go back: {message_of(way_back)}"
-        self.cause, self.message = self._explanation(action)
-        self.message = f"{self.message}; the robot {told}"
-        self.stop(Status.FAILURE)
+            back = way_back.status == Status.SUCCESS
+            told = "is back where it started" if back else f"could not go back: {message_of(way_back)}"
+            self._end(cause_of(action), f"{message_of(action)}; the robot {told}")
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class Summary(ExplainedDecorator):
     """The end of a mission in which steps may be skipped; `steps` are the path ids of its steps' outermost nodes.
 
     As the child, but a SUCCESS names what was skipped, and it is FAILURE when every one of the steps was skipped.
     """
 
+    kind = "summary"
     steps: Sequence[str]
 
     def update(self) -> Status:
@@ -177,32 +230,68 @@ class Summary(ExplainedDecorator):
         return status
 
 
-@dataclass(frozen=True)
-class PolicyFrame:
-    """Where a policy's nodes belong: the builder at the first part of their path ids, the step in words."""
+class RememberPose(ExplainedLeaf):
+    """Writes the robot's present pose in the world to the blackboard. Always SUCCESS once the robot is localised.
 
-    builder: PlanBuilder
-    words: str
-    may_skip: bool = True
+    FAILURE with PRECONDITION when the robot does not know where it is for longer than `patience_s`. With `keep`, a pose
+    that is there already stays: the mission was asked for where another one began.
+    """
+
+    kind = "remember"
+    key: str
+    context: RunContext
+    patience_s: float = 5.0
+    keep: bool = False
+
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The key of the pose."""
+        return {options["key"]: Pose2D}
+
+    def initialise(self) -> None:
+        """Start the patience."""
+        self.clear_explanation()
+        self._started_s = self.context.clock.now()
+
+    def update(self) -> Status:
+        """Write the pose, or wait for one."""
+        if self.keep and self.key in self.context.board:
+            return self.say("began before")
+        if self.context.localiser.estimate().localised:
+            self.context.board.put(self.key, self.context.pose())
+            return self.say("knows where it stands")
+        if self.context.clock.now() - self._started_s <= self.patience_s:
+            return self.say("waits until it knows where it is", Status.RUNNING)
+        return self.fail(Failed(Cause.PRECONDITION, "the robot does not know where it is"))
 
 
-def under_policy(body: NodeSpec, policy: Policy, frame: PolicyFrame) -> NodeSpec:
-    """The subtree under its policy; the subtree itself when the policy asks for nothing."""
-    node, below = frame.builder.node, body
+def under_policy(
+    body: NodeSpec, policy: Policy, builder: PlanBuilder, words: str, *, may_skip: bool = True
+) -> NodeSpec:
+    """The subtree under its policy, where that asks for anything; `words` is what is done, in words."""
+    below = body
     if policy.timeout_s is not None:
-        below = node("timeout", f"within {policy.timeout_s:g} s", below, part="timeout", limit_s=policy.timeout_s)
+        name = f"within {policy.timeout_s:g} s"
+        below = builder.node("timeout", name, below, part="timeout", limit_s=policy.timeout_s)
     if policy.further_attempts:
-        attempts = policy.further_attempts + 1
-        name = f"up to {attempts} attempts"
-        below = node("retry", name, below, part="retries", attempts=attempts, causes=RETRIED_CAUSES)
+        most = {"attempts": policy.further_attempts + 1, "causes": frozenset(Cause) - FINAL_CAUSES}
+        below = builder.node("retry", f"up to {most['attempts']} attempts", below, part="retries", **most)
     for part, name, condition in _conditions(policy.guards or Guards()):
-        below = node("guard", name, below, part=part, condition=condition)
-    return _ON_FAILURE[policy.on_failure or OnFailure.STOP](below, policy, frame)
-
-
-def needs_way_back(policy: Policy) -> bool:
-    """True when the policy leads back to where the mission began."""
-    return policy.on_failure is OnFailure.RETURN
+        below = builder.node("guard", name, below, part=part, condition=condition)
+    match policy.on_failure:
+        case OnFailure.SKIP:
+            return builder.node("skip", "skip it if it fails", below, part="skip", step=words)
+        case OnFailure.ASK:
+            question = policy.question or OperatorQuestion()
+            asked = {"default": question.default, "limit_s": question.limit_s, "text": question.text}
+            options = (RETRY, SKIP, STOP) if may_skip else (RETRY, STOP)
+            return builder.node("ask", "ask if it fails", below, part="ask", step=words, options=options, **asked)
+        case OnFailure.RETURN:
+            back = builder.at("return")
+            return back.node(
+                "go back", "go back if it fails", below, back.navigate(FromBoard(back.start_key), "the start")
+            )
+    return below
 
 
 def _conditions(guards: Guards) -> Iterator[tuple[str, str, Condition]]:
@@ -217,50 +306,3 @@ def _conditions(guards: Guards) -> Iterator[tuple[str, str, Condition]]:
             f"battery at {guards.battery:.0%} or more",
             BatteryAtLeast(guards.battery, stale=guards.stale),
         )
-
-
-def _skip(below: NodeSpec, policy: Policy, frame: PolicyFrame) -> NodeSpec:
-    return frame.builder.node("skip", "skip it if it fails", below, part="skip", step=frame.words)
-
-
-def _ask(below: NodeSpec, policy: Policy, frame: PolicyFrame) -> NodeSpec:
-    question = policy.question or OperatorQuestion()
-    return frame.builder.node(
-        "ask",
-        "ask if it fails",
-        below,
-        part="ask",
-        step=frame.words,
-        options=(RETRY, SKIP, STOP) if frame.may_skip else (RETRY, STOP),
-        default=question.default,
-        limit_s=question.limit_s,
-        text=question.text,
-    )
-
-
-def _go_back(below: NodeSpec, policy: Policy, frame: PolicyFrame) -> NodeSpec:
-    builder = frame.builder.at("return")
-    return builder.node(
-        "go back", "go back if it fails", below, builder.navigate(FromBoard(builder.start_key), "the start")
-    )
-
-
-def _stop(below: NodeSpec, policy: Policy, frame: PolicyFrame) -> NodeSpec:
-    return below
-
-
-_ON_FAILURE: Final[Mapping[OnFailure, Callable[[NodeSpec, Policy, PolicyFrame], NodeSpec]]] = {
-    OnFailure.STOP: _stop,
-    OnFailure.RETRY: _stop,
-    OnFailure.SKIP: _skip,
-    OnFailure.ASK: _ask,
-    OnFailure.RETURN: _go_back,
-}
-
-
-KINDS: Final[Mapping[str, NodeKind]] = {
-    "skip": NodeKind(Skip, ("child",)),
-    "ask": NodeKind(AskOperator, ("child", "context")),
-    "go back": NodeKind(GoBack, ("children",)),
-    "summary": NodeKind(Summary, ("child",)),
-}

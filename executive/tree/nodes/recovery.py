@@ -6,18 +6,16 @@ the attempts share on purpose.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained, cause_of, message_of
+from executive.tree.behaviour import Conditional, Explained, MemoryComposite, cause_of, message_of
 from executive.tree.board import Board
 from executive.tree.context import RunContext
-from executive.tree.node import NodeKind
-from executive.tree.nodes.composites import Conditional, MemoryComposite
 from executive.tree.nodes.guard import is_known_as
 from skills.api import Cause, ObjectObservation
 
@@ -83,7 +81,6 @@ class _AttemptFailure:
         return _AttemptFailure(cause_of(attempt), message_of(attempt), steps)
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class Recover(MemoryComposite):
     """An attempt (the first child), with recoveries (the others, each with its `Recovery`) before the next attempt.
 
@@ -97,6 +94,7 @@ class Recover(MemoryComposite):
     When it starts anew, recoveries are counted from zero and the blackboard keys in `forgets` are empty.
     """
 
+    kind = "recover"
     recoveries: Sequence[Recovery]
     attempts: int
     board: Board
@@ -106,30 +104,27 @@ class Recover(MemoryComposite):
     _due: list[int] = field(default_factory=list, init=False)
     _farthest: _AttemptFailure | None = field(default=None, init=False)
 
-    def tick(self) -> Iterator[Behaviour]:
-        """Tick the attempt or the recovery that is under way, and see what comes of it."""
-        if self.status != Status.RUNNING:
-            self._restart()
-        child = self.current_child = self.children[self._index]
-        yield from child.tick()
-        if child.status == Status.RUNNING:
-            self.status, self.cause, self.message = Status.RUNNING, None, message_of(child)
-        elif self._index == 0:
-            self._attempt_ended()
-        else:
-            self._recovery_ended(child)
-        yield self
-
     def _restart(self) -> None:
         super()._restart()
         self.attempt, self._uses, self._due, self._farthest = 1, [0] * len(self.recoveries), [], None
         self.board.forget(self.forgets)
 
-    def _attempt_ended(self) -> None:
+    def _following(self, child: Behaviour) -> int | None:
+        return None
+
+    def _take_over(self, child: Behaviour) -> None:
+        """See what comes of the attempt or the recovery that is under way."""
+        if child.status == Status.RUNNING:
+            self._go_on(message_of(child))
+        elif self._index == 0:
+            self._attempt_ended(child)
+        else:
+            self._recovery_ended(child)
+
+    def _attempt_ended(self, attempt: Behaviour) -> None:
         """Success ends it; after a failure the recoveries that fit are due."""
-        attempt = self.children[0]
         if attempt.status == Status.SUCCESS:
-            self._end(Status.SUCCESS, None, message_of(attempt))
+            self._end(None, message_of(attempt))
             return
         failure = _AttemptFailure.of(attempt)
         if self._farthest is None or failure.steps >= self._farthest.steps:
@@ -153,19 +148,17 @@ class Recover(MemoryComposite):
         chosen = self._due.pop(0)
         self._uses[chosen] += 1
         self._index = chosen + 1
-        why = message_of(self.children[0])
-        self.status, self.cause, self.message = Status.RUNNING, None, f"{self.children[self._index].name}, since {why}"
+        self._go_on(f"{self.children[self._index].name}, since {message_of(self.children[0])}")
         return True
 
     def _recovery_ended(self, recovery: Behaviour) -> None:
         rule = self.recoveries[self._index - 1]
         if recovery.status == Status.SUCCESS and rule.completes:
-            self._end(Status.SUCCESS, None, message_of(recovery))
+            self._end(None, message_of(recovery))
         elif recovery.status == Status.SUCCESS:
             self.attempt += 1
             self._index = 0
-            said = f"attempt {self.attempt}, since {message_of(self.children[0])}"
-            self.status, self.cause, self.message = Status.RUNNING, None, said
+            self._go_on(f"attempt {self.attempt}, since {message_of(self.children[0])}")
         elif rule.final or not self._next_recovery():
             error = Cause.ERROR if cause_of(recovery) is Cause.ERROR else None
             self._fail(f"; {recovery.name}: {message_of(recovery)}", error)
@@ -175,14 +168,9 @@ class Recover(MemoryComposite):
         last = _AttemptFailure.of(self.children[0])
         decisive = self._farthest or last
         then = "" if decisive.message == last.message else f", then {last.message}"
-        self._end(Status.FAILURE, cause or decisive.cause, f"{decisive.message}{then}{addition}")
-
-    def _end(self, status: Status, cause: Cause | None, message: str) -> None:
-        self.cause, self.message = cause, message
-        self.stop(status)
+        self._end(cause or decisive.cause, f"{decisive.message}{then}{addition}")
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class Afterwards(MemoryComposite):
     """Something to be done (the first child), and what tidies up after it (the second), however it ended.
 
@@ -191,27 +179,17 @@ class Afterwards(MemoryComposite):
     with the second's failure mentioned.
     """
 
+    kind = "afterwards"
     only_after_failure: bool = False
 
-    def tick(self) -> Iterator[Behaviour]:
-        """Tick the first child; when it is done, the second."""
-        if self.status != Status.RUNNING:
-            self._restart()
-        first, then = self.children
-        if self._index == 0:
-            self.current_child = first
-            yield from first.tick()
-            done = first.status == Status.FAILURE or (first.status == Status.SUCCESS and not self.only_after_failure)
-            self._index = int(done)
-        if self._index == 1:
-            self.current_child = then
-            yield from then.tick()
-        self._sum_up(first, then)
-        yield self
+    def _following(self, child: Behaviour) -> int | None:
+        done = child.status == Status.FAILURE or not self.only_after_failure
+        return 1 if self._index == 0 and done else None
 
-    def _sum_up(self, first: Behaviour, then: Behaviour) -> None:
-        if Status.RUNNING in (first.status, then.status):
-            self.status, self.cause, self.message = Status.RUNNING, None, message_of(self.children[self._index])
+    def _take_over(self, child: Behaviour) -> None:
+        first, then = self.children
+        if child.status == Status.RUNNING:
+            self._go_on(message_of(child))
             return
         failed = first.status == Status.FAILURE
         self.cause, self.message = (cause_of(first) if failed else None), message_of(first)
@@ -220,25 +198,30 @@ class Afterwards(MemoryComposite):
         self.stop(first.status)
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class OnlyIfKnown(MemoryComposite):
     """As its only child, for selectors that pass it over while the blackboard does not hold `key`."""
 
+    kind = "only if known"
     key: str
     board: Board
+
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The key, again."""
+        return {options["key"]: ObjectObservation}
 
     def applies(self) -> bool:
         """Whether the key has been written."""
         return self.key in self.board
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class OnlyIfHolding(MemoryComposite):
     """As its only child, for selectors that pass it over while the gripper holds nothing.
 
     With `known_as`, what is held must have been taken for an object of one of those classes, with all `attributes`.
     """
 
+    kind = "only if holding"
     context: RunContext
     known_as: tuple[str, ...] | None = None
     attributes: tuple[str, ...] = ()
@@ -248,13 +231,3 @@ class OnlyIfHolding(MemoryComposite):
         if not self.context.robot.gripper().holding:
             return False
         return self.known_as is None or is_known_as(self.context.payload.thing, self.known_as, self.attributes)
-
-
-KINDS: Final[Mapping[str, NodeKind]] = {
-    "recover": NodeKind(Recover, ("children", "board")),
-    "afterwards": NodeKind(Afterwards, ("children",)),
-    "only if known": NodeKind(
-        OnlyIfKnown, ("children", "board"), writes=lambda options: {options["key"]: ObjectObservation}
-    ),
-    "only if holding": NodeKind(OnlyIfHolding, ("children", "context")),
-}

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Final, Literal
+from dataclasses import field, replace
+from typing import Any, Final, Literal
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.mission.gripper import either
-from executive.tree.behaviour import cause_of, message_of
+from executive.tree.assembly import Assembler, StepPlans
+from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.board import Board
-from executive.tree.compiling.flow import Assembler, BlockPlans, decision_node, row
-from executive.tree.compiling.part import Assembled, StepPart
-from executive.tree.node import NodeKind
-from executive.tree.nodes.composites import MemoryComposite
-from executive.tree.nodes.decisions import Decide
-from executive.tree.plan import PlanBuilder
+from executive.tree.nodes.decisions import Decide, decide_plan
+from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import steps as model
 from executive.words.condition import READINGS, Condition, ValueIs, parts_of
 from executive.words.leaf_steps import CallSkill, Check, Do, Say, Set
@@ -27,7 +24,6 @@ from skills.files.errors import InputError, count_text
 from skills.robot import Clock
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class Repeat(MemoryComposite):
     """Rounds of its last child; before it, where there is one, stands the decision (`key` is where its answer is).
 
@@ -38,6 +34,7 @@ class Repeat(MemoryComposite):
     rounds have begun.
     """
 
+    kind = "repeat"
     mode: Literal["until", "while", "times"]
     words: str
     count: str
@@ -46,8 +43,6 @@ class Repeat(MemoryComposite):
     every_s: float = 0.0
     board: Board
     clock: Clock
-    taken_up: bool = field(default=False, init=False)
-    """Set before the first tick of a mission that goes on after a restart, in the middle of a round."""
     _phase: Literal["start", "before", "body", "after"] = field(default="start", init=False)
     _due_s: float = field(default=0.0, init=False)
 
@@ -57,7 +52,7 @@ class Repeat(MemoryComposite):
             self._restart()
         if self._phase == "start":
             if self.clock.now() < self._due_s - 1e-9:
-                self._goes_on(f"{self._told()}; the next in {self._due_s - self.clock.now():.0f} s")
+                self._go_on(f"{self._told()}; the next in {self._due_s - self.clock.now():.0f} s")
                 yield self
                 return
             self._begin_round()
@@ -81,14 +76,18 @@ class Repeat(MemoryComposite):
         if len(self.children) == 2 and isinstance(self.children[0], Decide):
             self.children[0].view.forget_presses()
 
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The key of how many rounds have begun."""
+        return {options["count"]: int}
+
     @property
     def rounds(self) -> int:
         """How many rounds have begun."""
         return int(self.board.get(self.count))
 
     def _begin_round(self) -> None:
-        for child in self.children:
-            child.stop(Status.INVALID)
+        self._reset_children()
         self.board.put(self.count, self.rounds + 1)
         self._enter_round()
 
@@ -99,12 +98,10 @@ class Repeat(MemoryComposite):
     def _judged(self, child: Behaviour) -> bool:
         """What the child's status means; False when another child is ticked in the same tick."""
         if child.status == Status.RUNNING:
-            self._goes_on(message_of(child))
+            self._go_on(message_of(child))
         elif child.status != Status.SUCCESS:
-            self._end(
-                cause_of(child),
-                f"{message_of(child)} (in round {self.rounds})" if self.rounds > 1 else message_of(child),
-            )
+            told = f" (in round {self.rounds})" if self.rounds > 1 else ""
+            self._end(cause_of(child), f"{message_of(child)}{told}")
         elif self._phase == "body":
             if self.mode == "until":
                 self._phase = "after"
@@ -122,7 +119,7 @@ class Repeat(MemoryComposite):
     def _round_done(self) -> None:
         if self.times is None or self.rounds < self.times or (self.mode == "while" and self.rounds == self.times):
             self._phase = "start"
-            self._goes_on(self._told())
+            self._go_on(self._told())
         elif self.mode == "times":
             self._end(None, self._told())
         else:
@@ -134,13 +131,6 @@ class Repeat(MemoryComposite):
         last = message_of(self.children[-1]) if self.children[-1].status == Status.SUCCESS else ""
         counted = count_text(done, "round")
         return f"{counted}, the last: {last}" if last else counted
-
-    def _goes_on(self, message: str) -> None:
-        self.status, self.cause, self.message = Status.RUNNING, None, message
-
-    def _end(self, cause: Cause | None, message: str) -> None:
-        self.cause, self.message = cause, message
-        self.stop(Status.SUCCESS if cause is None else Status.FAILURE)
 
 
 def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> Assembled:
@@ -154,16 +144,16 @@ def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> As
     before, nodes, key = assembler.flow.copy(), [], ""
     parts: tuple[StepPart, ...] = ()
     if mode == "while" and condition is not None:
-        decide, key, parts = decision_node(assembler, condition, builder.at("while"))
+        decide, key, parts = decide_plan(assembler.flow, condition, builder.at("while"))
         nodes = [decide]
-    body = row(assembler, block.steps, builder.at("round"), "round")
+    body = assembler.row(block.steps, builder.at("round"), "round")
     flow = assembler.flow
     if flow.held != before.held and rounds.times != 1:
         flow.names = dict(before.names)
         flow.held, flow.opening = either(before.held, flow.held), False
-        body = row(assembler, block.steps, builder.at("round"), "round")
+        body = assembler.row(block.steps, builder.at("round"), "round")
     if mode == "until" and condition is not None:
-        decide, key, parts = decision_node(assembler, condition, builder.at("until"))
+        decide, key, parts = decide_plan(assembler.flow, condition, builder.at("until"))
         nodes = [decide]
     if mode == "while":
         assembler.flow.join([before, assembler.flow.copy()])
@@ -213,7 +203,4 @@ def _given(steps: Iterable[Step]) -> set[str]:
     return found
 
 
-KINDS: Final[Mapping[str, NodeKind]] = {
-    "repeat": NodeKind(Repeat, ("children", "board", "clock"), writes=lambda options: {options["count"]: int}),
-}
-PLANS: Final[BlockPlans] = {model.Repeat: _plan}
+PLANS: Final[StepPlans] = {model.Repeat: _plan}

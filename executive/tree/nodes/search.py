@@ -1,21 +1,28 @@
-"""Looking for an object: which surfaces, in which order, and the subtree that visits them."""
+"""Looking for objects and people: where, in which order; and the answer whether they are there."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field, replace
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
-from executive.tree.board import FromBoard, SurfaceOfDetection, pose_beside
+from py_trees.common import Status
+
+from executive.tree.behaviour import Explained, ExplainedDecorator
+from executive.tree.board import Board, FromBoard, SurfaceOfDetection, pose_beside
 from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.tree.plan import PlanBuilder, pose_2d
+from executive.words.command import Task
 from executive.words.geometry import inside
-from executive.words.knowledge import Knowledge, Pose
-from skills.api import Cause, Thing
+from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge, Pose
+from skills.api import Cause, Failed, ObjectObservation, Publish, Thing
+from skills.detect.words import counted, numbered, plural, told_apart
 from skills.files.errors import listing
 
+ANSWER_TOPIC: Final = "answer"
 Ports = Mapping[str, object]
 
 NO_PORTS: Final[Ports] = MappingProxyType({})
@@ -24,6 +31,102 @@ MOST_ASIDE: Final = 2
 ASIDE_M: Final = 0.45
 _TALLY: Final = "observations"
 """The output port of a look for all that it saw."""
+
+
+class Answer(ExplainedDecorator):
+    """Turns a search into a yes or a no.
+
+    Child RUNNING: RUNNING. Child SUCCESS: SUCCESS, answer True. Child FAILURE with every surface looked at: SUCCESS,
+    answer False. Child FAILURE with a surface that could not be looked at: FAILURE with what kept the robot from it.
+    `looks` names for each surface the leaves that look at it, one for each viewpoint: all of them must have looked,
+    which means that they succeeded, or failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; one
+    that `tells` repeats what was seen where. `question` is what a yes says, `denied` what a no says; without
+    `yes_or_no` they stand alone, since "is it empty" and "is there anything on it" are one question.
+
+    With `tallies` the child looks at all surfaces, and what its leaves saw, each under a blackboard key, is counted,
+    each object once. As many as `needed` is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface
+    looked at, and else FAILURE as above. How many were counted goes to `count_key`, where
+    there is one.
+    """
+
+    kind = "answer"
+    question: str
+    denied: str
+    looks: Mapping[str, Sequence[str]]
+    key: str
+    board: Board
+    publish: Publish
+    tells: bool = False
+    tallies: Mapping[str, str] = field(default_factory=dict)
+    needed: int = 1
+    yes_or_no: bool = True
+    count_key: str = ""
+    answer: bool | None = field(default=None, init=False)
+
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The key of the answer, and that of the count."""
+        count = options.get("count_key")
+        return {options["key"]: bool, **({count: float} if count else {})}
+
+    def initialise(self) -> None:
+        """Forget an earlier answer."""
+        self.answer = None
+
+    def update(self) -> Status:
+        """The answer, as soon as the search is over."""
+        status = self.pass_on()
+        if status == Status.RUNNING:
+            return status
+        nodes = {node.path_id: node for node in self.iterate() if isinstance(node, Explained)}
+        unseen = [surface for surface, leaves in self.looks.items() if not _looked(leaves, nodes)]
+        if self.tallies:
+            return self._counted(nodes, unseen)
+        if status == Status.FAILURE and unseen:
+            return self._not_looked(nodes, unseen)
+        answer = status == Status.SUCCESS
+        return self._answered(answer, self.message if answer and self.tells else "")
+
+    def _counted(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
+        seen = [key for leaf, key in self.tallies.items() if leaf in nodes and nodes[leaf].status == Status.SUCCESS]
+        looks: list[tuple[ObjectObservation, ...]] = [self.board.get(key) for key in seen]
+        found = told_apart(looks)
+        enough = len(found) >= self.needed
+        if self.count_key:
+            self.board.put(self.count_key, float(len(found)))
+        if unseen and not enough:
+            return self._not_looked(nodes, unseen)
+        limits = f", as far as was seen: not {', '.join(unseen)}" if unseen else ""
+        return self._answered(enough, f"{counted(found, ())}{limits}" if found else "")
+
+    def _not_looked(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
+        return self.fail(Failed(_obstacle(nodes), f"could not look at {', '.join(unseen)}: {self.message}"))
+
+    def _answered(self, answer: bool, found: str) -> Status:
+        self.answer, self.cause = answer, None
+        told = self.question if answer else self.denied
+        if self.yes_or_no:
+            told = f"{'yes' if answer else 'no'}: {told}"
+        self.message = told + (f"; {found}" if found else "")
+        self.board.put(self.key, answer)
+        note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
+        self.publish(ANSWER_TOPIC, note)
+        return Status.SUCCESS
+
+
+def _looked(leaves: Sequence[str], nodes: Mapping[str, Explained]) -> bool:
+    """True when each of the leaves took a look, whether it saw something or nothing."""
+    return all(leaf in nodes and _took_a_look(nodes[leaf]) for leaf in leaves)
+
+
+def _took_a_look(leaf: Explained) -> bool:
+    return leaf.status == Status.SUCCESS or leaf.cause == Cause.POSTCONDITION
+
+
+def _obstacle(nodes: Mapping[str, Explained]) -> Cause:
+    """The first cause in the tree that is not merely "not seen"."""
+    causes = (node.cause for node in nodes.values())
+    return next((cause for cause in causes if cause not in (None, Cause.POSTCONDITION)), None) or Cause.EXECUTION
 
 
 def surfaces_elsewhere(
@@ -186,3 +289,81 @@ def where(knowledge: Knowledge, place: str | None) -> str:
     if place is None:
         return "anywhere"
     return f"{'on' if place in knowledge.surfaces else 'in'} the {place}"
+
+
+def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
+    """Look at the surfaces of the place and answer yes or no; where it is asked where or how many, tell that, too.
+
+    The answer goes to `answer_key`, which is a key of this subtree unless one is given.
+
+    The first object that is seen ends the search, unless they are to be counted: then all surfaces are looked at.
+    People are looked for in rooms.
+    """
+    command, knowledge = builder.command, builder.knowledge
+    place = None if command.goal is None else builder.place(command.goal)
+    counting, key = command.object_count != 1, builder.key("detection")
+    person = None if command.object is None else knowledge.somebody(command.object.name)
+    if person is not None:
+        what = "somebody" if person == ANYBODY else person
+        asked = what if command.object_count == 1 else _asked_for(person, command.object_count)
+        looks = people_looks(builder.at("search"), person, place, key, tallied=counting)
+    else:
+        thing = builder.known(command.object)
+        what, asked = str(thing), _asked_for(str(thing), command.object_count)
+        whole_room = place is None or place in knowledge.places
+        extra = {"floor": whole_room, "count": 0 if counting else 1}
+        surfaces = required_surfaces(builder, thing, place)
+        looks = look_plans(builder.at("search"), thing, surfaces, key, extra, tallied=counting)
+    below = builder.at("search")
+    search = below.node("round" if counting else "selector", f"look for {what}", *(look for _, look in looks))
+    leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
+    tallies = {look.children[-1].path_id: tally_of(look.children[-1]) for _, look in looks if counting}
+    spot = where(knowledge, place)
+    denied = f"{'not' if command.object_count > 1 or person in knowledge.people else 'no'} {asked} {spot}"
+    if what == ANYTHING:
+        asked, denied = "something", f"nothing {spot}"
+    elif person == ANYBODY and not counting:
+        denied = f"nobody {spot}"
+    named = "is" if person in knowledge.people else "are there" if counting and what != ANYTHING else "is there"
+    answer = builder.node(
+        "answer",
+        f"{named} {asked} {spot}?",
+        search,
+        question=asked if place is None else f"{asked} {spot}",
+        denied=denied,
+        looks=MappingProxyType(leaves),
+        key=answer_key or builder.key("answer"),
+        tells=place is None,
+        tallies=MappingProxyType(tallies),
+        needed=max(1, command.object_count),
+        yes_or_no=what != ANYTHING,
+    )
+    return builder.at("tidy").tidied(answer)
+
+
+def _asked_for(thing: str, count: int) -> str:
+    """What a question is about: "beer", "two beers", or "beers" for any number."""
+    if count == 1:
+        return thing
+    return numbered(count, thing) if count else plural(thing)
+
+
+def answering(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
+    """A status check whose answer goes elsewhere: options of its answer node by name."""
+    if node.kind == Answer.kind:
+        return node.with_options(**keys)
+    return replace(node, children=tuple(answering(child, keys) for child in node.children))
+
+
+def refuse_several(builder: PlanBuilder) -> None:
+    """Refuse a count that no trips are made of; in a question and of a time any count will do.
+
+    Raises InputError: more than one object, or an open number of objects.
+    """
+    command = builder.command
+    asked = 1 if command.task in (Task.FIND, Task.WAIT) else command.object_count
+    for thing, count in ((command.item, command.item_count), (command.object, asked)):
+        if count != 1:
+            said = f"{count} of '{thing}'" if count else f"an open number of '{thing}'"
+            hint = "say from where to where, and how many, or ask for one at a time"
+            raise builder.error(f"{said} cannot be carried in one go", hint)

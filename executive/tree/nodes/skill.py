@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Final, TypeVar
 
 from py_trees.common import Status
 
-from executive.tree.behaviour import ExplainedLeaf
-from executive.tree.behaviours.suspension import StoppableTime
-from executive.tree.board import Binding
+from executive.mission.gripper import UNNAMED
+from executive.tree.assembly import Assembler, Named, StepPlans
+from executive.tree.behaviour import ExplainedLeaf, StoppableTime
+from executive.tree.board import Binding, Constant, FromBoard
 from executive.tree.context import RunContext
-from executive.tree.node import NodeKind
-from executive.tree.types import conforms, describe_type
-from skills.api import Cause, Failed, Running, Skill, Step, Succeeded
+from executive.tree.goals import drive_goal, given_goal, lifted_goal, put_goal
+from executive.tree.plan import Assembled, PlanBuilder, StepPart, skill_spec
+from executive.tree.port_values import FROM_KEY, PortValueError, gathered, port_value
+from executive.tree.registry import missing
+from executive.tree.types import conforms, describe_type, field_types
+from executive.words.goal import GoalCondition
+from executive.words.knowledge import Knowledge, Pose
+from executive.words.leaf_steps import CallSkill
+from executive.words.slug import slug
+from skills.api import Cause, Failed, Running, Skill, Step, Succeeded, Surface
+from skills.files.errors import listing, suggestion
+from skills.robot import Pose2D
 
 ResultT = TypeVar("ResultT")
 ERROR_TOPIC = "errors"
@@ -26,7 +36,6 @@ class Remembered(Succeeded):
     """A success from before a restart: its data was fresh then."""
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class SkillLeaf(ExplainedLeaf):
     """Runs one skill.
 
@@ -40,6 +49,7 @@ class SkillLeaf(ExplainedLeaf):
     arm cannot be brought in does without.
     """
 
+    kind = "skill"
     skill: type[Skill[Any]]
     limit_s: float
     context: RunContext
@@ -50,6 +60,11 @@ class SkillLeaf(ExplainedLeaf):
     _skill: Skill[Any] | None = field(default=None, init=False)
     _values: Any = field(default=None, init=False)
     _false_start: Failed | None = field(default=None, init=False)
+
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The keys bound to the skill's output ports."""
+        return {key: options["skill"].outputs.get(port, Any) for port, key in options.get("outputs", {}).items()}
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -246,9 +261,72 @@ def _stamp_s(source: str, outputs: Mapping[str, Any], context: RunContext) -> fl
     return None if reading is None else float(reading.stamp_s)
 
 
-def _written(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The keys bound to the skill's output ports."""
-    return {key: options["skill"].outputs.get(port, Any) for port, key in options.get("outputs", {}).items()}
+def _plan(assembler: Assembler, call: CallSkill, builder: PlanBuilder) -> Assembled:
+    """The leaf of a skill on its own.
+
+    Raises InputError: no such skill, a value that does not fit its port, an unknown port or name.
+    """
+    if call.skill not in builder.registry:
+        raise call.error(("skill",), *missing(call.skill, builder.registry))
+    flow, path_id, skill = assembler.flow, builder.path_id, builder.registry[call.skill]
+    inputs, gives = _inputs(call, skill, builder.knowledge, flow.names), call.gives or {}
+    for port in gives:
+        if port not in skill.outputs:
+            known = f"its outputs are {listing(skill.outputs)}" if skill.outputs else "it has none"
+            hint = suggestion(port, skill.outputs, known)
+            raise call.error(("gives", port), f"{call.skill} has no output port '{port}'", hint)
+    outputs = {
+        port: assembler.give(name, f"{path_id}/{slug(port)}", skill.outputs[port], builder)
+        for port, name in gives.items()
+    }
+    leaf = skill_spec(builder.registry, call.skill, path_id, call.source, inputs, outputs)
+    goal = _goal(call.skill, inputs, builder.knowledge)
+    part = StepPart(path_id, skill=skill, goal=goal, held=flow.held, opening=flow.opening)
+    flow.held = {None: flow.held, True: UNNAMED, False: None}[skill.gripper_after]
+    flow.opening = flow.opening and skill.gripper_after is None
+    return Assembled((leaf,), (part,))
 
 
-KINDS: Final[Mapping[str, NodeKind]] = {"skill": NodeKind(SkillLeaf, ("context",), _written)}
+def _goal(skill: str, bound: Mapping[str, Binding], knowledge: Knowledge) -> GoalCondition | None:
+    """What a skill on its own is to bring about; None: nothing that a referee can see, or not known before."""
+    inputs = {port: each.value for port, each in bound.items() if isinstance(each, Constant)}
+    match skill:
+        case "navigate" if isinstance(pose := inputs.get("goal"), Pose2D):
+            return drive_goal(Pose(x=pose.x_m, y=pose.y_m, yaw=pose.yaw_rad))
+        case "grasp":
+            return lifted_goal()
+        case "place" if isinstance(surface := inputs.get("surface"), Surface):
+            return put_goal(knowledge, surface.name) if surface.name in knowledge.surfaces else None
+        case "hand_over":
+            return given_goal(knowledge.person(str(inputs.get("person", ""))))
+    return None
+
+
+def _inputs(
+    call: CallSkill, skill: type[Skill[Any]], knowledge: Knowledge, names: Mapping[str, Named]
+) -> dict[str, Binding]:
+    """A binding for each input port that has a value."""
+    hints = field_types(skill.Inputs)
+    try:
+        ports = gathered(call.values or {}, skill.Inputs)
+        return {
+            port: _named_output(call, path, value[FROM_KEY], names)
+            if isinstance(value, dict) and set(value) == {FROM_KEY}
+            else Constant(port_value(value, hints[port], knowledge, path))
+            for port, (path, value) in ports.items()
+        }
+    except PortValueError as error:
+        where = ".".join(map(str, error.path))
+        message = f"{call.skill}: {where + ': ' if where and where not in error.message else ''}{error.message}"
+        raise call.error(("with", *error.path), message, error.hint) from error
+
+
+def _named_output(call: CallSkill, path: tuple[str | int, ...], name: Any, names: Mapping[str, Named]) -> FromBoard:
+    if not isinstance(name, str) or name not in names:
+        none = None if names else "name one with 'gives: {PORT: NAME}' in an earlier step"
+        hint = suggestion(str(name), names, none)
+        raise call.error(("with", *path), f"no earlier step gives '{name}'", hint)
+    return FromBoard(names[name].key)
+
+
+PLANS: Final[StepPlans] = {CallSkill: _plan}

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from typing import Any, Final
 
 from py_trees.common import Status
 
+from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import ExplainedLeaf
-from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.board import FromBoard
-from executive.tree.compiling.decisions import (
-    Named,
-    keys_of,
-)
-from executive.tree.compiling.flow import Assembler, BlockPlans, branch_of, check_template, give_key, set_plan
-from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.context import RunContext
-from executive.tree.node import NodeKind
 from executive.tree.nodes.decisions import Keys, View
-from executive.tree.plan import PlanBuilder
+from executive.tree.nodes.search import ANSWER_TOPIC
+from executive.tree.nodes.values import set_plan
+from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import steps as model
 from executive.words.expression import LARGEST, ExpressionError, Kind, Template, Value, kind_of
 from executive.words.leaf_steps import Speak
@@ -36,7 +31,6 @@ _FILLERS: Final = re.compile(
 )
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class AskPeople(ExplainedLeaf):
     """Puts a question, aloud and on the page, and leaves the answer under `key`.
 
@@ -46,6 +40,7 @@ class AskPeople(ExplainedLeaf):
     value: FAILURE with PRECONDITION. The answer is published under `ANSWER_TOPIC`.
     """
 
+    kind = "question"
     text: Template
     keys: Keys
     options: tuple[str, ...]
@@ -62,6 +57,11 @@ class AskPeople(ExplainedLeaf):
         super().__post_init__()
         self._view = View(self.context)
 
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The key of the answer."""
+        return {options["key"]: options["gives"]}
+
     def initialise(self) -> None:
         """Put the question."""
         self.clear_explanation()
@@ -77,13 +77,12 @@ class AskPeople(ExplainedLeaf):
     def update(self) -> Status:
         """Act on the answer once it is there."""
         if self._false_start is not None or self._asked is None:
-            failure = self._false_start or Failed(Cause.ERROR, "the question was not put")
-            return self._failed(failure)
+            return self.fail(self._false_start or Failed(Cause.ERROR, "the question was not put"))
         if not self._asked.done():
             return Status.RUNNING
         said, self._asked = self._asked.result(), None
         if not said and self.default is None:
-            return self._failed(Failed(Cause.TIMEOUT, f"nobody answered '{self._text}' within {self.limit_s:g} s"))
+            return self.fail(Failed(Cause.TIMEOUT, f"nobody answered '{self._text}' within {self.limit_s:g} s"))
         answer = self._meant(said)
         if answer is not None:
             return self._answered(answer)
@@ -133,10 +132,6 @@ class AskPeople(ExplainedLeaf):
         self.context.publish(ANSWER_TOPIC, note)
         return Status.SUCCESS
 
-    def _failed(self, failure: Failed) -> Status:
-        self.cause, self.message = failure.cause, failure.message
-        return Status.FAILURE
-
 
 def _number(said: str) -> float | None:
     """A number that expressions can hold."""
@@ -151,24 +146,19 @@ def _as_text(value: Value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    return {options["key"]: options["gives"]}
-
-
 def _speak_plan(assembler: Assembler, block: Speak, builder: PlanBuilder) -> Assembled:
     if not block.text.names:
         return Assembled((builder.skill("speak", {"text": block.text.filled({})}),))
-    check_template(block.text, builder, assembler)
+    assembler.check_template(block.text, builder)
     key = builder.key("text")
-    names = {**assembler.flow.names, "": Named(key, str)}
-    fill = set_plan(builder, {key: block.text}, names, "fill", "put the values in")
+    fill = set_plan(assembler.flow, builder, {key: block.text}, {key: str}, "fill", "put the values in")
     return Assembled((builder.sequence("speak", fill, builder.skill("speak", {"text": FromBoard(key)})),))
 
 
 def _ask_plan(assembler: Assembler, block: model.Ask, builder: PlanBuilder) -> Assembled:
-    check_template(block.text, builder, assembler)
+    assembler.check_template(block.text, builder)
     kind = float if block.match == "number" else str
-    key = give_key(assembler, block.answer_name, builder.key("answer"), kind, builder)
+    key = assembler.give(block.answer_name, builder.key("answer"), kind, builder)
     choices = block.choices or {}
     names = {choice.lower(): choice for choice in choices} or _spoken(block.match, builder)
     default = _default(block, names, builder)
@@ -177,7 +167,7 @@ def _ask_plan(assembler: Assembler, block: model.Ask, builder: PlanBuilder) -> A
         f"ask: {block.text.text}",
         part="question",
         text=block.text,
-        keys=MappingProxyType(dict(keys_of(block.text, assembler.flow.names))),
+        keys=MappingProxyType(dict(assembler.flow.keys_of(block.text))),
         options=tuple(choices),
         names=MappingProxyType(names),
         gives=kind,
@@ -190,7 +180,7 @@ def _ask_plan(assembler: Assembler, block: model.Ask, builder: PlanBuilder) -> A
     flow, afters, branches, nodes = assembler.flow, [], {}, [leaf]
     parts: tuple[StepPart, ...] = ()
     for choice, steps in choices.items():
-        branch, after = branch_of(assembler, steps, builder.at(f"answer-{slug(choice)}"), f"if {choice}", flow)
+        branch, after = assembler.branch(steps, builder.at(f"answer-{slug(choice)}"), f"if {choice}", flow)
         afters.append(after)
         parts += branch.parts
         if branch.nodes:
@@ -231,5 +221,4 @@ def _default(block: model.Ask, names: Mapping[str, str], builder: PlanBuilder) -
     return names.get(str(default).lower(), str(default))
 
 
-KINDS: Final[Mapping[str, NodeKind]] = {"question": NodeKind(AskPeople, ("context",), writes=_writes)}
-PLANS: Final[BlockPlans] = {Speak: _speak_plan, model.Ask: _ask_plan}
+PLANS: Final[StepPlans] = {Speak: _speak_plan, model.Ask: _ask_plan}

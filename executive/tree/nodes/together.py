@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import field
 from typing import Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.mission.gripper import either
-from executive.tree.behaviour import cause_of, message_of
-from executive.tree.compiling.flow import Assembler, BlockPlans, branch_of
-from executive.tree.compiling.part import Assembled
-from executive.tree.node import NodeKind, NodeSpec
-from executive.tree.nodes.composites import MemoryComposite
-from executive.tree.plan import PlanBuilder
+from executive.tree.assembly import Assembler, StepPlans
+from executive.tree.behaviour import MemoryComposite, cause_of, message_of
+from executive.tree.node import NodeSpec
+from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import steps as model
 from skills.api import Cause, Part
 from skills.files.errors import InputError
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class Together(MemoryComposite):
     """All children side by side: each is ticked until it is done.
 
@@ -29,6 +26,7 @@ class Together(MemoryComposite):
     more; then the others are stopped. Else RUNNING.
     """
 
+    kind = "together"
     needed: int
     _failed: list[Behaviour] = field(default_factory=list, init=False)
     _done: list[Behaviour] = field(default_factory=list, init=False)
@@ -53,26 +51,23 @@ class Together(MemoryComposite):
 
     def _judge(self) -> None:
         if len(self._done) == self.needed:
-            self._finish(None, "; ".join(map(message_of, self._done)), Status.SUCCESS)
+            self._finish(None, "; ".join(map(message_of, self._done)))
         elif len(self.children) - len(self._failed) < self.needed:
-            self._finish(cause_of(self._failed[0]), "; ".join(map(message_of, self._failed)), Status.FAILURE)
+            self._finish(cause_of(self._failed[0]), "; ".join(map(message_of, self._failed)))
         else:
-            running = [child for child in self.children if child.status == Status.RUNNING]
-            self.status, self.cause = Status.RUNNING, None
-            self.message = "; ".join(map(message_of, running))
+            self._go_on("; ".join(message_of(child) for child in self.children if child.status == Status.RUNNING))
 
-    def _finish(self, cause: Cause | None, message: str, status: Status) -> None:
+    def _finish(self, cause: Cause | None, message: str) -> None:
         for child in self.children:
             if child.status == Status.RUNNING:
                 child.stop(Status.INVALID)
-        self.cause, self.message = cause, message
-        self.stop(status)
+        self._end(cause, message)
 
 
 def _plan(assembler: Assembler, block: model.Together, builder: PlanBuilder) -> Assembled:
     flow, made, afters = assembler.flow, [], []
     for number, step in enumerate(block.steps, start=1):
-        branch, after = branch_of(assembler, (step,), builder.at(f"branch-{number}"), f"branch {number}", flow)
+        branch, after = assembler.branch((step,), builder.at(f"branch-{number}"), f"branch {number}", flow)
         made.append(branch)
         afters.append(after)
     _refuse_collisions([each.nodes[0] for each in made], builder)
@@ -106,5 +101,4 @@ def _used_parts(branch: NodeSpec) -> frozenset[Part]:
     return frozenset(part for skill in skills for part in skill.uses)
 
 
-KINDS: Final[Mapping[str, NodeKind]] = {"together": NodeKind(Together, ("children",))}
-PLANS: Final[BlockPlans] = {model.Together: _plan}
+PLANS: Final[StepPlans] = {model.Together: _plan}

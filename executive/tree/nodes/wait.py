@@ -2,33 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import ExplainedLeaf
-from executive.tree.behaviours.decorators import ExplainedDecorator
+from executive.tree.assembly import Assembler, StepPlans
+from executive.tree.behaviour import ExplainedDecorator, ExplainedLeaf
 from executive.tree.board import Board
-from executive.tree.compiling.flow import Assembler, BlockPlans, decision_node
-from executive.tree.compiling.part import Assembled
 from executive.tree.context import RunContext
-from executive.tree.node import NodeKind
-from executive.tree.nodes.decisions import DAY_S, Decide
-from executive.tree.plan import PlanBuilder
+from executive.tree.nodes.decisions import DAY_S, Decide, decide_plan
+from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import leaf_steps as model
 from skills.robot import Clock
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
+class Pause(ExplainedLeaf):
+    """RUNNING for `duration_s` on the robot's clock, then SUCCESS: objects may come to rest, readings may come in."""
+
+    kind = "pause"
+    duration_s: float
+    clock: Clock
+
+    def initialise(self) -> None:
+        """Start the time."""
+        self.clear_explanation()
+        self._end_s = self.clock.now() + self.duration_s
+
+    def update(self) -> Status:
+        """Wait until the time is over."""
+        done = self.clock.now() >= self._end_s
+        return self.say(f"waited {self.duration_s:g} s") if done else self.say("waits a moment", Status.RUNNING)
+
+
 class WaitFor(ExplainedDecorator):
     """Waits until its child, a decision, is true; it is asked anew `every_s` after it was false.
 
     Child RUNNING: RUNNING. Answer true: SUCCESS. Answer false: RUNNING. Child FAILURE: FAILURE with its cause.
     """
 
+    kind = "wait for"
     key: str
     words: str
     every_s: float
@@ -60,10 +74,10 @@ class WaitFor(ExplainedDecorator):
         return Status.RUNNING
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
 class WaitUntilClock(ExplainedLeaf):
     """RUNNING until a time of day (s after midnight), then SUCCESS; at once when it was up to twelve hours ago."""
 
+    kind = "wait until"
     time_s: float
     words: str
     context: RunContext
@@ -78,8 +92,7 @@ class WaitUntilClock(ExplainedLeaf):
     def update(self) -> Status:
         """Wait until the time has come."""
         done = self.context.clock.now() >= self._end_s - 1e-9
-        self.message = f"it is {self.words}" if done else f"waits until {self.words}"
-        return Status.SUCCESS if done else Status.RUNNING
+        return self.say(f"it is {self.words}") if done else self.say(f"waits until {self.words}", Status.RUNNING)
 
 
 def _plan(assembler: Assembler, block: model.Wait, builder: PlanBuilder) -> Assembled:
@@ -90,14 +103,10 @@ def _plan(assembler: Assembler, block: model.Wait, builder: PlanBuilder) -> Asse
         time_s, words = awaited.until_clock_s, awaited.until_clock
         return Assembled((builder.node("wait until", f"wait until {words}", time_s=time_s, words=words),))
     assert awaited.condition is not None
-    decide, key, parts = decision_node(assembler, awaited.condition, builder.at("for"))
+    decide, key, parts = decide_plan(assembler.flow, awaited.condition, builder.at("for"))
     words, every_s = str(awaited.condition), awaited.every_s if decide.children else 0.0
     name = f"wait until {words}"
     return Assembled((builder.node("wait for", name, decide, key=key, words=words, every_s=every_s),), parts)
 
 
-KINDS: Final[Mapping[str, NodeKind]] = {
-    "wait for": NodeKind(WaitFor, ("child", "board", "clock")),
-    "wait until": NodeKind(WaitUntilClock, ("context",)),
-}
-PLANS: Final[BlockPlans] = {model.Wait: _plan}
+PLANS: Final[StepPlans] = {model.Wait: _plan}

@@ -12,7 +12,8 @@ from executive.cli.run_keys import HELP, SAY_HELP, Keys, Typing, keys_pressed, p
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.decisions import AnyHolds, DoesNotHold, Pressed
+from executive.tree.nodes.decisions import Decision
+from executive.words.condition import AnyOf, ButtonPressed, Not
 from skills.api import Question
 from skills.testing.clock import VirtualClock
 
@@ -168,7 +169,7 @@ def test_a_sentence_being_typed_and_its_answer_stand_below_the_tree(control):
 def waiting(compiled, make):
     """A control of a mission that waits for two buttons."""
     hands, tree = Control(), compiled(*make.FETCH)
-    either = AnyHolds((Pressed("go"), DoesNotHold(Pressed("hold on"))))
+    either = Decision(AnyOf(any=(ButtonPressed(button="go"), Not(**{"not": ButtonPressed(button="hold on")}))))
     decide = NodeSpec("decide", "alice/fetch-drink/decide", "either?", {"decision": either})
     hands.begin({"Alice": replace(tree, root=replace(tree.root, children=(*tree.root.children, decide)))})
     return hands

@@ -5,9 +5,9 @@ from typing import ClassVar
 import pytest
 from py_trees.common import Status
 
-from executive.tree.behaviours.decorators import Retry, Timeout
-from executive.tree.behaviours.suspension import StoppableTime, suspend
+from executive.tree.behaviour import StoppableTime, suspend
 from executive.tree.nodes.composites import MemorySequence
+from executive.tree.nodes.policies import Retry, Timeout
 from executive.tree.nodes.skill import SkillLeaf
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 

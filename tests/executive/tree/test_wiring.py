@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import pytest
 
 from executive.tree.board import Constant, FromBoard
-from executive.tree.compiling.wiring import check_wiring
+from executive.tree.compiler import check_wiring
 from executive.tree.node import NodeSpec
 from executive.tree.plan import skill_spec
 from skills.api import Skill, Succeeded

@@ -5,14 +5,14 @@ from dataclasses import replace
 import pytest
 from py_trees.common import Status
 
-from executive.tree.behaviours.decorators import Guard, Retry, Timeout
-from executive.tree.behaviours.suspension import suspend
+from executive.tree.behaviour import suspend
 from executive.tree.context import Endings
 from executive.tree.nodes.alternative import Try
 from executive.tree.nodes.choice import Choose
 from executive.tree.nodes.composites import MemorySequence
 from executive.tree.nodes.group import Always
-from executive.tree.nodes.policies import Skip
+from executive.tree.nodes.guard import Guard
+from executive.tree.nodes.policies import Retry, Skip, Timeout
 from executive.tree.nodes.repeat import Repeat
 from executive.tree.nodes.together import Together
 from skills.api import Cause, Failed

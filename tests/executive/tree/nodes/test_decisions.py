@@ -5,24 +5,14 @@ from dataclasses import replace
 import pytest
 from py_trees.common import Status
 
-from executive.tree.behaviours.answer import ANSWER_TOPIC
-from executive.tree.behaviours.suspension import suspend
+from executive.tree.behaviour import suspend
 from executive.tree.nodes.check import Check
-from executive.tree.nodes.decisions import (
-    AllHold,
-    AnswerIs,
-    AnyHolds,
-    Decide,
-    DoesNotHold,
-    MustHold,
-    MustNotBegin,
-    Pressed,
-    ValueHolds,
-    View,
-)
+from executive.tree.nodes.decisions import Decide, Decision, MustHold, MustNotBegin, View
 from executive.tree.nodes.guard import Waiting
+from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.tree.nodes.values import SetValues
 from executive.tree.nodes.wait import WaitFor, WaitUntilClock
+from executive.words.condition import AllOf, AnyOf, ButtonPressed, Look, Not, ValueIs
 from executive.words.expression import Expression, Template
 from skills.api import Cause, Failed
 from tests.executive.tree.scripted import Leaf, letters, tick
@@ -48,7 +38,15 @@ def view(run_context):
 
 
 def value(text, **keys):
-    return ValueHolds(Expression(text), keys)
+    return Decision(ValueIs(expression=text), keys)
+
+
+def button(name):
+    return Decision(ButtonPressed(button=name))
+
+
+def decision(condition, *answers):
+    return Decision(condition, answers=answers)
 
 
 # Decisions: true, false, or not known yet.
@@ -87,22 +85,29 @@ def test_values_are_read_from_the_blackboard(view, run_context):
 def test_a_button_counts_from_when_the_tree_was_made(run_context, pressed):
     pressed["go"] = 2
     view = View(run_context)
-    assert not Pressed("go").holds(view)
+    assert not button("go").holds(view)
     pressed["go"] = 3
-    assert Pressed("go").holds(view)
+    assert button("go").holds(view)
     view.forget_presses()
-    assert not Pressed("go").holds(view)
-    assert not Pressed("other").holds(view)
+    assert not button("go").holds(view)
+    assert not button("other").holds(view)
 
 
-class Is:
-    """A decision with a fixed answer."""
+LOOK = Look(object="coke")
 
-    def __init__(self, answer):
-        self.answer = answer
 
-    def holds(self, view):
-        return self.answer
+@pytest.fixture
+def answered(run_context):
+    """A decision of looks that have given these answers (None: not yet)."""
+
+    def make(condition, *answers):
+        keys = tuple(f"alice/look-{number}/answer" for number, _ in enumerate(answers))
+        for key, answer in zip(keys, answers, strict=True):
+            if answer is not None:
+                run_context.board.put(key, answer)
+        return decision(condition, *keys)
+
+    return make
 
 
 # all of      any of      (None: not known yet)
@@ -119,20 +124,20 @@ TABLE = [
 
 
 @pytest.mark.parametrize(("parts", "every", "some"), TABLE)
-def test_combinations(view, parts, every, some):
-    decisions = tuple(map(Is, parts))
-    assert (AllHold(decisions).holds(view), AnyHolds(decisions).holds(view)) == (every, some)
+def test_combinations(view, answered, parts, every, some):
+    both, either = answered(AllOf(all=(LOOK, LOOK)), *parts), answered(AnyOf(any=(LOOK, LOOK)), *parts)
+    assert (both.holds(view), either.holds(view)) == (every, some)
 
 
 @pytest.mark.parametrize(("part", "whole"), [(True, False), (False, True), (None, None)])
-def test_not(view, part, whole):
-    assert DoesNotHold(Is(part)).holds(view) is whole
+def test_not(view, answered, part, whole):
+    assert answered(Not(**{"not": LOOK}), part).holds(view) is whole
 
 
 def test_an_answer_is_not_known_before_the_look(view, run_context):
-    assert AnswerIs(FIRST).holds(view) is None
+    assert decision(LOOK, FIRST).holds(view) is None
     run_context.board.put(FIRST, False)
-    assert AnswerIs(FIRST).holds(view) is False
+    assert decision(LOOK, FIRST).holds(view) is False
 
 
 # Decide: takes the looks only as long as it needs them.
@@ -146,14 +151,16 @@ def test_an_answer_is_not_known_before_the_look(view, run_context):
 #   any+value    -          -         S        true    -        (the value is true already)
 #   all          F          -         F        -       1
 #   all          S true     E         F ERROR  -       1, 2
-BOTH, EITHER = AllHold((AnswerIs(FIRST), AnswerIs(SECOND))), AnyHolds((AnswerIs(FIRST), AnswerIs(SECOND)))
+BOTH = decision(AllOf(all=(LOOK, LOOK)), FIRST, SECOND)
+EITHER = decision(AnyOf(any=(LOOK, LOOK)), FIRST, SECOND)
+OR_CHARGED = AnyOf(any=(AnyOf(any=(LOOK, LOOK)), ValueIs(expression="battery > 0.1")))
 DECIDE = [
     (value("battery > 0.1"), ("S", True), ("S", True), "S", True, []),
     (BOTH, ("S", False), ("S", True), "S", False, ["+one"]),
     (BOTH, ("S", True), ("RS", True), "RS", True, ["+one", "+two"]),
     (EITHER, ("S", True), ("S", True), "S", True, ["+one"]),
     (EITHER, ("RS", False), ("S", False), "RS", False, ["+one", "+two"]),
-    (AnyHolds((EITHER, value("battery > 0.1"))), ("S", True), ("S", True), "S", True, []),
+    (decision(OR_CHARGED, FIRST, SECOND), ("S", True), ("S", True), "S", True, []),
     (BOTH, ("F", True), ("S", True), "F", None, ["+one"]),
     (BOTH, ("S", True), ("E", True), "F", None, ["+one", "+two"]),
 ]
@@ -176,7 +183,7 @@ def decide(run_context):
             words="it is so",
             key=KEY,
             context=run_context,
-            children=looks,
+            children=looks[: len(decision.answers)],
         )
 
     return make
@@ -197,7 +204,7 @@ def test_decide(decide, run_context, decision, one, two, expected, answer, taken
 
 def test_decide_lets_a_look_end_that_has_left_its_answer(decide, run_context):
     log = []
-    root = decide(AnswerIs(FIRST), one=("RRS", True), log=log)
+    root = decide(decision(LOOK, FIRST), one=("RRS", True), log=log)
     tick(root)
     run_context.board.put(FIRST, True)
     assert letters(root, 2) == "RS"
@@ -218,7 +225,7 @@ def test_decide_with_a_value_that_nothing_has_given(decide):
 
 
 def test_decide_with_looks_that_leave_no_answer_is_an_error(decide, run_context):
-    root = decide(AnswerIs("alice/never"))
+    root = decide(decision(LOOK, "alice/never"))
     assert letters(root, 1) == "F"
     assert root.cause is Cause.ERROR
 
@@ -311,7 +318,7 @@ def test_wait_cancelled_stops_the_decision(wait):
 
 def test_wait_for_a_button_counts_presses_from_when_it_begins(wait, run_context, pressed):
     decide = Decide(
-        path_id="alice/d", name="d", decision=Pressed("go"), words="go", key=KEY, context=run_context, children=[]
+        path_id="alice/d", name="d", decision=button("go"), words="go", key=KEY, context=run_context, children=[]
     )
     root = wait(decide)
     pressed["go"] = 1
@@ -380,7 +387,7 @@ def test_must_hold_without_a_value(run_context):
 
 
 def test_must_hold_waits_for_what_is_not_known_yet(run_context):
-    assert isinstance(MustHold(Is(None), "so").for_run(run_context).violated(run_context), Waiting)
+    assert isinstance(MustHold(decision(LOOK, FIRST), "so").for_run(run_context).violated(run_context), Waiting)
 
 
 def test_must_not_begin_calls_once_until_it_was_false_in_between(run_context, robot):
@@ -396,7 +403,7 @@ def test_must_not_begin_calls_once_until_it_was_false_in_between(run_context, ro
 
 
 def test_must_not_begin_is_called_once_by_each_press(run_context, pressed):
-    watch = MustNotBegin(Pressed("go"), "go").for_run(run_context)
+    watch = MustNotBegin(button("go"), "go").for_run(run_context)
     watch.begin(run_context)
     found = []
     for presses in (0, 1, 1, 2, 2):

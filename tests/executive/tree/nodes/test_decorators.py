@@ -5,9 +5,9 @@ from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
 from executive.tree.behaviour import Explained
-from executive.tree.behaviours.decorators import Guard, Retry, Timeout
 from executive.tree.nodes.composites import MemorySequence
-from executive.tree.nodes.guard import Holds
+from executive.tree.nodes.guard import Guard, Holds
+from executive.tree.nodes.policies import Retry, Timeout
 from skills.api import Cause, Failed, Thing
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID

@@ -6,12 +6,12 @@ import pytest
 from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
-from executive.tree.behaviours.decorators import Guard
 from executive.tree.nodes.guard import (
     BatteryAtLeast,
     BatteryForWork,
     Condition,
     Freshness,
+    Guard,
     Holds,
     KnowsPlace,
     NoStopButton,

@@ -6,9 +6,11 @@ from types import MappingProxyType
 import pytest
 from py_trees.common import Status
 
-from executive.tree.behaviours.leaves import Pause, RememberPose, SurfacesNear
 from executive.tree.board import BesideBoard, Board, FromBoardOr, SurfaceOfDetection
 from executive.tree.context import leaf_seed
+from executive.tree.nodes.fallen import SurfacesNear
+from executive.tree.nodes.policies import RememberPose
+from executive.tree.nodes.wait import Pause
 from skills.api import Cause, Surface
 from skills.robot import Pose2D
 

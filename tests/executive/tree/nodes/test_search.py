@@ -5,8 +5,8 @@ import pytest
 from py_trees.common import Status
 
 from executive.tree.behaviour import Explained
-from executive.tree.behaviours.answer import Answer
 from executive.tree.nodes.composites import MemoryRound, MemorySelector
+from executive.tree.nodes.search import Answer
 from skills.api import Cause, ObjectObservation, Thing
 
 

@@ -6,8 +6,8 @@ import pytest
 from py_trees.common import Status
 
 from executive.run.control import Control
-from executive.tree.behaviours.answer import ANSWER_TOPIC
-from executive.tree.behaviours.suspension import suspend
+from executive.tree.behaviour import suspend
+from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.tree.nodes.speech import SPEECH_TOPIC, AskPeople
 from executive.words.expression import Template
 from skills.api import Cause

@@ -26,8 +26,8 @@ from skills.detection import Detection
 from skills.files.errors import InputError
 from skills.files.outside import read_text
 from skills.perception.detector.augmentation import AugmentedDetector
+from skills.perception.detector.camera_images import turned, turned_back
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector
-from skills.perception.detector.upright import turned, turned_back
 from skills.quantities import Count
 from skills.robot import Picture
 

@@ -13,7 +13,7 @@ from pycocotools import mask as coco_mask
 
 from errand_train.detector.labels import Labels
 from skills.perception.detector.cascade_files import DetectorModel
-from skills.perception.detector.crops import refined
+from skills.perception.detector.onnx_detector import refined
 from skills.perception.detector.proposals import ProposalOptions, Proposals, proposals_of
 from skills.perception.detector.scales import Scales
 

@@ -33,9 +33,9 @@ from errand_train.detector.proposal_table import proposed, refined_by
 from errand_train.detector.store import read_picture
 from errand_train.detector.validate import examination
 from skills.perception.detector.cascade_files import classifier_file, load_model, refinement_file
-from skills.perception.detector.crops import crops_about
 from skills.perception.detector.letterbox import letterbox
 from skills.perception.detector.network_file import ModelFileError, Network
+from skills.perception.detector.onnx_detector import crops_about
 from skills.perception.detector.proposals import CLASSIFIED, ProposalOptions, Proposals, proposals_of
 from skills.perception.detector.scales import Scales, halved
 

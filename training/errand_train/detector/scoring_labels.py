@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from errand_train.detector.coco import CocoLabel, coco_file
-from skills.perception.detector.upright import LEAST_ROLL_DEG
+from skills.perception.detector.camera_images import LEAST_ROLL_DEG
 
 LEAST_LONG_PX: Final = 24.0
 LEAST_SHORT_PX: Final = 8.0

@@ -12,7 +12,6 @@ from skills.api import FLOOR, Cause, ObjectObservation, Succeeded, Surface
 from skills.approach.ports import ApproachInputs, ApproachPorts
 from skills.approach.standing import Standing, free_places, go_to_one, is_comfortable, reachable
 from skills.arm.arm_skill import ArmSkill
-from skills.arm.routine import Routine, SkillFailure
 from skills.detect.ports import DetectInputs
 from skills.detect.skill import Detect
 from skills.grasp.reach import body_heights_m, observed_target, reach_check
@@ -22,6 +21,7 @@ from skills.navigate.footprint import Footprint
 from skills.navigate.ports import NavigateInputs
 from skills.quantities import Count, Length, Margin, Speed, Turn
 from skills.robot import FloatArray, Pose2D
+from skills.routine import Routine, SkillFailure
 
 _STILL_BEFORE_M = 1.3
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from skills.api import Cause, Costmap, Running
-from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.ports import NavigateInputs
 from skills.navigate.skill import Navigate
 from skills.robot import ArmCapabilities, FloatArray, Pose2D
+from skills.routine import Routine, RoutineSkill, SkillFailure
 
 BEARINGS = 24
 REACH_WEIGHT = 4.0

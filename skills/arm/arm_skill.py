@@ -18,7 +18,6 @@ from skills.arm.gaze import head_angles, without_arm
 from skills.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.arm.kinematics import ArmModel, arm_model
 from skills.arm.poses import UP_B, look_configuration, towards_shoulder
-from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.arm.solid_cells import Outline, solid_boxes, with_picture, with_view
 from skills.estimate.self_filter import segment_distance
 from skills.patience import PATIENCE_S
@@ -35,6 +34,7 @@ from skills.robot import (
     Image,
     NoImageError,
 )
+from skills.routine import Routine, RoutineSkill, SkillFailure
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
 PlannedT = TypeVar("PlannedT")

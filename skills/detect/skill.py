@@ -23,7 +23,6 @@ from skills.api import (
 )
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
-from skills.arm.routine import Routine, SkillFailure
 from skills.detect.messages import (
     coverage_message,
     detections_message,
@@ -45,6 +44,7 @@ from skills.perception.surface_segmentation import Cluster, view_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
 from skills.quantities import Angle, Duration, Length, Tries
 from skills.robot import FloatArray, Image
+from skills.routine import Routine, SkillFailure
 
 _LEAST_SEEN = 0.02
 _FITS_NEAR_M = 0.4

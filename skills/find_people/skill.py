@@ -10,7 +10,6 @@ from typing import ClassVar
 import shapely
 
 from skills.api import Cause, ObjectObservation, Running, Succeeded, Thing
-from skills.arm.routine import Routine, SkillFailure
 from skills.detect.words import counted
 from skills.find_people.ports import FindPeopleInputs, FindPeoplePorts
 from skills.navigate.arm_footprint import ArmFootprint
@@ -23,6 +22,7 @@ from skills.perception.people import SeenPerson, merged, people_in_scan
 from skills.perception.people_watch import people_in_images
 from skills.quantities import Count, Delay, Length, Share, Turn, TurnRate
 from skills.robot import Image
+from skills.routine import Routine, SkillFailure
 
 _SCAN_AGE_S, _AHEAD_RAD = 1.0, 0.2
 _SIZE_M = (0.5, 0.5, 1.7)

@@ -19,7 +19,6 @@ from skills.arm.poses import (
     overview_viewpoints,
     sees_closely,
 )
-from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import surface_boxes
 from skills.grasp.candidates import THIN_M, GraspCandidate
 from skills.grasp.close_view import LOOK_HALF_SIDE_M, SURFACE_AROUND_M, CloseView, examine, square
@@ -36,6 +35,7 @@ from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
 from skills.quantities import Force, Length, Margin, Turn
 from skills.robot import ArmTrajectory, FloatArray, GripperKind
+from skills.routine import Routine, SkillFailure
 
 _CLOSED_RAD = 0.06
 _PER_KG_N, _PER_LEVER_N_M, _MOST_OF_FORCE = 12.0, 400.0, 0.95

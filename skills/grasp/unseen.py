@@ -13,9 +13,9 @@ import numpy as np
 from skills.api import Cause, ObjectObservation
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.kinematics import ArmModel
-from skills.arm.routine import Routine, SkillFailure
 from skills.arm.solid_cells import never_seen
 from skills.robot import FloatArray
+from skills.routine import Routine, SkillFailure
 
 _NEAR_M, _FURTHEST_M, _NEAREST_M = 0.3, 1.6, 0.4
 _FEWEST = 3

@@ -17,7 +17,6 @@ from skills.arm.arm_skill import GRIPPER_FORCE_N
 from skills.arm.collision import ArmScene, Box
 from skills.arm.hold import Grip
 from skills.arm.pull import PullWatch
-from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
 from skills.hand_over.given import Seen, release_from, release_of
 from skills.hand_over.ports import HandOverInputs, HandOverPorts
@@ -29,6 +28,7 @@ from skills.patience import Patience
 from skills.perception.people import SeenPerson, people_in_scan
 from skills.quantities import Duration, Force, Height, Length
 from skills.robot import FloatArray, Pose2D
+from skills.routine import Routine, SkillFailure
 
 _FACING_RAD = 0.5
 _SCANS = 3

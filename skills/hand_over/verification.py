@@ -14,13 +14,13 @@ from skills.api import Cause, InputsT
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.poses import UP_B, carry_configuration, overview_viewpoints, towards_shoulder
-from skills.arm.routine import Routine, SkillFailure
 from skills.back_off.ports import BackOffInputs
 from skills.back_off.skill import BackOff
 from skills.hand_over.given import Release, Seen, Sight, names_in, seen_given
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
 from skills.robot import ArmCapabilities, FloatArray, Image
+from skills.routine import Routine, SkillFailure
 
 LOOKS = 3
 SETTLES_WITHIN_S = 8.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from skills.api import Cause, InputsT, Running, SkillContext
-from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.navigate.base import Base
+from skills.routine import Routine, RoutineSkill, SkillFailure
 
 
 class MovingSkill(RoutineSkill[InputsT]):

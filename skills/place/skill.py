@@ -17,7 +17,6 @@ from skills.approach.standing import first_reachable_spot, free_places, go_to_on
 from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill, Goal
 from skills.arm.collision import ArmScene, Box, box_corners
 from skills.arm.poses import carry_configuration, overview_viewpoints, tucked_configuration
-from skills.arm.routine import Routine, SkillFailure
 from skills.arm.solid_cells import CELL_M
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.estimate.self_filter import SelfFilter
@@ -41,6 +40,7 @@ from skills.place.placement import (
 from skills.place.ports import PlaceInputs, PlacePorts
 from skills.quantities import Length, Tries, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, Image, Pose2D
+from skills.routine import Routine, SkillFailure
 
 _SURELY_FREE_M = 0.03
 _PRESS_M = 0.03

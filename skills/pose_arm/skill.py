@@ -6,8 +6,8 @@ import numpy as np
 
 from skills.api import Cause, Succeeded
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
-from skills.arm.routine import Routine, SkillFailure
 from skills.pose_arm.ports import PoseArmInputs, PoseArmPorts
+from skills.routine import Routine, SkillFailure
 
 _THERE_RAD = 0.05
 

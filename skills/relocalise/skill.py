@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from skills.api import Cause, LocalisationEstimate, Localiser, Running, SearchingLocaliser, Succeeded
-from skills.arm.routine import Routine, SkillFailure
 from skills.navigate.low_obstacles import WatchOptions, low_points
 from skills.navigate.moving import MovingSkill
 from skills.patience import PATIENCE_S
 from skills.quantities import Delay, Height, Length, Margin, Share, Speed, Turn, TurnRate
 from skills.relocalise.ports import RelocaliseInputs, RelocalisePorts
 from skills.robot import Capabilities, FloatArray, NoImageError, Scan
+from skills.routine import Routine, SkillFailure
 
 _BEYOND_M = 5.0
 

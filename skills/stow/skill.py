@@ -7,7 +7,7 @@ import numpy as np
 from skills.api import Cause, Succeeded
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.poses import carry_configuration
-from skills.arm.routine import Routine, SkillFailure
+from skills.routine import Routine, SkillFailure
 from skills.stow.ports import StowInputs, StowPorts
 
 _NEAR_X_M, _NEAR_Z_M = 0.05, 0.06

@@ -7,10 +7,10 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from scripted_robot import GRIPPER, MODEL, ScriptedRobot, context_of, outcome
 
 from skills.api import Cause, Failed, ObjectObservation, Thing
-from skills.arm.routine import SkillFailure
 from skills.grasp.candidates import Target, grasp_candidates
 from skills.grasp.memory import others_first, same_grasp, tried_grasp
 from skills.grasp.skill import Grasp, GraspInputs
+from skills.routine import SkillFailure
 
 CENTRE = (0.85, 0.0)
 

@@ -5,8 +5,8 @@ import pytest
 from scripted_robot import ScriptedRobot, context_of
 
 from skills.api import Cause, Failed, PlanningError, Running, Succeeded
-from skills.arm.routine import RoutineSkill, SkillFailure
 from skills.robot import ArmTrajectory
+from skills.routine import RoutineSkill, SkillFailure
 
 TRAJECTORY = ArmTrajectory(np.array([0.5]), np.array([[0.1, -3.0, 3.0, 0.0, 0.0, 0.0]]))
 

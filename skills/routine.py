@@ -40,13 +40,16 @@ _OFF_PATH_RAD = 0.2
 
 
 class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program error
-    """Ends a routine: the cause, one plain sentence, and what was learnt for the next attempt (see `Failed`)."""
+    """Ends a routine: the cause, one plain sentence, what was learnt, and whether it is final (see `Failed`)."""
 
-    def __init__(self, cause: Cause, message: str, outputs: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self, cause: Cause, message: str, outputs: Mapping[str, Any] | None = None, *, final: bool = False
+    ) -> None:
         super().__init__(message)
         self.cause = cause
         self.message = message
         self.outputs: Mapping[str, Any] = outputs or {}
+        self.final = final
 
 
 class OffPathError(Exception):
@@ -77,8 +80,8 @@ class RoutineSkill(Skill[InputsT]):
     stopped is taken up; else `run_again` looks what is done already.
     """
 
-    def __init__(self, context: SkillContext) -> None:
-        super().__init__(context)
+    def __init__(self, context: SkillContext, options: Any = None) -> None:
+        super().__init__(context, options)
         self._routine: Routine[Succeeded] | None = None
         self._commands: list[CommandId] = []
         self._interrupted: set[CommandId] = set()
@@ -157,7 +160,7 @@ class RoutineSkill(Skill[InputsT]):
             assert isinstance(finished.value, Succeeded)
             return finished.value
         except SkillFailure as failure:
-            return Failed(failure.cause, failure.message, failure.outputs)
+            return Failed(failure.cause, failure.message, failure.outputs, failure.final)
 
     def end(self) -> None:
         """Drop the routine and stop its commands that still run."""

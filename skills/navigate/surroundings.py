@@ -1,0 +1,103 @@
+"""What the navigate skill senses around the robot: obstacles, people, doors and other robots, and its own outline."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from skills.api import Costmap, ForgettingCostmap, SkillContext
+from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.collision_guard import CollisionGuard
+from skills.navigate.cut_off import DoorWatch
+from skills.navigate.giving_way import Avoided, GivingWay
+from skills.navigate.low_obstacles import LowObstacleWatch
+from skills.navigate.options import NavigateOptions
+from skills.navigate.people_space import Pace, PaceManager, spaced
+from skills.navigate.scan_health import ScanHealth
+from skills.perception.doorway import Doorway
+from skills.perception.people import SeenPerson
+from skills.perception.people_watch import PeopleWatch
+from skills.robot import FloatArray, Pose2D
+from skills.stack import LocalController
+
+_OUTLINE_PERIOD_S = 0.5
+
+
+class Surroundings:
+    """The surroundings of one trip, by the sensors alone.
+
+    `footprint` is the outline that plans and checks use, `room_m` the distance that plans keep to people.
+    """
+
+    def __init__(self, context: SkillContext, options: NavigateOptions) -> None:
+        self._context, self._space = context, options.space
+        self._outline = ArmFootprint(context)
+        self.footprint = self._outline.now()
+        self._measured_s = -math.inf
+        self.room_m = options.space.room_m
+        self.scans = ScanHealth(context, options.scans)
+        self.doors = DoorWatch(context, options.doors)
+        self.robots = GivingWay(context, options.giving_way)
+        self._low = LowObstacleWatch(context, options.low_obstacles)
+        self._people = PeopleWatch(context, options.people)
+        self._pace = PaceManager(self.footprint, options.space)
+        self._guard = CollisionGuard(context, self.footprint, options.guard)
+
+    def look(self, velocity: FloatArray) -> None:
+        """Look for low obstacles and for people; what was seen comes in later. `velocity` (3,) was commanded last."""
+        self._low.step()
+        self._people.step(velocity)
+
+    def look_anew(self) -> None:
+        """Measure the outline, judge the doors, and give people their full room again once nobody is near."""
+        if not self.persons():
+            self.room_m = self._space.room_m
+        self.doors.look()
+        self.footprint = self._pace.footprint = self._guard.footprint = self._outline.now()
+        self._measured_s = self._context.clock.now()
+
+    def outgrown(self) -> bool:
+        """Whether the arm, or what it holds, reaches farther than `footprint`; measured every _OUTLINE_PERIOD_S."""
+        if self._context.clock.now() < self._measured_s + _OUTLINE_PERIOD_S:
+            return False
+        self._measured_s = self._context.clock.now()
+        return self._outline.outgrows(self.footprint)
+
+    def persons(self) -> tuple[SeenPerson, ...]:
+        """The people near; what a camera takes for one where a robot says that it stands is that robot."""
+        return tuple(one for one in self._people.people() if not self.robots.is_robot(one.place_W))
+
+    def comes_nearer(self) -> bool:
+        """Whether plans keep less distance to people from now on; False where nobody is near, or they do already."""
+        if not self.persons() or self.room_m <= self._space.least_room_m:
+            return False
+        self.room_m = self._space.least_room_m
+        return True
+
+    def costmap(self, here: Pose2D, goal: Pose2D, avoided: Avoided = Avoided.BODIES) -> Costmap:
+        """The costmap with doors and robots, and with room about people as far as `here` and the goal leave it."""
+        costmap = self.robots.costmap(self.doors.costmap(self._context.costmap), avoided)
+        return spaced(costmap, self.footprint, (here, goal), self.persons(), self.room_m)
+
+    def danger(self, follower: LocalController, most_m_s: float) -> tuple[float, float] | None:
+        """The place (x, y) of what comes into the robot's way so suddenly that it must stand; None: nothing does."""
+        return self._guard.danger(self._context.pose(), follower, most_m_s)
+
+    def pace(self, follower: LocalController, most_m_s: float, goal: Pose2D) -> Pace:
+        """How fast people near the way let the robot go, most_m_s at most."""
+        ahead = follower.ahead(self._space.look_ahead_m)
+        return self._pace.pace(self._context.clock.now(), self._context.pose(), ahead, self.persons(), most_m_s, goal)
+
+    def closed_doors(self, goals: Sequence[Pose2D]) -> tuple[Doorway, ...]:
+        """The doors that were seen closed and leave no path to any of the goals."""
+        people_W = [one.place_W for one in self.persons()]
+        return self.doors.in_the_way(self.footprint, self._context.pose(), goals, people_W)
+
+    def cut_off(self, goals: Sequence[Pose2D]) -> bool:
+        """Whether surely none of the goals can be reached."""
+        return self.doors.regions(self.footprint, self._context.pose(), goals).cut_off
+
+    def forget(self) -> bool:
+        """Forget what the costmap saw, so that it is seen anew; whether there was anything to forget."""
+        costmap = self._context.costmap
+        return isinstance(costmap, ForgettingCostmap) and bool(costmap.forget_seen())

@@ -179,11 +179,15 @@ class ParticleView(Protocol):
         """Poses (N, 3) of x, y (m) and yaw (rad), `most` at most, evenly chosen by weight."""
 
 
-class Costmap(Protocol):
-    """Free space for the body: the surveyed keep-out grid plus obstacles that the sensors see."""
+class FreeSpace(Protocol):
+    """Free space for the body, as planners and controllers ask for it."""
 
     def clearance_m(self, points_W: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance from each (x, y) row to the nearest obstacle, surveyed or seen."""
+        """Distance from each (x, y) row to the nearest obstacle."""
+
+
+class Costmap(FreeSpace, Protocol):
+    """Free space by the surveyed keep-out grid, and by obstacles that the sensors see."""
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
         """Take in the robot's newest sensor readings; called by the runner before each tick."""

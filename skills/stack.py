@@ -26,7 +26,7 @@ from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Pose2D
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform
 
-    from skills.api import Costmap, Detector, Localiser, WorkCounter
+    from skills.api import Costmap, Detector, FreeSpace, Localiser, WorkCounter
     from skills.arm.collision import ArmScene
     from skills.arm.kinematics import ArmModel
     from skills.estimate.grid_map import GridMap
@@ -87,7 +87,7 @@ class GlobalPlanner(Protocol):
 
     def problem(
         self,
-        costmap: Costmap,
+        costmap: FreeSpace,
         footprint: Footprint,
         start: Pose2D,
         goal: Pose2D,
@@ -111,7 +111,7 @@ class LocalController(Protocol):
         pose: Pose2D,
         velocity: tuple[float, float, float],
         last: FloatArray,
-        costmap: Costmap,
+        costmap: FreeSpace,
         most_m_s: float = np.inf,
     ) -> Drive:
         """The velocity for now, at a world pose, body velocity and the velocity commanded `last` (3,)."""

@@ -14,7 +14,7 @@ from executive.tree.plan import StepPart
 from executive.words.command import START, Task
 from executive.words.geometry import area_m2
 from executive.words.knowledge import Knowledge
-from skills.api import Costmap, PlanningError, Skill
+from skills.api import FreeSpace, PlanningError, Skill
 from skills.files.errors import InputError, listing, suggestion
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import path_length
@@ -61,7 +61,7 @@ class Checked:
 class PlannedRoutes(RoutePlanner):
     """Routes by a global planner on the map, as `navigate` plans them; each is planned once."""
 
-    def __init__(self, costmap: Costmap, footprint: Footprint, planner: GlobalPlanner) -> None:
+    def __init__(self, costmap: FreeSpace, footprint: Footprint, planner: GlobalPlanner) -> None:
         self._costmap, self._footprint, self._planner = costmap, footprint, planner
         self._routes: dict[tuple[Pose2D, Pose2D], Route | PlanningError] = {}
 

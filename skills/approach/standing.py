@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from skills.api import Cause, Costmap, Running
+from skills.api import Cause, FreeSpace, Running
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.ports import NavigateInputs
@@ -45,7 +45,7 @@ def is_comfortable(pose: Pose2D, point_W: tuple[float, float], arm: ArmCapabilit
 def free_places(
     point_W: tuple[float, float],
     here: Pose2D,
-    costmap: Costmap,
+    costmap: FreeSpace,
     footprint: Footprint,
     distances_m: Sequence[float],
     best_m: float,

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import Costmap, ForgettingCostmap, LocalisationEstimate, SkillContext
+from skills.api import ForgettingCostmap, FreeSpace, SkillContext
 from skills.navigate.footprint import Footprint
 from skills.perception.doorway import Doorway, opening
 from skills.quantities import Delay, Length, Margin, Turn
-from skills.robot import FloatArray, Pose2D, Robot
+from skills.robot import FloatArray, Pose2D
 
 __all__ = ["DoorOptions", "DoorWatch", "Regions", "closed_sentence"]
 
@@ -75,7 +75,7 @@ class DoorWatch:
             elif seen.least_m > options.closed_m:
                 self._closed.pop(door, None)
 
-    def costmap(self, costmap: Costmap) -> Costmap:
+    def costmap(self, costmap: FreeSpace) -> FreeSpace:
         """The costmap, with the closed doors in it as long as they are not seen open."""
         return WithDoors(costmap, self.closed) if self._closed else costmap
 
@@ -119,7 +119,7 @@ class DoorWatch:
 class WithDoors:
     """A costmap in which closed doors are obstacles, whether or not they were seen of late."""
 
-    costmap: Costmap
+    costmap: FreeSpace
     doors: tuple[Doorway, ...]
 
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
@@ -134,14 +134,6 @@ class WithDoors:
             clearance = np.minimum(clearance, np.linalg.norm(points - nearest, axis=1) - _PANEL_M)
         return np.asarray(clearance)
 
-    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """As the costmap does."""
-        self.costmap.update(robot, localisation)
-
-    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        """As the costmap does."""
-        self.costmap.add_points(points_W, stamp_s)
-
 
 class Regions:
     """The connected regions of the ground in which a disc as wide as the robot can move.
@@ -152,7 +144,7 @@ class Regions:
 
     def __init__(
         self,
-        costmap: Costmap,
+        costmap: FreeSpace,
         footprint: Footprint,
         here: Pose2D,
         goals: Sequence[Pose2D],

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import Costmap
+from skills.api import FreeSpace
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, disc_centres, footprint_clearance_m
 from skills.navigate.path import TURN_M_PER_RAD, Path
@@ -92,7 +92,7 @@ class PathFollower:
         pose: Pose2D,
         velocity: tuple[float, float, float],
         last: FloatArray,
-        costmap: Costmap,
+        costmap: FreeSpace,
         most_m_s: float = math.inf,
     ) -> Drive:
         """The velocity for now, at a world pose, body velocity and the velocity commanded `last` (3,).
@@ -159,7 +159,7 @@ class PathFollower:
         most = most * options.period_s * np.where(np.abs(velocity) < np.abs(last), 2.0, 1.0)
         return np.asarray(last + np.clip(velocity - last, -most, most))
 
-    def _free_way(self, costmap: Costmap, now_m: float) -> tuple[float, tuple[float, float] | None]:
+    def _free_way(self, costmap: FreeSpace, now_m: float) -> tuple[float, tuple[float, float] | None]:
         """Way (m) that is free ahead, less a reserve, and the place of the first thing in it.
 
         A robot that has but now_m of clearance need only not get worse.
@@ -175,13 +175,13 @@ class PathFollower:
         way = self._progress[self._index + 2 * first] - self._progress[self._index]
         return max(0.0, float(way) - 0.1), self._culprit(costmap, poses[first])
 
-    def _culprit(self, costmap: Costmap, pose: FloatArray) -> tuple[float, float]:
+    def _culprit(self, costmap: FreeSpace, pose: FloatArray) -> tuple[float, float]:
         """Where on the outline at a pose something is touched."""
         centres = disc_centres(self._footprint, pose[None, :])[0]
         worst = int(np.argmin(costmap.clearance_m(centres) - self._footprint.discs[:, 2]))
         return float(centres[worst, 0]), float(centres[worst, 1])
 
-    def _brake(self, velocity: FloatArray, here: FloatArray, costmap: Costmap) -> FloatArray:
+    def _brake(self, velocity: FloatArray, here: FloatArray, costmap: FreeSpace) -> FloatArray:
         """The velocity, or as much of it as brings the outline into nothing within the next half second.
 
         Half of it is tried, then what leads back to the path without going ahead, then standing still.

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import Costmap
+from skills.api import FreeSpace
 from skills.estimate.compiled import compiled
 from skills.robot import BaseKind, Capabilities, FloatArray, Pose2D
 
@@ -96,14 +96,14 @@ def disc_centres(footprint: Footprint, poses: FloatArray) -> FloatArray:
     return np.stack([poses[:, 0:1] + c * x - s * y, poses[:, 1:2] + s * x + c * y], axis=-1)
 
 
-def footprint_clearance_m(costmap: Costmap, footprint: Footprint, poses: FloatArray) -> FloatArray:
+def footprint_clearance_m(costmap: FreeSpace, footprint: Footprint, poses: FloatArray) -> FloatArray:
     """Distance (m) from the outline to the nearest obstacle at (N, 3) poses x, y, yaw; negative when it is touched."""
     centres = disc_centres(footprint, poses)
     clearance = costmap.clearance_m(centres.reshape(-1, 2)).reshape(centres.shape[:2])
     return np.asarray(np.min(clearance - footprint.discs[:, 2], axis=1))
 
 
-def footprint_clear(costmap: Costmap, footprint: Footprint, pose: Pose2D, margin_m: float = SAFE_MARGIN_M) -> bool:
+def footprint_clear(costmap: FreeSpace, footprint: Footprint, pose: Pose2D, margin_m: float = SAFE_MARGIN_M) -> bool:
     """Whether the robot can stand at a pose with at least margin_m to everything."""
     return bool(footprint_clearance_m(costmap, footprint, pose_array([pose]))[0] >= margin_m)
 

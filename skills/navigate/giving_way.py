@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import Costmap, LocalisationEstimate, SkillContext
+from skills.api import FreeSpace, SkillContext
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.navigate.path import TURN_M_PER_RAD
 from skills.quantities import Count, Delay, Length, Margin
-from skills.robot import FloatArray, Pose2D, Robot
+from skills.robot import FloatArray, Pose2D
 from skills.stack import LocalController
 from skills.traffic import Neighbour
 
@@ -79,7 +79,7 @@ class Avoided(enum.Enum):
 class WithBodies:
     """A costmap in which discs (centres (N, 2) with one radius (m)) stand as well."""
 
-    costmap: Costmap
+    costmap: FreeSpace
     tree: cKDTree
     radius_m: float
 
@@ -93,16 +93,8 @@ class WithBodies:
         clearance[near] = np.minimum(clearance[near], nearest - self.radius_m)
         return clearance
 
-    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """As the costmap does."""
-        self.costmap.update(robot, localisation)
 
-    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        """As the costmap does."""
-        self.costmap.add_points(points_W, stamp_s)
-
-
-def with_bodies(costmap: Costmap, swept: Sequence[tuple[FloatArray, FloatArray]], larger_m: float = 0.0) -> Costmap:
+def with_bodies(costmap: FreeSpace, swept: Sequence[tuple[FloatArray, FloatArray]], larger_m: float = 0.0) -> FreeSpace:
     """The costmap with outlines (discs), larger_m wider to all sides, at poses (N, 3)."""
     if not swept:
         return costmap
@@ -131,12 +123,6 @@ class _Nothing:
 
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
         return np.full(len(points_W), np.inf)
-
-    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        return None
-
-    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        return None
 
 
 class GivingWay:
@@ -176,7 +162,7 @@ class GivingWay:
         """Those who go first, and go somewhere."""
         return [one for one in self._traffic.others() if one.first and one.path is not None]
 
-    def costmap(self, costmap: Costmap, avoided: Avoided) -> Costmap:
+    def costmap(self, costmap: FreeSpace, avoided: Avoided) -> FreeSpace:
         """The costmap with that of the others which is to be avoided."""
         others = [one for one in self._traffic.others() if avoided is not Avoided.WORKING or not _will_move(one)]
         with_others = with_bodies(costmap, [(one.discs, one.pose[None, :]) for one in others], _UNSURE_M)
@@ -255,7 +241,7 @@ class GivingWay:
         return bool(footprint_clearance_m(way, footprint, pose_array([here]))[0] < self._options.apart_m)
 
     def waiting_place(
-        self, costmap: Costmap, footprint: Footprint, here: Pose2D, tried: Sequence[Pose2D] = ()
+        self, costmap: FreeSpace, footprint: Footprint, here: Pose2D, tried: Sequence[Pose2D] = ()
     ) -> Pose2D | None:
         """The nearest pose that can be reached and lies off all reserved ways; None: there is none.
 

@@ -21,6 +21,11 @@ class MovingSkill(RoutineSkill[InputsT]):
         super().begin(inputs)
         self._base = Base(self.context)
 
+    def suspend(self) -> None:
+        """Stop the base at once; see `RoutineSkill.suspend`."""
+        self._base.stop()
+        super().suspend()
+
     def end(self) -> None:
         """Stop what this skill set in motion."""
         self._base.stop()
@@ -41,13 +46,17 @@ class MovingSkill(RoutineSkill[InputsT]):
         """
         end_s = self.context.clock.now() + for_s
         while self.context.clock.now() < end_s and not enough():
-            self._base.drive(velocity)
-            begun_s = self.context.clock.now()
-            yield Running(message)
-            while (refusal := self._base.refusal()) is not None:
-                if not self._base.asks_again():
-                    raise SkillFailure(Cause.EXECUTION, f"the robot refused to move: {refusal}")
-                yield Running(f"{message}; the robot refuses to move: {refusal}")
-                end_s, begun_s = end_s + self.context.clock.now() - begun_s, self.context.clock.now()
+            end_s += yield from self.drive(velocity, Running(message))
         self._base.stop()
         yield from self.pause(settle_s, "coming to rest")
+
+    def drive(self, velocity: tuple[float, float, float], running: Running) -> Routine[float]:
+        """Move at a body-frame velocity for one tick; for how long (s) the robot refused to. Raises SkillFailure."""
+        self._base.drive(velocity)
+        yield running
+        begun_s = self.context.clock.now()
+        while (refusal := self._base.refusal()) is not None:
+            if not self._base.asks_again():
+                raise SkillFailure(Cause.EXECUTION, f"The robot refused to drive: {refusal}.")
+            yield Running(f"{running.message}; the robot refuses to drive: {refusal}")
+        return self.context.clock.now() - begun_s

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import Costmap
+from skills.api import FreeSpace
 from skills.estimate.compiled import compiled
 from skills.geometry import wrap
 from skills.navigate.follower import Drive, FollowerOptions, PathFollower
@@ -64,7 +64,7 @@ class MppiController(PathFollower):
         pose: Pose2D,
         velocity: tuple[float, float, float],
         last: FloatArray,
-        costmap: Costmap,
+        costmap: FreeSpace,
         most_m_s: float = math.inf,
     ) -> Drive:
         """As the path follower's, with the velocity of the weighted rollouts where the way ahead is free."""
@@ -139,7 +139,7 @@ def _noise(options: MppiOptions) -> FloatArray:
     return np.ascontiguousarray(white)
 
 
-def _sampled(costmap: Costmap, pose: Pose2D) -> tuple[NDArray[np.float32], tuple[float, float, float]]:
+def _sampled(costmap: FreeSpace, pose: Pose2D) -> tuple[NDArray[np.float32], tuple[float, float, float]]:
     """Clearance on a grid about the robot, and the grid's frame (see `clearance_at`)."""
     offsets = np.arange(-2.8, 2.8 + _CELL_M, _CELL_M)
     points = np.stack(np.meshgrid(pose.x_m + offsets, pose.y_m + offsets), axis=-1).reshape(-1, 2)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from skills.api import Costmap, LocalisationEstimate
+from skills.api import FreeSpace
 from skills.navigate.footprint import Footprint, disc_centres, pose_array
 from skills.perception.people import SeenPerson
 from skills.quantities import Delay, Length, Margin, Speed
-from skills.robot import FloatArray, Pose2D, Robot
+from skills.robot import FloatArray, Pose2D
 
 __all__ = ["Pace", "PaceManager", "SpaceOptions", "WithPeople", "outline_distance_m", "spaced"]
 
@@ -45,7 +45,7 @@ class SpaceOptions:
 class WithPeople:
     """A costmap in which each person (x, y, radius in m) takes up a disc beyond what sensors see of them."""
 
-    costmap: Costmap
+    costmap: FreeSpace
     discs: FloatArray
 
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
@@ -54,14 +54,6 @@ class WithPeople:
         offsets = points[:, None, :2] - self.discs[None, :, :2]
         nearest = np.min(np.linalg.norm(offsets, axis=2) - self.discs[None, :, 2], axis=1)
         return np.asarray(np.minimum(self.costmap.clearance_m(points), nearest))
-
-    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """As the costmap does."""
-        self.costmap.update(robot, localisation)
-
-    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        """As the costmap does."""
-        self.costmap.add_points(points_W, stamp_s)
 
 
 def outline_distance_m(footprint: Footprint, poses: FloatArray, people: Sequence[SeenPerson]) -> FloatArray:
@@ -73,13 +65,13 @@ def outline_distance_m(footprint: Footprint, poses: FloatArray, people: Sequence
 
 
 def spaced(
-    costmap: Costmap,
+    costmap: FreeSpace,
     footprint: Footprint,
     fixed: Sequence[Pose2D],
     people: Sequence[SeenPerson],
     room_m: float,
     slack_m: float = 0.05,
-) -> Costmap:
+) -> FreeSpace:
     """The costmap with room_m about people, less where the robot must be nearer: at the `fixed` poses."""
     if not people:
         return costmap

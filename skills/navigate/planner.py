@@ -10,7 +10,7 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import NO_WORK_COUNTER, Costmap, PlanningError, WorkCounter
+from skills.api import NO_WORK_COUNTER, FreeSpace, PlanningError, WorkCounter
 from skills.geometry import wrap
 from skills.navigate.differential import CELL_SHARE, Links, courses, drives, links
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, clearance_at
@@ -70,7 +70,7 @@ class LatticePlanner:
 
     def problem(
         self,
-        costmap: Costmap,
+        costmap: FreeSpace,
         footprint: Footprint,
         start: Pose2D,
         goal: Pose2D,
@@ -101,7 +101,7 @@ class Problem:
 
 
 def plan_path(
-    costmap: Costmap, footprint: Footprint, start: Pose2D, goal: Pose2D, options: LatticePlanner | None = None
+    costmap: FreeSpace, footprint: Footprint, start: Pose2D, goal: Pose2D, options: LatticePlanner | None = None
 ) -> Path:
     """The cheapest way from start to goal that the footprint can go. Raises PlanningError.
 
@@ -115,7 +115,7 @@ def plan_path(
 
 
 def problem_of(
-    costmap: Costmap,
+    costmap: FreeSpace,
     footprint: Footprint,
     start: Pose2D,
     goal: Pose2D,

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from skills.api import Costmap, ForgettingCostmap, SkillContext
+from skills.api import ForgettingCostmap, FreeSpace, SkillContext
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.collision_guard import CollisionGuard
 from skills.navigate.cut_off import DoorWatch
 from skills.navigate.giving_way import Avoided, GivingWay
 from skills.navigate.low_obstacles import LowObstacleWatch
-from skills.navigate.options import NavigateOptions
+from skills.navigate.navigate_options import NavigateOptions
 from skills.navigate.people_space import Pace, PaceManager, spaced
 from skills.navigate.scan_health import ScanHealth
 from skills.perception.doorway import Doorway
@@ -74,7 +74,7 @@ class Surroundings:
         self.room_m = self._space.least_room_m
         return True
 
-    def costmap(self, here: Pose2D, goal: Pose2D, avoided: Avoided = Avoided.BODIES) -> Costmap:
+    def costmap(self, here: Pose2D, goal: Pose2D, avoided: Avoided = Avoided.BODIES) -> FreeSpace:
         """The costmap with doors and robots, and with room about people as far as `here` and the goal leave it."""
         costmap = self.robots.costmap(self.doors.costmap(self._context.costmap), avoided)
         return spaced(costmap, self.footprint, (here, goal), self.persons(), self.room_m)

@@ -21,7 +21,7 @@ from skills.estimate.grid_map import GridMap
 from skills.geometry import relative
 from skills.navigate.footprint import Footprint
 from skills.navigate.low_obstacles import WatchOptions
-from skills.navigate.options import NavigateOptions
+from skills.navigate.navigate_options import NavigateOptions
 from skills.navigate.planner import plan_path
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D

@@ -94,7 +94,8 @@ def test_a_robot_that_does_not_move_is_given_up():
 def test_ended_on_the_way_it_stops():
     bench = Bench(IN_THE_OPEN)
     skill = BackOff(bench.context())
-    bench.tick()
+    for _ in range(4):
+        bench.tick()
     skill.begin(BackOffInputs())
     for _ in range(10):
         skill.step()

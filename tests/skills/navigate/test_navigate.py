@@ -8,7 +8,7 @@ from planar_robot import Bench, Box, NamingWorker
 from skills.api import Cause, Failed, Running, Step, Succeeded
 from skills.estimate.dead_reckoning import DeadReckoning
 from skills.estimate.rolling_costmap import RollingCostmap
-from skills.navigate.options import NavigateOptions
+from skills.navigate.navigate_options import NavigateOptions
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import BaseKind, Pose2D
 

@@ -146,7 +146,7 @@ def test_a_robot_that_refuses_to_move_is_an_execution_failure():
     bench = strange_bench()
     bench.robot.refuse_because = "it sits"
     step, _ = outcome(bench)
-    assert step == Failed(Cause.EXECUTION, "the robot refused to move: it sits")
+    assert step == Failed(Cause.EXECUTION, "The robot refused to drive: it sits.")
 
 
 def test_without_new_scans_it_says_so():

@@ -10,7 +10,7 @@ from skills.api import Cause, ForgettingCostmap, Job, SkillContext
 from skills.geometry import compose
 from skills.navigate.cut_off import closed_sentence
 from skills.navigate.giving_way import Avoided
-from skills.navigate.options import NavigateOptions
+from skills.navigate.navigate_options import NavigateOptions
 from skills.navigate.path import Path
 from skills.navigate.ports import NavigateInputs
 from skills.navigate.surroundings import Surroundings

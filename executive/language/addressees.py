@@ -10,7 +10,7 @@ from functools import cache, cached_property
 from typing import Final
 
 from executive.language.cleaning import addressed_to
-from executive.language.lexicon import Patterns, lexicon, read_table
+from executive.language.lexicon import Patterns, any_of, lexicon, read_table
 from executive.language.questions import RefusalError
 from executive.words.robots import display_name, robot_called
 from skills.files.errors import listing
@@ -79,9 +79,8 @@ class Addressees:
     @cached_property
     def forms(self) -> Patterns:
         """How they are called and told what to do."""
-        longest = sorted(map(re.escape, self.names), key=len, reverse=True)
-        verbs = rf"(?:{'|'.join(sorted(map(re.escape, _verbs()), key=len, reverse=True))})(?![\w'])"
-        return Patterns("robots.yaml", words={"one": rf"(?:{'|'.join(longest)})(?![\w'-])", "verbs": verbs})
+        words = {"one": rf"(?:{any_of(self.names)})(?![\w'-])", "verbs": rf"(?:{any_of(_verbs())})(?![\w'])"}
+        return Patterns("robots.yaml", words=words)
 
     def meant(self, said: str, but: Sequence[str] = ()) -> Who:
         """Which robots `said` names; "the other robot" is the one that is none of `but`.

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
-from executive.language.lexicon import Patterns, lexicon
+from executive.language.lexicon import Patterns, any_of, lexicon
 
 
 @cache
 def _number_pattern() -> str:
-    words = "|".join(sorted((w for w in lexicon().numbers if w not in ("couple", "dozen")), key=len, reverse=True))
+    words = any_of(word for word in lexicon().numbers if word not in ("couple", "dozen"))
     return rf"(?:\d+(?:\.\d+)?|(?:{words})(?:[ -](?:{words}))?)"
 
 

@@ -12,7 +12,7 @@ from typing import Final
 from executive.language.addressees import Saying, Who, addressees
 from executive.language.amounts import AMOUNTS
 from executive.language.items import Item
-from executive.language.lexicon import Patterns, lexicon, read_table
+from executive.language.lexicon import Patterns, any_of, lexicon, read_table
 from executive.language.tokens import smoothed
 
 CLAUSES: Final = Patterns("structures.yaml", words=AMOUNTS)
@@ -183,8 +183,7 @@ def text_of(clauses: Iterable[Clause]) -> str:
 
 @cache
 def _joint() -> re.Pattern[str]:
-    polite = "|".join(map(re.escape, lexicon().openers))
-    words = "|".join((CLAUSES.text("outer"), CLAUSES.text("whatever"), CLAUSES.text("joints"), polite))
+    words = "|".join((*map(CLAUSES.text, ("outer", "whatever", "joints")), any_of(lexicon().openers)))
     return re.compile(rf"(?:[\s,;.!?:]+|(?<![\w'])(?:{words})(?![\w']))+", re.IGNORECASE)
 
 

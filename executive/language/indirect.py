@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Final
 
-from executive.language.items import Being, Chunk, Item, Row, Separator, Unknown, Verb, command_position
+from executive.language.items import Being, Chunk, Item, Row, Separator, Unknown, Verb, command_position, verb
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
@@ -41,7 +41,7 @@ def where_is(row: Row, items: list[Item]) -> Item | None:
     row.silent |= set() if inverted else {end}
     if asks:
         items.pop()
-    return Verb(_FIND, lexicon().verbs[(_FIND,)])
+    return verb(_FIND)
 
 
 def _is_be(row: Row, at: int) -> bool:
@@ -61,8 +61,8 @@ def how_many(row: Row, items: list[Item]) -> Item | None:
     if row.tokens[row.at].word != "how" or phrase is None or len(phrase.tokens) < 3 or not command_position(items):
         return None
     end = row.at + len(phrase.tokens)
-    verb = row.tokens[end : end + 1]
-    if row.tokens[row.at + 1].word != "many" or not verb or verb[0].lemma != "be":
+    be = row.tokens[end : end + 1]
+    if row.tokens[row.at + 1].word != "many" or not be or be[0].lemma != "be":
         return None
     if phrase.person and (len(phrase.tokens) > 3 or phrase.head.word not in lexicon().any_person):
         return None
@@ -72,7 +72,7 @@ def how_many(row: Row, items: list[Item]) -> Item | None:
     row.at = end + 1
     while row.at < len(row.tokens) and row.tokens[row.at].word in _THERE:
         row.at += 1
-    items += [Separator(""), Being(verb[0].text, existential=True, asked=True)]
+    items += [Separator(""), Being(be[0].text, existential=True, asked=True)]
     return Chunk(counted)
 
 
@@ -98,7 +98,7 @@ def what_is(row: Row, items: list[Item]) -> Item | None:
         return None
     if asks:
         items.pop()
-    items += [Verb(_FIND, lexicon().verbs[(_FIND,)]), Chunk(OBJECTS)]
+    items += [verb(_FIND), Chunk(OBJECTS)]
     return found
 
 
@@ -175,7 +175,7 @@ def needed(row: Row, items: list[Item]) -> Item | None:
     if not behind or behind[0].tag in ("TO", "IN") or behind[0].pos in ("PUNCT", "CCONJ"):
         return None
     row.at += len(found)
-    items.insert(first, Verb(_BRING, lexicon().verbs[(_BRING,)]))
+    items.insert(first, verb(_BRING))
     return Separator("")
 
 
@@ -196,7 +196,7 @@ def belongs(row: Row, items: list[Item]) -> Item | None:
     items[first + 1 :] = [
         replace(item, role=PrepositionRole.SOURCE) if isinstance(item, Chunk) else item for item in items[first + 1 :]
     ]
-    items.insert(first, Verb(_PUT, lexicon().verbs[(_PUT,)]))
+    items.insert(first, verb(_PUT))
     return Separator("")
 
 

@@ -24,6 +24,11 @@ class Verb:
     kinds: frozenset[VerbKind]
 
 
+def verb(text: str) -> Verb:
+    """A verb of the dictionary as an item."""
+    return Verb(text, lexicon().verbs[tuple(text.split())])
+
+
 @dataclass(frozen=True)
 class Chunk:
     """A noun phrase with the preposition before it; `role` is None for a bare one."""
@@ -274,7 +279,7 @@ def _with_verb(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
     carried = [chunk.role for chunk in chunks] == [None, PrepositionRole.GOAL] and len(chunks) == len(items)
     if len(clauses) != 1 or clauses[0].verb is not None or not carried or chunks[0].phrase.kind is not NounKind.THING:
         return clauses
-    return (replace(clauses[0], verb=Verb(_TAKE, lexicon().verbs[(_TAKE,)])),)
+    return (replace(clauses[0], verb=verb(_TAKE)),)
 
 
 def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import enum
 import re
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Mapping, Set
 from functools import cache
 from importlib import resources
-from typing import Any, Final
+from typing import Any
 
 import yaml
 
@@ -40,103 +39,6 @@ class PrepositionRole(enum.Enum):
     FOR = "for"  # for somebody, or what is searched for
 
 
-@dataclass(frozen=True)
-class Lexicon:
-    """All dictionaries; phrases are tuples of lower-case words.
-
-    `corrections` says of each phrase whether it may also be a mere filler; `light_nouns` gives for a verb the nouns
-    that make one act with it ("take a picture").
-    """
-
-    verbs: Mapping[Phrase, frozenset[VerbKind]]
-    at_is_goal: frozenset[str]
-    goal_wanted: frozenset[str]
-    source_wanted: frozenset[str]
-    goes_back: frozenset[str]
-    prepositions: Mapping[Phrase, PrepositionRole]
-    fillers: frozenset[Phrase]
-    openers: tuple[str, ...]
-    requests: tuple[str, ...]
-    refusals: tuple[str, ...]
-    searches: tuple[str, ...]
-    counting: tuple[str, ...]
-    short_forms: Mapping[str, str]
-    asides: tuple[str, ...]
-    praises: tuple[str, ...]
-    hesitations: tuple[str, ...]
-    speaker: frozenset[str]
-    pronouns: frozenset[str]
-    levels: frozenset[str]
-    bare_goal: frozenset[str]
-    leaves: frozenset[str]
-    enters: frozenset[str]
-    needs: frozenset[Phrase]
-    here: frozenset[str]
-    there: frozenset[str]
-    people: frozenset[str]
-    everyone: frozenset[str]
-    anyone: frozenset[str]
-    any_person: frozenset[str]
-    directions: frozenset[str]
-    worn: frozenset[str]
-    quantities: frozenset[str]
-    fixtures: frozenset[str]
-    somebody: frozenset[str]
-    subjects: frozenset[str]
-    asks: frozenset[str]
-    asked_with: frozenset[str]
-    fullness: frozenset[str]
-    manners: frozenset[str]
-    told: frozenset[str]
-    negations: frozenset[Phrase]
-    corrections: Mapping[Phrase, bool]
-    light_nouns: Mapping[str, frozenset[str]]
-    light_whole: frozenset[str]
-    written: frozenset[str]
-    prepared: frozenset[str]
-    gives: frozenset[str]
-    hands: frozenset[str]
-    calls: frozenset[str]
-    titles: frozenset[str]
-    units: frozenset[str]
-    docks: frozenset[str]
-    vague_numbers: frozenset[str]
-    no_numbers: frozenset[str]
-    loose_numbers: frozenset[str]
-    definite: frozenset[str]
-    numbers: Mapping[str, int]
-
-
-@cache
-def lexicon() -> Lexicon:
-    """The dictionaries that come with the package."""
-    verbs, words = read_table("verbs.yaml"), read_table("words.yaml")
-    read = {**verbs, **words}
-    plain: dict[str, Any] = {
-        each.name: _KINDS[each.type](read[each.name]) for each in fields(Lexicon) if each.type in _KINDS
-    }
-    return Lexicon(
-        **plain,
-        verbs=_kinds(verbs),
-        prepositions={
-            tuple(phrase.split()): PrepositionRole(role)
-            for role, phrases in words["prepositions"].items()
-            for phrase in phrases
-        },
-        short_forms=words["short_forms"],
-        numbers={word: int(number) for word, number in words["numbers"].items()},
-        corrections={tuple(p.split()): soft for soft in (False, True) for p in words["corrections"][_SOFTNESS[soft]]},
-        light_nouns={verb: frozenset(nouns) for verb, nouns in words["light_nouns"].items()},
-    )
-
-
-_SOFTNESS: Final = {False: "certain", True: "soft"}
-
-
-def _phrases(texts: Iterable[str]) -> frozenset[Phrase]:
-    return frozenset(tuple(text.split()) for text in texts)
-
-
 @cache
 def read_table(name: str) -> Any:
     """A table of this package: all that is no list or mapping is text, "on" and "no" among it."""
@@ -144,23 +46,51 @@ def read_table(name: str) -> Any:
     return yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
 
 
-def _kinds(verbs: Mapping[str, Iterable[str]]) -> dict[Phrase, frozenset[VerbKind]]:
-    phrases = {phrase for kind in VerbKind for phrase in verbs[kind.value]}
-    return {
-        tuple(phrase.split()): frozenset(kind for kind in VerbKind if phrase in verbs[kind.value]) for phrase in phrases
-    }
+class Lexicon:
+    """The lists of words in verbs.yaml and words.yaml by their names; phrases are tuples of lower-case words.
+
+    `corrections` says of each phrase whether it may also be a mere filler; `light_nouns` gives for a verb the nouns
+    that make one act with it ("take a picture").
+    """
+
+    def __init__(self) -> None:
+        self._lists: dict[str, Any] = {**read_table("verbs.yaml"), **read_table("words.yaml")}
+        kinds: dict[Phrase, set[VerbKind]] = {}
+        for kind in VerbKind:
+            for phrase in self._phrases(kind.value):
+                kinds.setdefault(phrase, set()).add(kind)
+        self.verbs = {phrase: frozenset(each) for phrase, each in kinds.items()}
+        self.fillers, self.needs, self.negations = map(self._phrases, ("fillers", "needs", "negations"))
+        roles = self._lists["prepositions"].items()
+        self.prepositions = {tuple(one.split()): PrepositionRole(role) for role, each in roles for one in each}
+        softness = self._lists["corrections"].items()
+        self.corrections = {tuple(one.split()): name == "soft" for name, each in softness for one in each}
+        self.light_nouns: Mapping[str, frozenset[str]] = {
+            verb: frozenset(nouns) for verb, nouns in self._lists["light_nouns"].items()
+        }
+        self.short_forms: Mapping[str, str] = self._lists["short_forms"]
+        self.numbers = {word: int(number) for word, number in self._lists["numbers"].items()}
+
+    def __getattr__(self, name: str) -> Set[str]:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        words = dict.fromkeys(self._lists[name]).keys()
+        setattr(self, name, words)
+        return words
+
+    def _phrases(self, name: str) -> Set[Phrase]:
+        return {tuple(text.split()): None for text in self._lists[name]}.keys()
 
 
-def _longest_first(phrases: Iterable[str]) -> tuple[str, ...]:
-    return tuple(sorted(phrases, key=len, reverse=True))
+@cache
+def lexicon() -> Lexicon:
+    """The dictionaries that come with the package."""
+    return Lexicon()
 
 
-_KINDS: Final[Mapping[Any, Callable[[Iterable[str]], object]]] = {
-    "frozenset[str]": frozenset,
-    "frozenset[Phrase]": _phrases,
-    "tuple[str, ...]": _longest_first,
-}
-"""How the fields are read that are plain lists in the files, by their types."""
+def any_of(phrases: Iterable[str]) -> str:
+    """The regular expression of any one of them, the longest first."""
+    return "|".join(map(re.escape, sorted(phrases, key=len, reverse=True)))
 
 
 class Patterns:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Final
 
-from executive.language.lexicon import lexicon, read_table
+from executive.language.lexicon import any_of, lexicon, read_table
 from executive.language.nouns import NounKind
 from executive.words.command import is_attribute, may_be_attribute
 from executive.words.knowledge import Knowledge
@@ -150,8 +150,7 @@ def name_table(knowledge: Knowledge) -> NameTable:
     stand_ins = {name.lower(): THING for name in things}
     stand_ins |= {name.lower(): PLACE for name in places}
     stand_ins |= {name.lower(): PERSON for name in people}
-    longest_first = sorted(stand_ins, key=len, reverse=True)
-    pattern = re.compile(rf"\b({'|'.join(map(re.escape, longest_first)) or '(?!)'})(e?s)?\b", re.IGNORECASE)
+    pattern = re.compile(rf"\b({any_of(stand_ins) or '(?!)'})(e?s)?\b", re.IGNORECASE)
     return NameTable(pattern, stand_ins)
 
 
@@ -274,7 +273,7 @@ def smoothed(text: str) -> str:
 def _rules(family: str | None = None) -> tuple[_Rule, ...]:
     tables = {f"<{name}>": getattr(lexicon(), name) for name in _TABLES}
     tables["<verbs>"] = [first for first, *rest in lexicon().verbs if not rest]
-    phrases = {mark: "|".join(map(re.escape, table)) for mark, table in tables.items()}
+    phrases = {mark: any_of(table) for mark, table in tables.items()}
     filled = re.compile("|".join(phrases))
     return tuple(
         (

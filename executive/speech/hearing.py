@@ -129,7 +129,7 @@ def _knows(known: Collection[str], name: str) -> bool:
     while words and " ".join(words) not in known and is_attribute(words[0]):
         words = words[1:]
     people = lexicon().people - _UNRESOLVED
-    return bool(words) and (" ".join(words) in known or people.issuperset(words))
+    return bool(words) and (" ".join(words) in known or set(words) <= people)
 
 
 def _plain(name: str) -> str:

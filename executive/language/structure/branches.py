@@ -8,9 +8,10 @@ from dataclasses import replace
 
 from executive.language.amounts import seconds_of, time_of, times_of
 from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cut, text_of, verb_positions
+from executive.language.items import verb
 from executive.language.questions import RefusalError
 from executive.language.structure.conditions import suppose
-from executive.language.structure.plain import State, Supposed, contrary, verb
+from executive.language.structure.plain import State, Supposed, contrary
 from executive.language.structure.requests import speech_in, wait
 from executive.language.structure.row import (
     Base,

@@ -9,12 +9,12 @@ from typing import Final
 
 from executive.language.amounts import AMOUNTS, seconds_of, share_of, time_of
 from executive.language.clauses import CLAUSES
-from executive.language.items import Chunk, Item
-from executive.language.lexicon import Patterns
+from executive.language.items import Chunk, Item, verb
+from executive.language.lexicon import Patterns, any_of
 from executive.language.questions import RefusalError, RefusalKind, Slot, which
 from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
-from executive.language.structure.plain import PlainReader, State, Supposed, behind_preposition, contrary, verb
+from executive.language.structure.plain import PlainReader, State, Supposed, behind_preposition, contrary
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
@@ -60,8 +60,7 @@ _SIGNS: Final = {
     **dict.fromkeys(_MOST, "<="),
     "": ">=",
 }
-_COMPARED: Final = "|".join(sorted(filter(None, _SIGNS), key=len, reverse=True))
-_P: Final = Patterns("structures.yaml", "conditions", {**AMOUNTS, "compared": _COMPARED})
+_P: Final = Patterns("structures.yaml", "conditions", {**AMOUNTS, "compared": any_of(filter(None, _SIGNS))})
 _FULL: Final = 0.99
 
 

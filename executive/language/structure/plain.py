@@ -8,7 +8,7 @@ from typing import Final
 
 from executive.language.actions import Action
 from executive.language.indirect import OBJECTS
-from executive.language.items import Adverb, Being, Chunk, Item, Verb, Whether
+from executive.language.items import Adverb, Being, Chunk, Item, Whether, verb
 from executive.language.lexicon import PrepositionRole, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
@@ -84,11 +84,6 @@ def at_start(knowledge: Knowledge, memory: Memory) -> State:
     start = (knowledge.start.x, knowledge.start.y)
     room = next((name for name, place in knowledge.places.items() if inside(place.polygon, start)), None)
     return State(memory=memory, at=room)
-
-
-def verb(text: str) -> Verb:
-    """A verb of the dictionary as an item."""
-    return Verb(text, lexicon().verbs[tuple(text.split())])
 
 
 def phrase_of_name(name: str, kind: NounKind) -> Phrase:

@@ -9,7 +9,8 @@ from typing import Final
 
 from executive.language.amounts import AMOUNTS, seconds_of, share_of, time_of
 from executive.language.clauses import ACTS, CLAUSES
-from executive.language.lexicon import Patterns
+from executive.language.items import verb
+from executive.language.lexicon import Patterns, any_of
 from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
@@ -22,7 +23,6 @@ from executive.language.structure.plain import (
     Supposed,
     contrary,
     phrase_of_name,
-    verb,
 )
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
@@ -239,9 +239,7 @@ def _of_world(knowledge: Knowledge) -> Patterns:
 
 @lru_cache(maxsize=16)
 def _with_names(people: tuple[str, ...], places: tuple[str, ...]) -> Patterns:
-    longest = [sorted(map(re.escape, names), key=len, reverse=True) for names in (people, places)]
-    names, around = ("|".join(spelled) or "(?!)" for spelled in longest)
-    return ACTS.filled(names=names, around=around)
+    return ACTS.filled(names=any_of(people) or "(?!)", around=any_of(places) or "(?!)")
 
 
 _SPEAKER: Final = frozenset({"me", "us"})

@@ -10,7 +10,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cue_behind, cut, split
-from executive.language.items import Adverb, Chunk
+from executive.language.items import Adverb, Chunk, verb
 from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
 from executive.language.questions import RefusalError, RefusalKind
@@ -20,7 +20,7 @@ from executive.language.steps import Steps as PlainSteps
 from executive.language.steps import Trace
 from executive.language.structure.branches import Branches
 from executive.language.structure.conditions import suppose
-from executive.language.structure.plain import PlainReader, State, at_start, behind_preposition, phrase_of_name, verb
+from executive.language.structure.plain import PlainReader, State, at_start, behind_preposition, phrase_of_name
 from executive.language.structure.requests import (
     Asked,
     Listener,

@@ -35,7 +35,8 @@ class Action:
     `kind` is None for a statement, which only tells where something is. `said` is all that was said of it, `unknown`
     the words that do not fit, `choices` phrases of which only one can be meant, `teller` who told by what they did.
     `departs` says that a place is only left, `ways` are where the way was said to lead past, `time` is how long it is
-    to be waited. `anew` says that "then" or "after that" stood before it.
+    to be waited. `anew` says that "then" or "after that" stood before it, and `again`, once pronouns are resolved, that
+    the thing was spoken of before.
     """
 
     kind: VerbKind | None
@@ -51,6 +52,12 @@ class Action:
     ways: tuple[Location, ...] = ()
     time: Phrase | None = None
     anew: bool = False
+    again: bool = False
+
+    @property
+    def target(self) -> Phrase | None:
+        """The one thing that it is done to, once pronouns are resolved."""
+        return self.objects[0] if self.objects else None
 
 
 _ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})

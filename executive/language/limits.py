@@ -13,13 +13,12 @@ from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, read_
 from executive.language.nouns import NounKind, noun_examples
 from executive.language.phrases import Phrase
 from executive.language.questions import ABLE, RefusalError, RefusalKind
-from executive.language.reference import ResolvedAction
 from executive.language.roles import HERE, Location
 from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
 
 
-def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | None) -> None:
+def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> None:
     """Refuse odd numbers, to carry people, to serve all of a kind, what no hand can hold, and places out of reach.
 
     Raises:
@@ -38,7 +37,7 @@ def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | Non
     if people:
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {ABLE}", people)
     if knowledge is not None:
-        actions = [replace(action, target=None) if _asks_for_people(action) else action for action in actions]
+        actions = [replace(action, objects=()) if _asks_for_people(action) else action for action in actions]
         actions = [action for action in actions if not _visits_all(action)]
     moved = [action.target for action in actions if _moved(action)]
     outside = [(part, part) for action in actions for part in _outside(action, action.target in moved)]
@@ -60,13 +59,13 @@ def _named(words: Sequence[str], clause: str) -> str:
     return quoted if not clause or clause in words else f"{quoted} in {clause!r}"
 
 
-def _serves_all(action: ResolvedAction) -> bool:
+def _serves_all(action: Action) -> bool:
     """Whether a thing is brought to all of some people."""
     goal = None if action.goal is None else action.goal.phrase
     return _carries(action) and goal is not None and goal.universal and action.target is not None
 
 
-def _carries(action: ResolvedAction) -> bool:
+def _carries(action: Action) -> bool:
     return action.kind not in (VerbKind.GO, VerbKind.FIND, VerbKind.WAIT, VerbKind.CHARGE)
 
 
@@ -74,7 +73,7 @@ _BY_HAND: Final = frozenset({"bring", "carry", "take", "deliver", "take over", "
 _INTO: Final = frozenset({"into", "onto"})
 
 
-def _moved(action: ResolvedAction) -> bool:
+def _moved(action: Action) -> bool:
     """Whether a definite thing is taken from or put into a place in the house, so that it is no idea.
 
     So is "the mail from the desk", and what is written ("take the report to the boss").
@@ -100,7 +99,7 @@ def _moved(action: ResolvedAction) -> bool:
     return place.kind is NounKind.PLACE or (place.kind is NounKind.THING and _fixture(action.target))
 
 
-def _outside(action: ResolvedAction, moved: bool) -> Iterator[str]:
+def _outside(action: Action, moved: bool) -> Iterator[str]:
     """The parts of an action that are out of reach; `moved` says that its thing lies in a place of the house."""
     if action.target is not None and (
         action.target.universal
@@ -113,7 +112,7 @@ def _outside(action: ResolvedAction, moved: bool) -> Iterator[str]:
         yield from _outside_place(place, action)
 
 
-def _holdable(phrase: Phrase, action: ResolvedAction) -> bool:
+def _holdable(phrase: Phrase, action: Action) -> bool:
     """Whether it is something to be found, and taken where the action takes it."""
     if phrase.known:
         return True
@@ -125,11 +124,11 @@ def _holdable(phrase: Phrase, action: ResolvedAction) -> bool:
     return not _light(phrase, action) and (phrase.kind is None or phrase.kind.within_reach)
 
 
-def _visits_all(action: ResolvedAction) -> bool:
+def _visits_all(action: Action) -> bool:
     return action.kind is VerbKind.GO and action.goal is not None and action.goal.every_room
 
 
-def _asks_for_people(action: ResolvedAction) -> bool:
+def _asks_for_people(action: Action) -> bool:
     """Whether it asks where somebody is, or whether there is any person at all ("is anybody in the hall")."""
     phrase = action.target if action.kind is VerbKind.FIND else None
     anyone = phrase is not None and phrase.head.word in lexicon().anyone
@@ -151,7 +150,7 @@ def _fixture(phrase: Phrase) -> bool:
     return phrase.head.lemma in lexicon().fixtures
 
 
-def _light(phrase: Phrase, action: ResolvedAction) -> bool:
+def _light(phrase: Phrase, action: Action) -> bool:
     """Whether verb and noun are one act, as in "take a picture": the noun is no thing then."""
     acts = lexicon().light_nouns.get(action.verb.split()[0], frozenset())
     elsewhere = action.goal is not None and action.goal.phrase is not None and action.goal.phrase.kind is NounKind.PLACE
@@ -159,7 +158,7 @@ def _light(phrase: Phrase, action: ResolvedAction) -> bool:
     return phrase.head.lemma in acts and loose and action.source is None and not elsewhere
 
 
-def _outside_place(place: Location | None, action: ResolvedAction) -> Iterator[str]:
+def _outside_place(place: Location | None, action: Action) -> Iterator[str]:
     while place is not None:
         phrase = place.phrase
         idle = phrase is not None and action.kind is VerbKind.GO and _idle(phrase, place, action.verb)

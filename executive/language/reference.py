@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
 
 from executive.language.actions import Action
 from executive.language.lexicon import VerbKind
@@ -12,25 +11,6 @@ from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
 from executive.language.roles import THERE, Location
-
-_SEVERAL: Final = frozenset({"them", "they", "these", "those"})
-
-
-@dataclass(frozen=True)
-class ResolvedAction:
-    """An action on one thing at most, without pronouns; `again` says that the thing was spoken of before.
-
-    `time` is how long it is to be waited, `anew` says that "then" stood before it.
-    """
-
-    kind: VerbKind
-    verb: str
-    target: Phrase | None = None
-    source: Location | None = None
-    goal: Location | None = None
-    again: bool = False
-    time: Phrase | None = None
-    anew: bool = False
 
 
 @dataclass(frozen=True)
@@ -55,33 +35,35 @@ class Memory:
 
 @dataclass(frozen=True)
 class Resolved:
-    """The resolved actions of a sentence, what was spoken of last, and each pronoun with what it stood for."""
+    """The actions of a sentence without pronouns, what was spoken of last, and each pronoun with what it stood for."""
 
-    actions: tuple[ResolvedAction, ...] = ()
+    actions: tuple[Action, ...] = ()
     memory: Memory = field(default_factory=Memory)
     meanings: tuple[tuple[str, str], ...] = ()
 
 
 def resolve(actions: Sequence[Action], memory: Memory) -> Resolved:
-    """The actions, each on one thing and without pronouns; `memory` is what was spoken of before.
+    """The actions, each on one thing at most and without pronouns; `memory` is what was spoken of before.
 
     Raises:
         RefusalError: a pronoun stands for nothing that was said.
     """
     resolved = Resolved(memory=memory)
     for action in actions:
-        kind = action.kind
-        resolved = _stated(action, resolved) if kind is None else _done(action, kind, resolved)
+        resolved = _stated(action, resolved) if action.kind is None else _done(action, resolved)
     return resolved
 
 
-def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
+def _done(action: Action, before: Resolved) -> Resolved:
     memory = before.memory
     again = any(phrase.pronoun for phrase in action.objects)
     meant = _all_meant(action.objects, memory)
-    things = tuple(_named_before(thing, action, kind, before.actions) or thing for thing in meant)
+    things = tuple(_named_before(thing, action, before.actions) or thing for thing in meant)
     goal, source = (_place(place, memory) for place in (action.goal, action.source))
-    _check_back(action, goal, before)
+    to = None if action.goal is None else action.goal.phrase
+    taken = before.actions[-1].source if before.actions else None
+    if again and to is not None and to.pronoun and goal is not None and goal == taken:  # put it next to it
+        raise RefusalError(f"which place is {to.text!r}?", [to.text], question=True)
     told = again or any(phrase.stands_for_one for phrase in action.objects)
     source = source or (memory.where if told else None)
     person = next((place for place in (goal, source) if place is not None and place.living), memory.person)
@@ -93,36 +75,24 @@ def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
         person=person,
         told=memory.told,
     )
-    looks = kind is not VerbKind.GO
-    actions = (
-        ResolvedAction(
-            kind=kind,
-            verb=action.verb,
-            target=thing,
-            source=source or (memory.where_is(thing) if thing and looks else None),
-            goal=goal,
-            again=same,
-            time=action.time,
-            anew=action.anew,
+    bare = replace(action, objects=(), source=source, goal=goal, again=again)
+    each = tuple(
+        replace(
+            bare,
+            objects=(thing,),
+            source=source or (memory.where_is(thing) if action.kind is not VerbKind.GO else None),
+            again=again or thing not in meant,
         )
-        for thing in things or (None,)
-        for same in [again or (thing is not None and thing not in meant)]
+        for thing in things
     )
-    return Resolved((*before.actions, *actions), after, (*before.meanings, *_meanings(action, memory)))
+    return Resolved(
+        (*before.actions, *(each if things else (bare,))), after, (*before.meanings, *_meanings(action, memory))
+    )
 
 
-def _check_back(action: Action, goal: Location | None, before: Resolved) -> None:
-    """Ask what "it" means in "put it next to it" when that would be where the thing was taken from."""
-    phrase = None if action.goal is None else action.goal.phrase
-    taken = before.actions[-1].source if before.actions else None
-    again = any(thing.pronoun for thing in action.objects)
-    if again and phrase is not None and phrase.pronoun and goal is not None and goal == taken:
-        raise RefusalError(f"which place is {phrase.text!r}?", [phrase.text], question=True)
-
-
-def _named_before(thing: Phrase, action: Action, kind: VerbKind, actions: Sequence[ResolvedAction]) -> Phrase | None:
+def _named_before(thing: Phrase, action: Action, actions: Sequence[Action]) -> Phrase | None:
     """The thing that was taken before under the same name: "get the bread, go to the hall and put the bread there"."""
-    if thing.indefinite or action.source is not None or kind not in (VerbKind.PLACE, VerbKind.SINGLE_TRIP):
+    if thing.indefinite or action.source is not None or action.kind not in (VerbKind.PLACE, VerbKind.SINGLE_TRIP):
         return None
     taken = (one.target for one in reversed(actions) if one.target is not None and one.kind is not VerbKind.PLACE)
     return next((target for target in taken if target.text.lower() == thing.text.lower()), None)
@@ -142,14 +112,16 @@ def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
 
 def _stated(action: Action, before: Resolved) -> Resolved:
     """Remember a statement; "it is in the drawer" tells where the thing of an earlier action is."""
-    where = _place(action.source, before.memory)
-    at = where if not action.objects else None
-    person = before.memory.person if action.teller is None else Location(action.teller, within=at)
-    memory = replace(before.memory, where=where, place=where or before.memory.place, person=person)
+    memory = before.memory
+    where = _place(action.source, memory)
     somebody = any(phrase.stands_for_somebody for phrase in action.objects)
-    if where is not None and somebody and before.memory.person:
-        return _met(replace(before.memory.person, within=where), before)
-    animal = somebody and any(thing.kind is NounKind.PERSON for thing in before.memory.things)
+    if where is not None and somebody and memory.person:  # bring it to Robin, he is in the hall
+        met = replace(memory.person, within=where)
+        actions = tuple(replace(one, goal=met) if one.goal == memory.person else one for one in before.actions)
+        return replace(before, actions=actions, memory=replace(memory, person=met, place=where))
+    teller = None if action.teller is None else Location(action.teller, within=None if action.objects else where)
+    memory = replace(memory, where=where, place=where or memory.place, person=teller or memory.person)
+    animal = somebody and any(thing.kind is NounKind.PERSON for thing in memory.things)
     if not animal and not any(phrase.pronoun for phrase in action.objects):
         return replace(before, memory=_told(action, where, memory))
     told = tuple(
@@ -157,13 +129,6 @@ def _stated(action: Action, before: Resolved) -> Resolved:
         for one in before.actions
     )
     return replace(before, actions=told, memory=memory)
-
-
-def _met(person: Location, before: Resolved) -> Resolved:
-    """Remember where somebody who was spoken of is to be met: "bring it to Robin, he is in the hall"."""
-    old = before.memory.person
-    actions = tuple(replace(one, goal=person) if one.goal == old else one for one in before.actions)
-    return replace(before, actions=actions, memory=replace(before.memory, person=person, place=person.within))
 
 
 def _told(action: Action, where: Location | None, memory: Memory) -> Memory:
@@ -195,7 +160,7 @@ def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:
         raise RefusalError(f"what does {phrase.text!r} stand for?", [phrase.text], question=True)
     if phrase.stands_for_one:
         return [phrase.instead_of_one(memory.things[-1])]
-    if phrase.head.word in _SEVERAL and len(memory.gathered) > len(memory.things):
+    if phrase.head.word in ("them", "they", "these", "those") and len(memory.gathered) > len(memory.things):
         return memory.gathered
     said = phrase.said_count
     return memory.things if said is None else [thing.with_count(said) for thing in memory.things]
@@ -204,7 +169,8 @@ def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:
 def _place(place: Location | None, memory: Memory) -> Location | None:
     """The place that was meant: "there" is the last one, "her" the last person."""
     phrase = None if place is None else place.phrase
-    if place is None or not (place == THERE or (phrase is not None and phrase.stands_for_somewhere)):
+    pronoun = phrase is not None and (phrase.pronoun or phrase.stands_for_one or phrase.stands_for_somebody)
+    if place is None or not (place == THERE or pronoun):
         return place
     meant = memory.person if phrase is not None and phrase.stands_for_somebody and memory.person else memory.place
     if phrase is not None and phrase.person:

@@ -18,7 +18,7 @@ from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase, noun_phrases
 from executive.language.questions import ABLE, RefusalError, RefusalKind, Slot, which
 from executive.language.reading import split_items
-from executive.language.reference import Memory, ResolvedAction, resolve
+from executive.language.reference import Memory, resolve
 from executive.language.roles import Location
 from executive.language.tokens import Affirmed, Token, affirmed, name_table, parse_with_names, rephrased
 from executive.words.command import Command, is_attribute
@@ -57,7 +57,7 @@ class Trace:
     unwanted: tuple[Phrase, ...] = ()
     clauses: tuple[Predicate, ...] = ()
     actions: tuple[Action, ...] = ()
-    resolved: tuple[ResolvedAction, ...] = ()
+    resolved: tuple[Action, ...] = ()
     frames: tuple[CommandFrame, ...] = ()
     meanings: tuple[tuple[str, str], ...] = ()
     commands: tuple[Command, ...] = ()

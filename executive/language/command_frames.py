@@ -15,7 +15,8 @@ from executive.language.roles import HERE, Location
 from executive.words.command import Command, Task
 
 _GOES_FOR: Final = frozenset({VerbKind.FIND, VerbKind.PICK, VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP})
-_ALONE: Final[dict[VerbKind | None, Task | None]] = {
+_TAKES: Final = {*_GOES_FOR, VerbKind.PLACE}
+_ALONE: Final[Mapping[VerbKind | None, Task | None]] = {
     VerbKind.GO: None,
     VerbKind.WAIT: Task.WAIT,
     VerbKind.CHARGE: Task.CHARGE,

@@ -180,9 +180,10 @@ def _reachable(phrase: Phrase, place: Location) -> bool:
     named = place.within is not None and phrase.head.pos == "PROPN"
     if phrase.known or named or phrase.person:
         return True
+    nominal = phrase.head.pos not in ("ADJ", "ADV") or len(phrase.tokens) > 1 or phrase.known
     called = place.preposition == "to" and phrase.proper and phrase.kind is NounKind.ABSTRACT
     called = called and phrase.head.lemma not in noun_examples()
-    return called or (phrase.nominal and (phrase.kind is None or phrase.kind.within_reach))
+    return called or (nominal and (phrase.kind is None or phrase.kind.within_reach))
 
 
 _MOVES: Final = frozenset(VerbKind) - {VerbKind.FIND, VerbKind.CHECK}

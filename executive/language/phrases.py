@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Final
@@ -109,11 +109,6 @@ class Phrase:
         return len(self.tokens) == 1 and self.head.word in lexicon().somebody
 
     @property
-    def stands_for_somewhere(self) -> bool:
-        """Whether it is a pronoun that can mean a place or a person."""
-        return self.pronoun or self.stands_for_one or self.stands_for_somebody
-
-    @property
     def speaker(self) -> bool:
         """Whether it is who speaks."""
         return len(self.tokens) == 1 and self.head.word in lexicon().speaker
@@ -140,11 +135,6 @@ class Phrase:
         """Whether it is written as a name, of whatever kind."""
         return not self._determined() and all(token.pos == "PROPN" for token in self.tokens)
 
-    def as_person(self) -> Phrase:
-        """The same, taken for the name of a person."""
-        *left, head = self.tokens
-        return replace(self, tokens=(*left, replace(head, kind=NounKind.PERSON)))
-
     @property
     def universal(self) -> bool:
         """Whether it means all of a kind ("everyone", "all the men"); "all the forks" are only the forks."""
@@ -160,19 +150,9 @@ class Phrase:
         return held and any(t.word == "your" and t.index < self.head.index for t in self.tokens)
 
     @property
-    def negative(self) -> bool:
-        """Whether it says that there is none ("no milk")."""
-        return len(self.tokens) > 1 and self.tokens[0].word == "no"
-
-    @property
     def indefinite(self) -> bool:
         """Whether it means any one of its kind: no article but "a", no possessive."""
         return not any(t.word in lexicon().definite or t.tag in ("PRP$", "POS") for t in self.tokens)
-
-    @property
-    def nominal(self) -> bool:
-        """Whether it can be a place or a thing: no bare adjective ("silent")."""
-        return self.head.pos not in ("ADJ", "ADV") or len(self.tokens) > 1 or self.head.known
 
     @property
     def known(self) -> bool:
@@ -195,17 +175,9 @@ class Phrase:
         """Whether it is only a number ("two", "a couple")."""
         return _number(self.head) is not None
 
-    def counting(self, counted: Phrase) -> Phrase:
-        """The phrase of so many of what is counted."""
-        return replace(counted, tokens=(*self.tokens, *counted.tokens))
-
     def with_extra(self, *words: str) -> Phrase:
         """The phrase with more words behind the noun."""
         return replace(self, extra=(*self.extra, *words))
-
-    def described(self, tokens: Sequence[Token]) -> Phrase:
-        """The phrase with a description behind the noun, without articles."""
-        return self.with_extra(*(t.text for t in tokens if t.tag != "DT"))
 
     def consisting_of(self, inner: Phrase) -> Phrase:
         """The phrase with "of" and what it consists of behind the noun; of a mere number nothing is held."""
@@ -234,14 +206,10 @@ class Phrase:
         mine = {n for n, t in enumerate(left) if t.tag == "POS" and left[n - 1].tag not in ("PRP$", "PRP")}
         return (*(t for n, t in enumerate(left) if n in units | mine or not _is_determiner(t)), head)
 
-    def _counting(self) -> tuple[Token, ...]:
-        """The words before the noun among which a count may be; that of a measure is none ("ten inch nails")."""
-        return tuple(t for n, t in enumerate(self.tokens[:-1]) if not self._measures(n))
-
     def _numerals(self) -> Iterator[tuple[Token, ...]]:
-        """The numbers that count, each in its words side by side."""
-        words = self.tokens if self.counts else self._counting()
-        for numeral, run in groupby(words, key=_is_numeral):
+        """The numbers that count, each in its words side by side; that of a measure does not ("ten inch nails")."""
+        left = tuple(t for n, t in enumerate(self.tokens[:-1]) if not self._measures(n))
+        for numeral, run in groupby(self.tokens if self.counts else left, key=_is_numeral):
             if numeral:
                 yield tuple(run)
 
@@ -306,14 +274,11 @@ def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:
     end = len(tokens)
     for head in reversed(tokens):
         if head.index < end and _is_head(head, tokens):
-            start = _first(head, tokens)
+            start = head.index
+            while start > 0 and _belongs(tokens[start - 1], head, tokens):
+                start -= 1
             phrases[start] = Phrase(tuple(tokens[start : head.index + 1]))
             end = start
-    return _compounds(phrases)
-
-
-def _compounds(phrases: Mapping[int, Phrase]) -> dict[int, Phrase]:
-    """Join nouns that stand side by side without an article: "the kitchen" and "counter" are one place."""
     joined: dict[int, Phrase] = {}
     for start, phrase in sorted(phrases.items()):
         before = joined.get(last := max(joined, default=-1))
@@ -325,6 +290,7 @@ def _compounds(phrases: Mapping[int, Phrase]) -> dict[int, Phrase]:
 
 
 def _compound(before: Phrase, phrase: Phrase) -> bool:
+    """Whether nouns side by side without an article are one: "the kitchen" and "counter"."""
     if before.head.lemma in lexicon().people and phrase.named_person and phrase.proper:
         return before.head.pos in ("NOUN", "PROPN") and not before.plural
     nouns = before.head.pos == "NOUN" and all(t.pos == "NOUN" for t in phrase.tokens)
@@ -336,22 +302,10 @@ def _is_head(token: Token, tokens: Sequence[Token]) -> bool:
     if token.tag in ("EX", "WDT", "WP") or token.relation == "nummod":
         return False
     parent = tokens[token.head]
-    inside = token.relation in _LEFT and parent.index > token.index and _joined(token, parent, tokens)
+    inside = token.relation in _LEFT and parent.index > token.index
+    inside = inside and all(t.relation in _LEFT and t.word != "," for t in tokens[token.index + 1 : parent.index])
     nominal = token.pos in _NOMINAL or (token.pos in ("ADJ", "DET") and token.relation in _HEADLIKE)
     return nominal and not inside
-
-
-def _joined(token: Token, parent: Token, tokens: Sequence[Token]) -> bool:
-    """Whether only words of one noun phrase stand between `token` and the noun behind it."""
-    return all(t.relation in _LEFT and t.word != "," for t in tokens[token.index + 1 : parent.index])
-
-
-def _first(head: Token, tokens: Sequence[Token]) -> int:
-    """Where the phrase of `head` begins: the words before it that depend on it, directly or not."""
-    first = head.index
-    while first > 0 and _belongs(tokens[first - 1], head, tokens):
-        first -= 1
-    return first
 
 
 def _belongs(token: Token, head: Token, tokens: Sequence[Token]) -> bool:

@@ -153,7 +153,7 @@ class _Reader(Row):
         if phrase is None:
             return None if preposition else self._level(items)
         self.at = start + len(phrase.tokens)
-        if phrase.negative:
+        if len(phrase.tokens) > 1 and phrase.tokens[0].word == "no":
             return Unknown(phrase.spoken)
         phrase = self._described(self._numbered(self._of(phrase)))
         role = lexicon().prepositions[preposition] if preposition else None
@@ -191,7 +191,7 @@ class _Reader(Row):
                 break
             self.at += 1 + len(inner.tokens)
             whole = phrase.counts or phrase.head.word in ("all", "both")
-            phrase = phrase.counting(inner) if whole else phrase.consisting_of(inner)
+            phrase = replace(inner, tokens=(*phrase.tokens, *inner.tokens)) if whole else phrase.consisting_of(inner)
         return phrase
 
     def _numbered(self, phrase: Phrase) -> Phrase:
@@ -208,7 +208,7 @@ class _Reader(Row):
     def _described(self, phrase: Phrase) -> Phrase:
         """Join what tells somebody or something apart: what they do, what they wear, what it has."""
         while (end := self._description_end(phrase)) > self.at:
-            phrase = phrase.described(self.tokens[self.at : end])
+            phrase = phrase.with_extra(*(t.text for t in self.tokens[self.at : end] if t.tag != "DT"))
             self.at = end
         return phrase
 

@@ -137,8 +137,12 @@ def _told(action: Action, where: Location | None, memory: Memory) -> Memory:
     if people:
         return replace(memory, person=Location(people[-1], within=where))
     told = () if where is None else tuple((phrase, where) for phrase in action.objects)
-    called = [phrase.as_person() for phrase in action.objects if phrase.proper]
-    person = Location(called[-1], within=where) if called else memory.person
+    called = [phrase for phrase in action.objects if phrase.proper]
+    person = memory.person
+    if called:
+        *left, head = called[-1].tokens
+        named = replace(called[-1], tokens=(*left, replace(head, kind=NounKind.PERSON)))
+        person = Location(named, within=where)
     return replace(memory, person=person, things=action.objects or memory.things, told=(*memory.told, *told))
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cache
 from typing import Final
 
 from executive.language.actions import Action
@@ -17,6 +16,9 @@ from executive.language.roles import HERE, Location
 from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
 
+_STAYS: Final = (VerbKind.GO, VerbKind.FIND, VerbKind.WAIT, VerbKind.CHARGE)
+_BY_HAND: Final = frozenset({"bring", "carry", "take", "deliver", "take over", "bring over", "carry over", "hand"})
+
 
 def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> None:
     """Refuse odd numbers, to carry people, to serve all of a kind, what no hand can hold, and places out of reach.
@@ -24,108 +26,36 @@ def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> No
     Raises:
         RefusalError: any action is out of reach; it names all that is.
     """
-    counted = (phrase for d in actions for phrase in (d.target, d.time) if phrase is not None)
+    counted = (phrase for one in actions for phrase in (one.target, one.time) if phrase is not None)
     odd = [number for phrase in counted if (number := phrase.odd_number)]
     if odd:
         raise RefusalError(f"{listing(map(repr, odd))} is no number of things; say how many in one whole number", odd)
-    shared = [
-        d.goal.phrase.spoken for d in actions if d.goal is not None and d.goal.phrase is not None and _serves_all(d)
-    ]
+    carrying = [(one, one.target) for one in actions if one.kind not in _STAYS and one.target is not None]
+    goals = [one.goal.phrase for one, _ in carrying if one.goal is not None]
+    shared = [goal.spoken for goal in goals if goal is not None and goal.universal]
     if shared:
         raise RefusalError(f"I bring things to one person at a time, not to {', '.join(shared)}; name one", shared)
-    people = [f"{d.verb} {d.target.text}" for d in actions if _carries(d) and d.target is not None and d.target.person]
+    people = [f"{one.verb} {target.text}" for one, target in carrying if target.person]
     if people:
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {ABLE}", people)
     if knowledge is not None:
-        actions = [replace(action, objects=()) if _asks_for_people(action) else action for action in actions]
-        actions = [action for action in actions if not _visits_all(action)]
-    moved = [action.target for action in actions if _moved(action)]
-    outside = [(part, part) for action in actions for part in _outside(action, action.target in moved)]
+        rooms = [one for one in actions if one.kind is VerbKind.GO and one.goal is not None and one.goal.every_room]
+        actions = [replace(one, objects=()) if _asks_for_people(one) else one for one in actions if one not in rooms]
+    moved = [one.target for one in actions if one.target is not None and _moved(one, one.target)]
+    outside = [(part, part) for one in actions for part in _outside(one, one.target in moved)]
     if outside:
         raise not_understood(outside, knowledge)
 
 
 def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None) -> RefusalError:
     """The refusal that names the parts which lie outside the mission, each with the whole clause that it stands in."""
-    within = {clause: [part for part, other in parts if other == clause] for _, clause in parts}
-    named = (_named(tuple(dict.fromkeys(words)), clause) for clause, words in within.items())
+    named = []
+    for clause in dict.fromkeys(clause for _, clause in parts):
+        words = dict.fromkeys(part for part, other in parts if other == clause)
+        quoted = ", ".join(map(repr, words))
+        named.append(quoted if not clause or clause in words else f"{quoted} in {clause!r}")
     reason = f"I do not understand {', '.join(named)}; {ABLE}"
     return RefusalError(reason, [part for part, _ in parts], kind=RefusalKind.NOT_UNDERSTOOD)
-
-
-def _named(words: Sequence[str], clause: str) -> str:
-    """The words in quotes, and the clause, unless that is all the same."""
-    quoted = ", ".join(map(repr, words))
-    return quoted if not clause or clause in words else f"{quoted} in {clause!r}"
-
-
-def _serves_all(action: Action) -> bool:
-    """Whether a thing is brought to all of some people."""
-    goal = None if action.goal is None else action.goal.phrase
-    return _carries(action) and goal is not None and goal.universal and action.target is not None
-
-
-def _carries(action: Action) -> bool:
-    return action.kind not in (VerbKind.GO, VerbKind.FIND, VerbKind.WAIT, VerbKind.CHARGE)
-
-
-_BY_HAND: Final = frozenset({"bring", "carry", "take", "deliver", "take over", "bring over", "carry over", "hand"})
-_INTO: Final = frozenset({"into", "onto"})
-
-
-def _moved(action: Action) -> bool:
-    """Whether a definite thing is taken from or put into a place in the house, so that it is no idea.
-
-    So is "the mail from the desk", and what is written ("take the report to the boss").
-    """
-    if action.target is None or action.target.indefinite or not _carries(action):
-        return False
-    goal = action.goal
-    if (
-        goal is not None
-        and goal.preposition in _INTO
-        and goal.phrase is not None
-        and goal.phrase.kind is NounKind.PLACE
-    ):
-        return action.target.kind is not NounKind.ELSEWHERE
-    laid = action.kind is VerbKind.PLACE and goal is not None and goal.phrase is not None
-    laid = laid and goal is not None and goal.phrase is not None and goal.phrase.kind is NounKind.PLACE
-    if goal not in (None, HERE) and (action.verb in _BY_HAND or laid) and action.target.head.lemma in lexicon().written:
-        return True
-    role = lexicon().prepositions.get(tuple(action.source.preposition.split())) if action.source is not None else None
-    place = None if action.source is None else action.source.phrase
-    if place is None or role is not PrepositionRole.SOURCE or action.target.kind is NounKind.ELSEWHERE:
-        return False
-    return place.kind is NounKind.PLACE or (place.kind is NounKind.THING and _fixture(action.target))
-
-
-def _outside(action: Action, moved: bool) -> Iterator[str]:
-    """The parts of an action that are out of reach; `moved` says that its thing lies in a place of the house."""
-    if action.target is not None and (
-        action.target.universal
-        or action.target.addressed
-        or action.target.counts
-        or not (moved or _holdable(action.target, action))
-    ):
-        yield f"{action.verb} {action.target.spoken}"
-    for place in (action.source, action.goal):
-        yield from _outside_place(place, action)
-
-
-def _holdable(phrase: Phrase, action: Action) -> bool:
-    """Whether it is something to be found, and taken where the action takes it."""
-    if phrase.known:
-        return True
-    if action.kind is VerbKind.FIND and action.source is None and (_anybody(phrase) or _cuisine(phrase)):
-        return False
-    called = phrase.kind is NounKind.VEHICLE and (phrase.indefinite or action.kind is not VerbKind.FIND)
-    if called or (action.kind is not VerbKind.FIND and _fixture(phrase)):
-        return False
-    return not _light(phrase, action) and (phrase.kind is None or phrase.kind.within_reach)
-
-
-def _visits_all(action: Action) -> bool:
-    return action.kind is VerbKind.GO and action.goal is not None and action.goal.every_room
 
 
 def _asks_for_people(action: Action) -> bool:
@@ -135,59 +65,84 @@ def _asks_for_people(action: Action) -> bool:
     return phrase is not None and (anyone or phrase.person or phrase.stands_for_somebody)
 
 
-def _anybody(phrase: Phrase) -> bool:
-    """Whether it is any one of some trade ("a good dentist"), who is not looked for in a house."""
-    return phrase.kind is NounKind.PERSON and phrase.indefinite and not phrase.named_person
+def _moved(action: Action, target: Phrase) -> bool:
+    """Whether a definite thing is taken from or put into a place in the house, so that it is no idea.
+
+    So is "the mail from the desk", and what is written ("take the report to the boss").
+    """
+    if target.indefinite or action.kind in _STAYS:
+        return False
+    goal, source = action.goal, action.source
+    laid = goal is not None and goal.kind is NounKind.PLACE
+    if goal is not None and goal.preposition in ("into", "onto") and laid:
+        return target.kind is not NounKind.ELSEWHERE
+    by_hand = action.verb in _BY_HAND or (action.kind is VerbKind.PLACE and laid)
+    if goal not in (None, HERE) and by_hand and target.head.lemma in lexicon().written:
+        return True
+    if source is None or source.role is not PrepositionRole.SOURCE or target.kind is NounKind.ELSEWHERE:
+        return False
+    fixture = target.head.lemma in lexicon().fixtures
+    return source.kind is NounKind.PLACE or (source.kind is NounKind.THING and fixture)
 
 
-def _cuisine(phrase: Phrase) -> bool:
-    """Whether it is any food of some style, as recipes and menus have it ("pasta dishes")."""
-    styled = any(t.relation in ("compound", "amod") and not t.adjective for t in phrase.tokens[:-1])
-    return styled and phrase.plural and phrase.indefinite and phrase.head.lemma in lexicon().prepared
+def _outside(action: Action, moved: bool) -> Iterator[str]:
+    """The parts of an action that are out of reach; `moved` says that its thing lies in a place of the house."""
+    target = action.target
+    if target is not None:
+        odd = target.universal or target.addressed or target.counts
+        if odd or not (moved or target.known or _holdable(target, action)):
+            yield f"{action.verb} {target.spoken}"
+    for each in (action.source, action.goal):
+        place = each
+        while place is not None:
+            phrase = place.phrase
+            if phrase is not None and (
+                phrase.universal
+                or not _reachable(phrase, place)
+                or (action.kind is VerbKind.GO and _idle(phrase, place, action.verb))
+            ):
+                yield f"{action.verb} {place.preposition} {phrase.spoken}".replace("  ", " ")
+            place = place.within
 
 
-def _fixture(phrase: Phrase) -> bool:
-    return phrase.head.lemma in lexicon().fixtures
-
-
-def _light(phrase: Phrase, action: Action) -> bool:
-    """Whether verb and noun are one act, as in "take a picture": the noun is no thing then."""
+def _holdable(phrase: Phrase, action: Action) -> bool:
+    """Whether it is something to be found, and taken where the action takes it."""
+    find = action.kind is VerbKind.FIND
+    if find and action.source is None:
+        trade = phrase.kind is NounKind.PERSON and phrase.indefinite and not phrase.named_person  # a good dentist
+        styled = any(t.relation in ("compound", "amod") and not t.adjective for t in phrase.tokens[:-1])
+        cuisine = styled and phrase.plural and phrase.indefinite and phrase.head.lemma in lexicon().prepared
+        if trade or cuisine:  # pasta dishes, as recipes and menus have them
+            return False
+    if phrase.kind is NounKind.VEHICLE and (phrase.indefinite or not find):
+        return False
+    if not find and phrase.head.lemma in lexicon().fixtures:
+        return False
+    # Verb and noun may be one act, as in "take a picture": the noun is no thing then.
     acts = lexicon().light_nouns.get(action.verb.split()[0], frozenset())
-    elsewhere = action.goal is not None and action.goal.phrase is not None and action.goal.phrase.kind is NounKind.PLACE
     loose = phrase.indefinite or action.verb in lexicon().light_whole
-    return phrase.head.lemma in acts and loose and action.source is None and not elsewhere
-
-
-def _outside_place(place: Location | None, action: Action) -> Iterator[str]:
-    while place is not None:
-        phrase = place.phrase
-        idle = phrase is not None and action.kind is VerbKind.GO and _idle(phrase, place, action.verb)
-        if phrase is not None and (idle or phrase.universal or not _reachable(phrase, place)):
-            yield f"{action.verb} {place.preposition} {phrase.spoken}".replace("  ", " ")
-        place = place.within
+    placed = action.source is not None or (action.goal is not None and action.goal.kind is NounKind.PLACE)
+    light = phrase.head.lemma in acts and loose and not placed
+    return not light and (phrase.kind is None or phrase.kind.within_reach)
 
 
 def _idle(phrase: Phrase, place: Location, verb: str) -> bool:
     """Whether going there is something else than a way: "go to bed", "reach my wife"."""
-    bare = len(phrase.tokens) == 1 and not phrase.known
     out = place.preposition.startswith("out")
-    called = phrase.person and (out or not phrase.named_person) and place.within is None and verb in lexicon().calls
-    return called or (bare and phrase.head.lemma in lexicon().light_nouns.get(verb.split()[0], frozenset()))
+    if phrase.person and (out or not phrase.named_person) and place.within is None and verb in lexicon().calls:
+        return True
+    bare = len(phrase.tokens) == 1 and not phrase.known
+    return bare and phrase.head.lemma in lexicon().light_nouns.get(verb.split()[0], frozenset())
 
 
 def _reachable(phrase: Phrase, place: Location) -> bool:
     """Whether one can go there, or to somebody; a name in front of a place is somebody's ("Paris at the desk")."""
-    named = place.within is not None and phrase.head.pos == "PROPN"
-    if phrase.known or named or phrase.person:
+    if phrase.known or phrase.person or (place.within is not None and phrase.head.pos == "PROPN"):
         return True
-    nominal = phrase.head.pos not in ("ADJ", "ADV") or len(phrase.tokens) > 1 or phrase.known
+    nominal = phrase.head.pos not in ("ADJ", "ADV") or len(phrase.tokens) > 1
     called = place.preposition == "to" and phrase.proper and phrase.kind is NounKind.ABSTRACT
     called = called and phrase.head.lemma not in noun_examples()
     return called or (nominal and (phrase.kind is None or phrase.kind.within_reach))
-
-
-_MOVES: Final = frozenset(VerbKind) - {VerbKind.FIND, VerbKind.CHECK}
-_OVER: Final = "over"
 
 
 def refuse_harm(clauses: Sequence[Predicate]) -> None:
@@ -198,8 +153,8 @@ def refuse_harm(clauses: Sequence[Predicate]) -> None:
 
 
 def _does_harm(clause: Predicate) -> bool:
-    words = _harmful()
-    if not isinstance(verb := clause.verb, Verb | Outside):
+    words, verb = read_table("harm.yaml"), clause.verb
+    if not isinstance(verb, Verb | Outside):
         return False
     said = (verb.text if isinstance(verb, Verb) else verb.word).lower()
     chunks = [item for item in clause.items if isinstance(item, Chunk) and item.role is not PrepositionRole.FOR]
@@ -208,8 +163,8 @@ def _does_harm(clause: Predicate) -> bool:
         return True
     if said in words["throws"]:
         return any(chunk.preposition in words["flies"] for chunk in chunks) or bool(met)
-    moves = isinstance(verb, Verb) and bool(verb.kinds & _MOVES)
-    over = _OVER if said.endswith(f" {_OVER}") else ""
+    moves = isinstance(verb, Verb) and not verb.kinds <= {VerbKind.FIND, VerbKind.CHECK}
+    over = "over" if said.endswith(" over") else ""
     return moves and any((chunk.preposition or over) in words["upon"] for chunk in met)
 
 
@@ -218,26 +173,16 @@ def _somebody(phrase: Phrase) -> bool:
     bare = len(phrase.content) == 1
     living = phrase.person or phrase.speaker or phrase.stands_for_somebody or (bare and phrase.kind is NounKind.PERSON)
     owned = not bare or any(token.tag in ("PRP$", "POS") for token in phrase.tokens)
-    return living or (owned and phrase.head.lemma in _harmful()["body"])
-
-
-@cache
-def _harmful() -> Mapping[str, frozenset[str]]:
-    return {name: frozenset(words) for name, words in read_table("harm.yaml").items()}
-
-
-_GO: Final = frozenset({VerbKind.GO})
-_ON_TOP: Final = ("in", "out")
+    return living or (owned and phrase.head.lemma in read_table("harm.yaml")["body"])
 
 
 def check_ways_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Action]) -> None:
     """Refuse a way that is to be taken, and relations to the speaker but "to me". Raises RefusalError."""
-    for action in actions:
-        for place in action.ways:
-            if place.phrase is None or place.phrase.head.lemma not in read_table("relations.yaml")["doors"]:
-                raise _refused("go", place.preposition, place.name)
+    for place in (place for action in actions for place in action.ways):
+        if place.phrase is None or place.phrase.head.lemma not in read_table("relations.yaml")["doors"]:
+            raise _refused("go", place.preposition, place.name)
     for clause in clauses:
-        act = "go" if isinstance(clause.verb, Verb) and clause.verb.kinds == _GO else "bring"
+        act = "go" if isinstance(clause.verb, Verb) and clause.verb.kinds == {VerbKind.GO} else "bring"
         for chunk in clause.items:
             if isinstance(chunk, Chunk) and chunk.phrase.speaker and not _keeps(act, "person", chunk.preposition):
                 raise _refused(act, chunk.preposition, chunk.phrase.spoken)
@@ -248,18 +193,13 @@ def check_relation(act: str, kinds: Sequence[str], location: Location) -> None:
 
     `kinds` is what the place may turn out to be: "room", "surface" or "person". Raises RefusalError.
     """
-    name = location.phrase
+    name, around = location.phrase, location.within
     if name is None:
         return
-    groups = (
-        _ON_TOP
-        if "surface" in kinds and name.head.lemma.split()[-1] in read_table("relations.yaml")["open_tops"]
-        else ()
-    )
-    on_top = any(_in(group, location.preposition) for group in groups)
-    if not (on_top or any(_keeps(act, kind, location.preposition) for kind in kinds)):
+    open_top = "surface" in kinds and name.head.lemma.split()[-1] in read_table("relations.yaml")["open_tops"]
+    kept = any(_keeps(act, kind, location.preposition) for kind in kinds)
+    if not kept and not (open_top and _keeps("lie", "open_top", location.preposition)):
         raise _refused(act, location.preposition, name.spoken)
-    around = location.within
     if around is not None and not _keeps("around", "place", around.preposition):
         raise _refused("around", around.preposition, around.name)
 
@@ -270,8 +210,5 @@ def _refused(act: str, preposition: str, name: str) -> RefusalError:
 
 
 def _keeps(act: str, kind: str, preposition: str) -> bool:
-    return any(_in(group, preposition) for group in read_table("relations.yaml")["kept"][act][kind])
-
-
-def _in(group: str, preposition: str) -> bool:
-    return preposition in read_table("relations.yaml")["groups"][group]
+    table = read_table("relations.yaml")
+    return any(preposition in table["groups"][group] for group in table["kept"][act][kind])

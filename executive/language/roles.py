@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.language.items import Adverb, Chunk, Item, Separator, Unknown, Whether
-from executive.language.lexicon import PrepositionRole
+from executive.language.lexicon import PrepositionRole, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 
@@ -33,6 +33,16 @@ class Location:
     def living(self) -> bool:
         """Whether it is somebody, of whatever trade, or an animal: "him" and "her" can mean them."""
         return self.phrase is not None and (self.phrase.person or self.phrase.kind is NounKind.PERSON)
+
+    @property
+    def kind(self) -> NounKind | None:
+        """What kind of place, or somebody, it is."""
+        return None if self.phrase is None else self.phrase.kind
+
+    @property
+    def role(self) -> PrepositionRole | None:
+        """What its preposition says of it."""
+        return lexicon().prepositions.get(tuple(self.preposition.split()))
 
     @property
     def every_room(self) -> bool:

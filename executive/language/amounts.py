@@ -35,6 +35,10 @@ class TimeOfDay:
         """As "14:30"."""
         return f"{int(self.seconds // 3600):02d}:{int(self.seconds % 3600 // 60):02d}"
 
+    def notes(self, said: str) -> tuple[str, ...]:
+        """What it was taken for, where it could be another."""
+        return (f"I take '{said}' as {self.text}",) if self.taken else ()
+
 
 def count_of(text: str) -> float | None:
     """The number that digits or words make."""

@@ -304,9 +304,8 @@ class Branches(Base):
         if match is None:
             return None
         if (time := time_of(match["what"])) is not None:
-            self.notes += [f"I take '{match['what']}' as {time.text}"] if time.taken else []
-            until = ValueIs(text=f'clock >= "{time.text}"')
-            return Rounds(Loop(until=until, every_s=every_s), state)
+            self.notes += time.notes(match["what"])
+            return Rounds(Loop(until=ValueIs(text=f'clock >= "{time.text}"'), every_s=every_s), state)
         try:
             supposed = suppose(match["what"], state, self.reader)
         except RefusalError:
@@ -361,7 +360,7 @@ class Branches(Base):
         if not found.text:
             raise RefusalError(f"{found.cue.lower()} what?", [found.cue])
         if found.kind is Cue.UNTIL and (time := time_of(found.text)) is not None:
-            self.notes += [f"I take '{found.text}' as {time.text}"] if time.taken else []
+            self.notes += time.notes(found.text)
             return Rounds(Loop(until=ValueIs(text=f'clock >= "{time.text}"')), row.state)
         _, state = type(self)(self.reader).sequence(scope, row.state)
         supposed = suppose(found.text, state, self.reader)

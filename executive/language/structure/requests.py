@@ -15,7 +15,7 @@ from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.roles import Location
-from executive.language.structure.conditions import button_condition, meeting, suppose, usual_condition
+from executive.language.structure.conditions import FULL, button_condition, meeting, suppose, usual_condition
 from executive.language.structure.plain import (
     PlainReader,
     PlainReading,
@@ -55,8 +55,7 @@ def wait(where: str, how: str, what: str, state: State, reader: PlainReader) -> 
         if (passed := _WAITING.passed.fullmatch(what)) is not None and (span := seconds_of(passed["span"])) is not None:
             return (*steps, Wait(awaited=Awaited(seconds=span))), there, ()
         if (time := time_of(_WAITING.time.sub(r"\g<time>", what))) is not None:
-            notes = (f"I take '{what}' as {time.text}",) if time.taken else ()
-            return ((*steps, Wait(awaited=Awaited(until_clock=time.text))), there, notes)
+            return (*steps, Wait(awaited=Awaited(until_clock=time.text))), there, time.notes(what)
         return _until(suppose(what, there, reader), steps, there)
     if how == "for":
         more, there, found = _awaited(what, there, reader)
@@ -98,15 +97,12 @@ def _awaited(what: str, state: State, reader: PlainReader) -> tuple[Steps, State
     raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
 
 
-_FULL: Final = 0.99
-
-
 def charging_in(text: str, state: State) -> Done | None:
     """Charging up to a level; None where no level is said."""
     match = _WAITING.charge.fullmatch(text)
     if match is None:
         return None
-    level = _FULL if match["level"].lower().startswith("full") else share_of(match["level"])
+    level = FULL if match["level"].lower().startswith("full") else share_of(match["level"])
     if level is None:
         raise RefusalError(f"'{match['level']}' is no charge; say it in percent", [match["level"]])
     return (Dock(charging=Charging(level=level)),), replace(state, goal=None, at=None), ()

@@ -330,7 +330,7 @@ class Branches(Base):
     def beside(self, row: Row, where: str, body: Sequence[Clause]) -> None:
         """Say something while going somewhere."""
         reading = self.reader.commands_of(where, row.state, (verb("go"),))
-        said = [] if len(body) != 1 else [speech_in(body[0].text, self.reader.knowledge, self.reader.steps.parser)]
+        said = [] if len(body) != 1 else [speech_in(body[0].text, self.reader)]
         first = said[0] if said else None
         if first is None or first.text is None or first.to is not None or len(reading.commands) != 1:
             raise RefusalError("while I go somewhere I can only say something", [text_of(body)])

@@ -16,14 +16,7 @@ from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.roles import Location
 from executive.language.structure.conditions import FULL, button_condition, meeting, suppose, usual_condition
-from executive.language.structure.plain import (
-    PlainReader,
-    PlainReading,
-    State,
-    Supposed,
-    contrary,
-    phrase_of_name,
-)
+from executive.language.structure.plain import PlainReader, PlainReading, State, phrase_of_name
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Awaited, Charging, Dock, Wait, steps_of_commands
@@ -56,21 +49,27 @@ def wait(where: str, how: str, what: str, state: State, reader: PlainReader) -> 
             return (*steps, Wait(awaited=Awaited(seconds=span))), there, ()
         if (time := time_of(_WAITING.time.sub(r"\g<time>", what))) is not None:
             return (*steps, Wait(awaited=Awaited(until_clock=time.text))), there, time.notes(what)
-        return _until(suppose(what, there, reader), steps, there)
-    if how == "for":
-        more, there, found = _awaited(what, there, reader)
-        return _until(found, (*steps, *more), there)
-    found = suppose(what, there, reader)
-    return _until(replace(found, condition=contrary(found.condition), holds=found.fails), steps, there)
-
-
-def _until(found: Supposed, steps: Steps, there: State) -> Done:
+        found = suppose(what, there, reader)
+    elif how != "for":
+        found = suppose(what, there, reader).denied(what)
+    elif (match := _WAITING.button.fullmatch(what)) is not None:
+        found = button_condition(match["button"] or match["of"], what, there)
+    elif " to " in what and (usual := usual_condition(what, there, reader)) is not None:
+        found = usual
+    elif (match := _WAITING.person_at.fullmatch(what)) is not None and reader.is_somebody(match["who"], there):
+        reading = reader.go_to(match["where"], there)
+        steps, there = (*steps, *steps_of_commands(reading.commands)), reading.state
+        found = meeting(match["who"], None, what, there, reader)
+    elif reader.is_somebody(what, there):
+        found = meeting(what, None, what, there, reader)
+    else:
+        raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
     after = replace(found.holds, goal=found.holds.goal or there.goal)
     return (*steps, Wait(awaited=Awaited(condition=found.condition))), after, found.notes
 
 
 def _gone(where: str, state: State, reader: PlainReader) -> tuple[Steps, State]:
-    """Where it is to be waited, and going there."""
+    """Going to where it is to be waited, and what is known there."""
     if _WAITING.here.fullmatch(where):
         return (), state
     match = _WAITING.place.fullmatch(where)
@@ -80,21 +79,6 @@ def _gone(where: str, state: State, reader: PlainReader) -> tuple[Steps, State]:
         return (), state
     reading = reader.go_to(match["place"] or match["there"], state)
     return steps_of_commands(reading.commands), reading.state
-
-
-def _awaited(what: str, state: State, reader: PlainReader) -> tuple[Steps, State, Supposed]:
-    """What "wait for ..." waits for, and going there where a place is said."""
-    if (match := _WAITING.button.fullmatch(what)) is not None:
-        return (), state, button_condition(match["button"] or match["of"], what, state)
-    if " to " in what and (found := usual_condition(what, state, reader)) is not None:
-        return (), state, found
-    if (match := _WAITING.person_at.fullmatch(what)) is not None and reader.is_somebody(match["who"], state):
-        reading = reader.go_to(match["where"], state)
-        found = meeting(match["who"], None, what, reading.state, reader)
-        return steps_of_commands(reading.commands), reading.state, found
-    if reader.is_somebody(what, state):
-        return (), state, meeting(what, None, what, state, reader)
-    raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
 
 
 def charging_in(text: str, state: State) -> Done | None:
@@ -139,12 +123,12 @@ class Asked:
     yes_or_no: bool = False
 
 
-def speech_in(text: str, knowledge: Knowledge, parser: DependencyParser) -> Said | None:
+def speech_in(text: str, reader: PlainReader) -> Said | None:
     """What a clause asks to say; None where it asks for nothing of that kind.
 
     Raises RefusalError: what it asks to say cannot be said for somebody else, or to nobody who is known.
     """
-    forms = _of_world(knowledge)
+    forms, parser = _of_world(reader.knowledge), reader.steps.parser
     if (match := forms.say_to.fullmatch(text) or forms.say_whom.fullmatch(text)) is not None:
         return Said(_words(match["text"], parser), _listener(match))
     if forms.says_inside.match(text) is not None:
@@ -157,7 +141,24 @@ def speech_in(text: str, knowledge: Knowledge, parser: DependencyParser) -> Said
         return Said(_told(match["text"]), _listener(match))
     if (match := ACTS.announce.fullmatch(text)) is not None:
         return Said(_told(match["text"]), None if match["place"] is None else Listener(where=match["place"]))
-    return _relayed(text, forms, parser)
+    match = forms.tell_that.fullmatch(text) or forms.let_know_that.fullmatch(text)
+    if match is not None and not ACTS.question.match(match["text"]):
+        return Said(_told(match["text"]), _listener(match))
+    if (match := forms.tell_to.fullmatch(text)) is not None:
+        return Said(_told(f"please {match['act']}"), _listener(match))
+    match = forms.tell.fullmatch(text) or forms.let_know.fullmatch(text)
+    return None if match is None else _relayed(match["text"], text, _listener(match), parser)
+
+
+def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser) -> Said:
+    """ "Tell Robin dinner is ready", "let Robin know it"."""
+    if said is not None and re.match(r"(?:and|or)\b", said, re.IGNORECASE):
+        raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
+    if said is None or re.fullmatch(r"so|it|that|about it|about that", said, re.IGNORECASE):
+        return Said(None, to)
+    if CLAUSES.greetings.fullmatch(said) or (not ACTS.question.match(said) and _clause(said, parser)):
+        return Said(_told(said), to)
+    raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
 
 
 def speech_to(who: str, text: str, knowledge: Knowledge) -> Said:
@@ -168,32 +169,12 @@ def speech_to(who: str, text: str, knowledge: Knowledge) -> Said:
     return Said(_told(text), _listener(match))
 
 
-def _relayed(text: str, forms: Patterns, parser: DependencyParser) -> Said | None:
-    """ "Tell Robin that dinner is ready", "let Robin know it", "ask Robin to come"."""
-    match = forms.tell_that.fullmatch(text) or forms.let_know_that.fullmatch(text)
-    if match is not None and not ACTS.question.match(match["text"]):
-        return Said(_told(match["text"]), _listener(match))
-    if (match := forms.tell_to.fullmatch(text)) is not None:
-        return Said(_told(f"please {match['act']}"), _listener(match))
-    match = forms.tell.fullmatch(text) or forms.let_know.fullmatch(text)
-    if match is None:
-        return None
-    said = match["text"]
-    if said is not None and re.match(r"(?:and|or)\b", said, re.IGNORECASE):
-        raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
-    if said is None or re.fullmatch(r"so|it|that|about it|about that", said, re.IGNORECASE):
-        return Said(None, _listener(match))
-    if CLAUSES.greetings.fullmatch(said) or (not ACTS.question.match(said) and _clause(said, parser)):
-        return Said(_told(said), _listener(match))
-    raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
-
-
 def _clause(text: str, parser: DependencyParser) -> bool:
     """Whether it is a whole statement: a finite verb with its subject before it."""
     tokens = parser.parse(text)
-    verbs = {t.index for t in tokens if t.tag in ("VBZ", "VBP", "VBD", "MD") or t.relation == "root"}
-    finite = any(t.tag in ("VBZ", "VBP", "VBD", "MD") for t in tokens)
-    return finite and any(t.relation in ("nsubj", "nsubjpass", "expl") and t.head in verbs for t in tokens)
+    finite = {t.index for t in tokens if t.tag in ("VBZ", "VBP", "VBD", "MD")}
+    verbs = finite | {t.index for t in tokens if t.relation == "root"}
+    return bool(finite) and any(t.relation in ("nsubj", "nsubjpass", "expl") and t.head in verbs for t in tokens)
 
 
 def _words(text: str, parser: DependencyParser) -> str:
@@ -238,16 +219,12 @@ def _with_names(people: tuple[str, ...], places: tuple[str, ...]) -> Patterns:
     return ACTS.filled(names=any_of(people) or "(?!)", around=any_of(places) or "(?!)")
 
 
-_SPEAKER: Final = frozenset({"me", "us"})
-_SOMEBODY: Final = frozenset({"him", "her"})
-
-
 def _listener(match: re.Match[str]) -> Listener:
     who, where = match["who"], match["where"]
     word = who.lower()
-    if word in _SPEAKER:
+    if word in ("me", "us"):
         return Listener(who, speaker=True)
-    if word in _SOMEBODY:
+    if word in ("him", "her"):
         return Listener(who)
     if word in ("them", "the others", "everyone", "everybody") or " " in word:
         return Listener(where=where)
@@ -266,13 +243,12 @@ def question_in(text: str, knowledge: Knowledge) -> Asked | None:
     match, open_one = forms.wants_one.fullmatch(text), forms.wants_what.fullmatch(text)
     found = match or open_one
     if found is None or _listener(found).name is None:
-        raise RefusalError(
-            f"I do not understand the question in '{text}'; I can ask somebody by name whether they want this or that",
-            [text],
+        what = (
+            f"I do not understand the question in '{text}'; I can ask somebody by name whether they want this or that"
         )
-    if match is None and open_one is not None:
-        return _what(open_one, text, knowledge)
-    assert match is not None
+        raise RefusalError(what, [text])
+    if match is None:
+        return _what(found, text, knowledge)
     if (word := CLAUSES.deictic.search(match["what"])) is not None:
         raise RefusalError(f"I cannot ask that for you: '{word[0]}' would mean somebody else", [text])
     choices = tuple(re.split(r",? or |, ", match["what"], flags=re.IGNORECASE))
@@ -285,9 +261,7 @@ def _what(match: re.Match[str], text: str, knowledge: Knowledge) -> Asked:
     names = knowledge.classes(kind.removesuffix("s")) if kind else ()
     if not names:
         raise RefusalError(f"I do not know what there is to choose from in '{text}'; name it", [text])
-    spoken = f"What {'do you want to drink' if match['kind'] is None else f'{kind} do you want'}?"
-    if match["kind"] is not None:
-        spoken = f"Which {kind} do you want?"
+    spoken = "What do you want to drink?" if match["kind"] is None else f"Which {kind} do you want?"
     return Asked(spoken, _listener(match), tuple(f"a {name}" for name in names))
 
 
@@ -296,18 +270,14 @@ def without_article(choice: str) -> str:
     return re.sub(r"^(?:a|an|some|the|any|another) ", "", choice, flags=re.IGNORECASE)
 
 
-def serves_all(text: str) -> bool:
-    """Whether something is brought to several people at once."""
-    return ACTS.gives.match(text) is not None and ACTS.everyone.search(text) is not None
-
-
 def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, State] | None:
     """A step for each person to whom something is brought; None where it is brought to nobody of that kind.
 
     Raises RefusalError: it does not say in which room, nobody is known to be there, or there is only one of the thing.
     """
     trace = reader.actions_of(text, state)
-    to = next((one.goal for one in trace.actions if one.goal is not None and _all_people(one.goal)), None)
+    goals = [one.goal for one in trace.actions if one.goal is not None and one.goal.phrase is not None]
+    to = next((goal for goal in goals if goal.phrase and ACTS.everyone.fullmatch(goal.phrase.spoken)), None)
     if to is None or to.phrase is None:
         return None
     who = to.phrase.spoken
@@ -328,10 +298,6 @@ def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, S
         steps += steps_of_commands(reading.commands)
         begun = replace(reading.state, memory=state.memory)
     return tuple(steps), begun
-
-
-def _all_people(goal: Location) -> bool:
-    return goal.phrase is not None and ACTS.everyone.fullmatch(goal.phrase.spoken) is not None
 
 
 def search_everywhere(text: str, state: State, reader: PlainReader) -> PlainReading | None:

@@ -29,7 +29,6 @@ from executive.language.structure.requests import (
     question_in,
     search_everywhere,
     search_for,
-    serves_all,
     speech_in,
     speech_to,
     template,
@@ -147,7 +146,7 @@ class Builder(Branches):
         if found is not None and not _spoken_of(found, clause.text):
             self.modified(row, clause, found)
             return at + 1
-        said = speech_in(clause.text, self.reader.knowledge, self.reader.steps.parser)
+        said = speech_in(clause.text, self.reader)
         if said is None:
             return None
         text = said.text if said.text is not None else self.told
@@ -267,9 +266,10 @@ class Builder(Branches):
         return at + 1
 
     def _everyone(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
-        if not serves_all(clauses[at].text):
+        text = clauses[at].text
+        if ACTS.gives.match(text) is None or ACTS.everyone.search(text) is None:
             return None
-        done = for_everyone(clauses[at].text, self.known(row), self.reader)
+        done = for_everyone(text, self.known(row), self.reader)
         if done is None:
             return None
         self.flush(row)

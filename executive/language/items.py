@@ -187,6 +187,11 @@ class Predicate:
     subject: Chunk | None = None
     whether: bool = False
 
+    @property
+    def content(self) -> tuple[Item, ...]:
+        """The items but the separators."""
+        return tuple(item for item in self.items if not isinstance(item, Separator))
+
 
 def predicates(items: Iterable[Item]) -> tuple[Predicate, ...]:
     """Cut the row of items at its verbs."""
@@ -198,25 +203,24 @@ def predicates(items: Iterable[Item]) -> tuple[Predicate, ...]:
             found.append(Predicate(item))
         else:
             found[-1] = replace(found[-1], items=(*found[-1].items, item))
-    whole = (clause for clause in found if clause.verb is not None or _content(clause.items))
+    whole = (clause for clause in found if clause.verb is not None or clause.content)
     return tuple(part for clause in whole for part in _ungapped(clause))
 
 
 def _ungapped(clause: Predicate) -> Iterator[Predicate]:
     """Say the verb again where it was left out: "a beer to Robin and a coke to Charlie"."""
-    given = next((n for n in range(1, len(clause.items) - 1) if _gives_another(clause.items, n)), None)
-    if given is not None and isinstance(clause.verb, Verb):
-        yield replace(clause, items=clause.items[:given])
-        yield from _ungapped(Predicate(clause.verb, clause.items[given + 1 :]))
-        return
-    cut = next((n for n in range(1, len(clause.items) - 1) if _gap(clause.items, n)), None)
+    items, between = clause.items, range(1, len(clause.items) - 1)
+    cut = next((n for n in between if _gives_another(items, n)), None)
+    recipient: tuple[Item, ...] = ()
+    if cut is None and (cut := next((n for n in between if _gap(items, n)), None)) is not None:
+        first = items[0]
+        speaks = isinstance(first, Chunk) and first.role is None and first.phrase.speaker
+        recipient = (first,) if speaks else ()
     if cut is None or not isinstance(clause.verb, Verb):
         yield clause
         return
-    yield replace(clause, items=clause.items[:cut])
-    first = clause.items[0]
-    recipient = (first,) if isinstance(first, Chunk) and first.role is None and first.phrase.speaker else ()
-    yield from _ungapped(Predicate(clause.verb, (*recipient, *clause.items[cut + 1 :])))
+    yield replace(clause, items=items[:cut])
+    yield from _ungapped(Predicate(clause.verb, (*recipient, *items[cut + 1 :])))
 
 
 def _gives_another(items: Sequence[Item], at: int) -> bool:
@@ -233,38 +237,32 @@ def _gap(items: Sequence[Item], at: int) -> bool:
     joint, thing, place = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
     if not (isinstance(joint, Separator) and isinstance(thing, Chunk) and isinstance(place, Chunk)):
         return False
-    bare = [item for item in items[:at] if isinstance(item, Chunk) and item.role is None and not item.phrase.speaker]
-    roles = [item.role for item in items[:at] if isinstance(item, Chunk) and item.role is not None]
-    return thing.role is None and place.role is not None and bool(bare) and place.role in roles
-
-
-def _content(items: Sequence[Item]) -> bool:
-    return any(not isinstance(item, Separator) for item in items)
+    before = [item for item in items[:at] if isinstance(item, Chunk)]
+    bare = any(item.role is None and not item.phrase.speaker for item in before)
+    return thing.role is None and bare and place.role is not None and place.role in [item.role for item in before]
 
 
 def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
     """Begin a clause of "to be", which takes its subject, and the "if" before it, from the clause before."""
-    rest = last.items
-    subject = rest[-1] if rest and isinstance(rest[-1], Chunk) and not being.existential else None
-    if subject is None or subject.role is not None:
+    rest, subject = last.items, last.items[-1] if last.items and not being.existential else None
+    if not isinstance(subject, Chunk) or subject.role is not None:
         subject = None
     else:
         rest = rest[:-1]
     whether = bool(rest) and isinstance(rest[-1], Whether)
-    asked = being.asked and subject is None
-    before = replace(last, items=rest[: len(rest) - whether])
-    return [before, Predicate(replace(being, asked=asked), (), subject, whether)]
+    asked = replace(being, asked=being.asked and subject is None)
+    return [replace(last, items=rest[: len(rest) - whether]), Predicate(asked, (), subject, whether)]
 
 
 def without_name(clauses: Sequence[Predicate]) -> tuple[Predicate, ...]:
     """Leave out a bare name before the first verb: it calls somebody ("Michael go to the kitchen")."""
     first, *rest = clauses or [Predicate(None)]
-    content = [item for item in first.items if not isinstance(item, Separator)]
-    name = content[0] if len(content) == 1 and isinstance(content[0], Chunk) and content[0].role is None else None
-    joined = any(isinstance(item, Separator) and item.word in ("and", "or") for item in first.items)
-    comma = isinstance(first.items[-1], Separator) and first.items[-1].word == "," if first.items else False
-    called = name is not None and not joined and (name.phrase.named_person or (comma and name.phrase.proper))
-    return tuple(rest if first.verb is None and called and rest else clauses)
+    name = first.content[0] if len(first.content) == 1 else None
+    if first.verb is not None or not rest or not isinstance(name, Chunk) or name.role is not None:
+        return tuple(clauses)
+    words = [item.word if isinstance(item, Separator) else "" for item in first.items]
+    called = name.phrase.named_person or (words[-1] == "," and name.phrase.proper)
+    return tuple(rest if called and not {"and", "or"} & {*words} else clauses)
 
 
 def requested(predicates: Sequence[Predicate]) -> list[Predicate]:
@@ -274,79 +272,67 @@ def requested(predicates: Sequence[Predicate]) -> list[Predicate]:
 
 def _with_verb(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
     """Say "take" where there is no verb at all: "hammer to the kitchen, please"."""
-    items = [item for clause in clauses for item in clause.items if not isinstance(item, Separator)]
+    items = [item for clause in clauses for item in clause.content]
     chunks = [item for item in items if isinstance(item, Chunk)]
     carried = [chunk.role for chunk in chunks] == [None, PrepositionRole.GOAL] and len(chunks) == len(items)
     if len(clauses) != 1 or clauses[0].verb is not None or not carried or chunks[0].phrase.kind is not NounKind.THING:
         return clauses
-    return (replace(clauses[0], verb=verb(_TAKE)),)
+    return (replace(clauses[0], verb=verb("take")),)
 
 
 def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
     """Put a place that stands before the first verb behind it: "from the kitchen bring me a spoon"."""
     if len(clauses) < 2 or clauses[0].verb is not None or not isinstance(clauses[1].verb, Verb | Being):
         return clauses
-    fronted = [item for item in clauses[0].items if not isinstance(item, Separator)]
-    if _named_first(fronted, clauses[1]):
-        return (replace(clauses[0], verb=Being("", existential=True, asked=False)), *clauses[1:])
-    places = all(isinstance(item, Chunk) and item.role in _FRONTED for item in fronted)
-    first = replace(clauses[1], items=(*clauses[1].items, *fronted))
-    return (first, *clauses[2:]) if places else clauses
-
-
-def _named_first(fronted: Sequence[Item], clause: Predicate) -> bool:
-    """Whether a thing is only named, and then meant by "it": "that vase on the shelf, bring it here"."""
+    fronted = clauses[0].content
     chunks = [item for item in fronted if isinstance(item, Chunk)]
-    named = len(chunks) == len(fronted) and bool(chunks) and chunks[0].role is None and not chunks[0].phrase.pronoun
-    placed = named and all(chunk.role in _FRONTED for chunk in chunks[1:]) and not chunks[0].phrase.speaker
-    meant = [item.phrase for item in clause.items if isinstance(item, Chunk)]
-    return placed and any(phrase.pronoun or phrase.text == chunks[0].phrase.text for phrase in meant)
+    if len(chunks) < len(fronted):
+        return clauses
+    if chunks and chunks[0].role is None:  # that vase on the shelf, bring it here
+        named = chunks[0].phrase
+        told = all(chunk.role in PLACES for chunk in chunks[1:]) and not (named.pronoun or named.speaker)
+        meant = [item.phrase for item in clauses[1].items if isinstance(item, Chunk)]
+        if told and any(phrase.pronoun or phrase.text == named.text for phrase in meant):
+            return (replace(clauses[0], verb=Being("", existential=True, asked=False)), *clauses[1:])
+    if not all(chunk.role in PLACES for chunk in chunks):
+        return clauses
+    return (replace(clauses[1], items=(*clauses[1].items, *fronted)), *clauses[2:])
 
 
 def _without_reasons(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
     """Leave out what the speakers say that they are about to do themselves, before or after what is to be done."""
-    if len(clauses) > 1 and _own_affair(clauses[-1].verb) and isinstance(clauses[-2].verb, Verb):
+
+    def own_affair(verb: Verb | Being | Outside | None, before: Sequence[Item]) -> bool:
+        """Whether it is nothing that a robot does, and nothing that it is asked for, either: "I am about to sing"."""
+        wants = [item.word for item in before if isinstance(item, Unknown)]
+        return isinstance(verb, Outside) and verb.word.lower() not in lexicon().asks and wants[-1:] == ["to"]
+
+    if len(clauses) > 1 and isinstance(clauses[-2].verb, Verb):
         items = clauses[-2].items
-        at = next((n for n in range(len(items) - 1, -1, -1) if isinstance(items[n], Chunk)), None)
-        last = None if at is None else items[at]
-        wants = [item.word for item in items[(at or 0) + 1 :] if isinstance(item, Unknown)]
-        if at is not None and isinstance(last, Chunk) and last.phrase.speaker and at > 0 and wants[-1:] == ["to"]:
+        at = next((n for n in range(len(items) - 1, -1, -1) if isinstance(items[n], Chunk)), 0)
+        last = items[at] if items else None
+        speaks = at > 0 and isinstance(last, Chunk) and last.phrase.speaker
+        if speaks and own_affair(clauses[-1].verb, items[at + 1 :]):
             return (*clauses[:-2], replace(clauses[-2], items=items[:at]))
     if len(clauses) < 3 or clauses[0].verb is not None or not isinstance(clauses[2].verb, Verb):
         return clauses
-    first, act = clauses[0].items, clauses[1].verb
-    wants = [item.word for item in first if isinstance(item, Unknown)]
+    first = clauses[0].items
     speaker = bool(first) and isinstance(first[0], Chunk) and first[0].phrase.speaker
-    return clauses[2:] if speaker and _own_affair(act) and wants[-1:] == ["to"] else clauses
-
-
-def _own_affair(verb: Verb | Being | Outside | None) -> bool:
-    """Whether it is nothing that a robot does, and nothing that it is asked for, either."""
-    return isinstance(verb, Outside) and verb.word.lower() not in lexicon().asks
+    return clauses[2:] if speaker and own_affair(clauses[1].verb, first) else clauses
 
 
 def _without_checks(clauses: Sequence[Predicate]) -> Iterator[Predicate]:
     """Leave out "see" and "check" before "if there is": the question stands alone."""
     asks = False
     for clause, after in zip_longest(clauses, clauses[1:]):
-        bare = _checks(clause) and _only_whether(clause)
+        checks = isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
+        bare = checks and all(isinstance(item, Separator | Whether) for item in clause.items)
         if clause.whether and not asks:
-            clause = replace(clause, verb=Outside(_IF))
+            clause = replace(clause, verb=Outside("if"))
         asks = bare and after is not None and after.whether
         if not asks and not (bare and after is not None and isinstance(after.verb, Verb)):
             yield clause
 
 
-def _checks(clause: Predicate | None) -> bool:
-    """Whether its verb asks how things stand."""
-    return clause is not None and isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
-
-
-def _only_whether(clause: Predicate) -> bool:
-    """Whether nothing but "if" stands behind its verb, as in "see if you can find it"."""
-    return all(isinstance(item, Separator | Whether) for item in clause.items)
-
-
-_FRONTED: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
-_TAKE: Final = "take"
-_IF: Final = "if"
+PLACES: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
+"""The roles of places behind a preposition."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from executive.language.items import Adverb, Chunk, Item, Separator, Unknown, Whether
+from executive.language.items import PLACES, Adverb, Chunk, Item, Separator, Unknown, Whether
 from executive.language.lexicon import PrepositionRole, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
@@ -52,7 +52,7 @@ class Location:
     @property
     def name(self) -> str:
         """The words of the place itself, without articles; "start" for HERE."""
-        return _HERE_NAME if self.phrase is None else self.phrase.text
+        return "start" if self.phrase is None else self.phrase.text
 
     @property
     def text(self) -> str:
@@ -70,7 +70,6 @@ _JOINTS: Final = frozenset({",", ";", "and", "or", "then", "also", "plus", "seco
 _CLOSER: Final = (PrepositionRole.AT, PrepositionRole.BESIDE)
 _EVERYONE: Final = frozenset({"everyone", "everybody", "anyone", "anybody"})
 _LISTING: Final = frozenset({",", ""})
-_HERE_NAME: Final = "start"
 HERE: Final = Location(None)
 THERE: Final = Location(None, preposition="there")
 
@@ -98,13 +97,60 @@ class Roles:
     unknown: list[str] = field(default_factory=list)
     favour: bool = False
 
+    def add(self, one: _Placed) -> None:
+        """Sort in a phrase with the place around it, by its preposition."""
+        phrase, role, location = one.chunk.phrase, one.chunk.role, one.location
+        joined = bool(one.joint and self.goals)
+        if role is None:
+            self._add_bare(one)
+        elif role is PrepositionRole.SOURCE:
+            self.sources.append(location)
+        elif role is PrepositionRole.GOAL:
+            (self.joined_goals if joined else self.goals).append(location)
+        elif role in _CLOSER:
+            (self.joined_goals if joined or (one.joint and self.ats) else self.ats).append(location)
+        elif role is PrepositionRole.PATH:
+            self.paths.append(location)
+        elif phrase.speaker or phrase.person:
+            self.recipient, self.favour = location, True
+        else:
+            self.searched = phrase
+
+    def _add_bare(self, one: _Placed) -> None:
+        phrase = one.chunk.phrase
+        self.listed = self.listed or (bool(one.joint) and bool(self.objects))
+        last = self.objects[-1] if self.objects else None
+        told_apart = last is not None and not (last.speaker or last.person) and phrase.stands_for_one
+        if last is not None and told_apart and one.joint in _LISTING and one.within is None:
+            self.objects[-1] = phrase.instead_of_one(last)
+            return
+        places = self.goals or self.ats
+        another = phrase.kind is NounKind.THING and bool(places and self.objects)  # the salt to the hall and the pepper
+        another = another and places[-1].kind is NounKind.PLACE
+        if one.joint and places and not self.sources and not another:
+            self.joined_goals.append(one.location)
+            return
+        if one.within is not None and _somebody(phrase) and not self.objects:
+            self.first_at = one.within
+        elif one.within is not None:
+            self.ats.append(one.within)
+        self.objects.append(phrase)
+
 
 @dataclass(frozen=True)
-class _Spoken:
-    """A chunk, and the "and" or "or" right before it."""
+class _Placed:
+    """A chunk, the "and" or "or" right before it, and the place around it."""
 
     chunk: Chunk
     joint: str
+    within: Location | None = None
+
+    @property
+    def location(self) -> Location:
+        """The chunk as a location."""
+        if self.chunk.phrase.speaker:
+            return HERE
+        return Location(self.chunk.phrase, self.chunk.preposition, self.within)
 
 
 def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) -> Roles:
@@ -115,41 +161,41 @@ def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) ->
     """
     roles = Roles()
     spoken = list(_spoken(items, roles))
-    if describes:
-        spoken = _describe(spoken)
     row: list[_Placed] = []
-    for one in _nested(spoken, puts):
+    for one in _nested(_described(spoken) if describes else spoken, puts):
         if one.joint == "or" and row and one.chunk.role in (None, row[-1].chunk.role):
             listed = _listed_before(row)
             roles.choices.append([*listed, one.chunk.phrase])
             roles.objects = [phrase for phrase in roles.objects if phrase not in listed[1:]]
             continue
-        _ADD[one.chunk.role](roles, one)
+        roles.add(one)
         row.append(one)
     roles.goals += [HERE if item.here else THERE for item in items if isinstance(item, Adverb)]
-    _split_recipient(roles)
+    first = roles.objects[0] if roles.objects else None
+    if first is not None and (first.speaker or (len(roles.objects) > 1 and _receives(first, roles))):
+        roles.objects.pop(0)  # give Robin a coke, bring me a coke
+        roles.recipient = HERE if first.speaker else Location(first, within=roles.first_at)
+    elif roles.first_at is not None:
+        roles.ats.append(roles.first_at)
     return roles
 
 
-def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Spoken]:
+def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Placed]:
     """The chunks; what is neither chunk nor small word is left over."""
     joint, relative = "", False
     before: Chunk | None = None
     for item in items:
         if isinstance(item, Chunk):
             lies = relative and before is not None and before.role is None and not before.phrase.person
-            item = replace(item, role=PrepositionRole.SOURCE) if lies and item.role in _CLOSER else item
-            before = item
-            yield _Spoken(item, joint)
-        elif isinstance(item, Unknown):
-            roles.unknown.append(item.word)
-        elif isinstance(item, Whether):
-            roles.unknown.append("if")
+            before = replace(item, role=PrepositionRole.SOURCE) if lies and item.role in _CLOSER else item
+            yield _Placed(before, joint)
+        elif isinstance(item, Unknown | Whether):
+            roles.unknown.append(item.word if isinstance(item, Unknown) else "if")
         relative = isinstance(item, Separator) and (item.word in _RELATIVE or (relative and item.word == ""))
         joint = "" if not isinstance(item, Separator) else item.word if item.word in _JOINTS else joint
 
 
-def _describe(spoken: list[_Spoken]) -> list[_Spoken]:
+def _described(spoken: list[_Placed]) -> list[_Placed]:
     """Make "the object on top of the cup from the desk" an object of its own and a source."""
     places = [n for n, one in enumerate(spoken) if one.chunk.role not in (None, PrepositionRole.FOR)]
     if len(places) < 2 or places[0] == 0:
@@ -165,44 +211,25 @@ def _describe(spoken: list[_Spoken]) -> list[_Spoken]:
     return [*spoken[: first - 1], described, *spoken[first + 1 :]]
 
 
-@dataclass(frozen=True)
-class _Placed:
-    """A chunk with the place around it already joined."""
-
-    chunk: Chunk
-    joint: str
-    within: Location | None
-
-    @property
-    def location(self) -> Location:
-        """The chunk as a location."""
-        if self.chunk.phrase.speaker:
-            return HERE
-        return Location(self.chunk.phrase, self.chunk.preposition, self.within)
-
-
-_PLACE_ROLES: Final = (PrepositionRole.SOURCE, PrepositionRole.GOAL, *_CLOSER)
-
-
-def _nested(spoken: Sequence[_Spoken], puts: bool) -> Iterator[_Placed]:
-    """Join to each place the one behind it that tells it more closely."""
+def _nested(spoken: Sequence[_Placed], puts: bool) -> Iterator[_Placed]:
+    """Join to each place the one behind it that tells it more closely: no "and" between, and another preposition."""
     rest = list(spoken)
     while rest:
         first = rest.pop(0)
-        chain: list[Chunk] = []
+        chain = [first.chunk]
         apart = puts and first.chunk.role is PrepositionRole.SOURCE
-        while rest and not apart and _tells_closer(rest[0], chain[-1] if chain else first.chunk):
+        while rest and not apart:
+            before, chunk = chain[-1], rest[0].chunk
+            place = before.role in PLACES
+            place = place or (before.role in (None, PrepositionRole.FOR) and _somebody(before.phrase))
+            closer = chunk.role in _CLOSER and not rest[0].joint and chunk.preposition != before.preposition
+            if not (place and closer):
+                break
             chain.append(rest.pop(0).chunk)
         within: Location | None = None
-        for chunk in reversed(chain):
+        for chunk in reversed(chain[1:]):
             within = Location(chunk.phrase, chunk.preposition, within)
-        yield _Placed(first.chunk, first.joint, within)
-
-
-def _tells_closer(one: _Spoken, before: Chunk) -> bool:
-    """Whether a place tells the one before it more closely: no "and" between, and another preposition."""
-    place = before.role in _PLACE_ROLES or (before.role in (None, PrepositionRole.FOR) and _somebody(before.phrase))
-    return place and one.chunk.role in _CLOSER and not one.joint and one.chunk.preposition != before.preposition
+        yield replace(first, within=within)
 
 
 def _somebody(phrase: Phrase) -> bool:
@@ -212,87 +239,16 @@ def _somebody(phrase: Phrase) -> bool:
 def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
     """The phrases that an "or" behind the row gives a choice of: the last, and what commas join to it."""
     first = len(row) - 1
-    while first > 0 and row[first].joint in _LISTING and _alike(row[first - 1].chunk, row[first].chunk):
+    while first > 0 and row[first].joint in _LISTING:
+        before, chunk = row[first - 1].chunk, row[first].chunk
+        receives = before.phrase.speaker or before.phrase.person or before.phrase.kind is NounKind.PERSON
+        if before.role != chunk.role or (receives and not chunk.phrase.person):
+            break
         first -= 1
     return [one.chunk.phrase for one in row[first:]]
 
 
-def _alike(before: Chunk, chunk: Chunk) -> bool:
-    """Whether two chunks can be of one list, the first not being who receives the second."""
-    receives = before.phrase.speaker or before.phrase.person or before.phrase.kind is NounKind.PERSON
-    return before.role == chunk.role and (not receives or chunk.phrase.person)
-
-
-def _add_bare(roles: Roles, one: _Placed) -> None:
-    roles.listed = roles.listed or (bool(one.joint) and bool(roles.objects))
-    last = roles.objects[-1] if roles.objects else None
-    told_apart = last is not None and not (last.speaker or last.person) and one.chunk.phrase.stands_for_one
-    if told_apart and one.joint in _LISTING and one.within is None:
-        roles.objects[-1] = one.chunk.phrase.instead_of_one(roles.objects[-1])
-    elif one.joint and (roles.goals or roles.ats) and not roles.sources and not _another_thing(roles, one.chunk.phrase):
-        roles.joined_goals.append(one.location)
-    elif one.within is not None and _somebody(one.chunk.phrase) and not roles.objects:
-        roles.objects.append(one.chunk.phrase)
-        roles.first_at = one.within
-    elif one.within is not None:
-        roles.objects.append(one.chunk.phrase)
-        roles.ats.append(one.within)
-    else:
-        roles.objects.append(one.chunk.phrase)
-
-
-def _another_thing(roles: Roles, phrase: Phrase) -> bool:
-    """Whether what is joined to a place is one more thing for it ("the salt to the kitchen and the pepper too")."""
-    place = (roles.goals or roles.ats)[-1].phrase
-    return phrase.kind is NounKind.THING and place is not None and place.kind is NounKind.PLACE and bool(roles.objects)
-
-
-def _add_source(roles: Roles, one: _Placed) -> None:
-    roles.sources.append(one.location)
-
-
-def _add_goal(roles: Roles, one: _Placed) -> None:
-    (roles.joined_goals if one.joint and roles.goals else roles.goals).append(one.location)
-
-
-def _add_at(roles: Roles, one: _Placed) -> None:
-    (roles.joined_goals if one.joint and (roles.goals or roles.ats) else roles.ats).append(one.location)
-
-
-def _add_for(roles: Roles, one: _Placed) -> None:
-    if one.chunk.phrase.speaker or one.chunk.phrase.person:
-        roles.recipient = one.location
-        roles.favour = True
-    else:
-        roles.searched = one.chunk.phrase
-
-
-def _add_path(roles: Roles, one: _Placed) -> None:
-    roles.paths.append(one.location)
-
-
-_ADD: Final = {
-    None: _add_bare,
-    PrepositionRole.SOURCE: _add_source,
-    PrepositionRole.GOAL: _add_goal,
-    PrepositionRole.AT: _add_at,
-    PrepositionRole.BESIDE: _add_at,
-    PrepositionRole.FOR: _add_for,
-    PrepositionRole.PATH: _add_path,
-}
-
-
 def _receives(first: Phrase, roles: Roles) -> bool:
     """Whether the first of several bare phrases is given the others: somebody, or an animal."""
-    them = (first.stands_for_somebody or first.head.word in _EVERYONE) and not roles.listed
-    return first.person or them or (first.kind is NounKind.PERSON and not roles.listed)
-
-
-def _split_recipient(roles: Roles) -> None:
-    """In "give Robin a coke" and "bring me a coke" the first of the bare phrases is the recipient."""
-    first = roles.objects[0] if roles.objects else None
-    if first is not None and (first.speaker or (len(roles.objects) > 1 and _receives(first, roles))):
-        roles.objects.pop(0)
-        roles.recipient = HERE if first.speaker else Location(first, within=roles.first_at)
-    elif roles.first_at is not None:
-        roles.ats.append(roles.first_at)
+    them = first.stands_for_somebody or first.head.word in _EVERYONE or first.kind is NounKind.PERSON
+    return first.person or (them and not roles.listed)

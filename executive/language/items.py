@@ -164,6 +164,11 @@ class Row:
         self.at += count
         return " ".join(t.text for t in self.tokens[self.at - count : self.at])
 
+    def take_words(self, phrase: Sequence[str]) -> str:
+        """A phrase of the dictionaries, whose words are then read."""
+        self.at += len(phrase)
+        return " ".join(phrase)
+
     def ahead(self, count: int = 1) -> Sequence[Token]:
         """The `count` words behind the next one, fewer at the end."""
         return self.tokens[self.at + 1 : self.at + 1 + count]

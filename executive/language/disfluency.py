@@ -24,8 +24,6 @@ from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
 
-_IT: Final = frozenset({"it", "them"})
-_CONTRAST: Final = "but"
 _WHERE_FROM: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.AT, PrepositionRole.BESIDE})
 _WHERE_TO: Final = frozenset({PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE, PrepositionRole.FOR})
 
@@ -62,16 +60,29 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
     Raises RefusalError: it forbids something by itself ("but don't go to the kitchen").
     """
     ahead = _without_separators(rest)
-    being = bool(done) and isinstance(done[-1], Being)
-    if ahead and isinstance(verb := ahead[0], Verb) and not being:
-        first = next((item.phrase for item in ahead if isinstance(item, Chunk) and item.role is None), None)
-        rest = _behind_clause(ahead)
-        if not _done_instead(verb, done, rest):
-            raise _forbidden(mark, ahead)
-        return done, rest if first is None or first.pronoun or first.speaker else _one_of_them(rest, first)
-    if ahead and isinstance(chunk := ahead[0], Chunk) and not being:
-        rest = _told_apart(_behind_chunks(ahead), chunk.phrase)
-        if not _meant_instead(chunk, mark, done, rest):
+    first = ahead[0] if ahead else None
+    if done and isinstance(done[-1], Being):
+        first = None
+    if isinstance(first, Verb):
+        end = _clause_end(ahead)
+        clause, rest = ahead[1:end], ahead[end:]
+        turns = (n for n, item in enumerate(clause) if isinstance(item, Separator) and item.word == "but")
+        turn = next(turns, len(clause))
+        kept = [first, *clause[turn + 1 :]] if clause[turn + 1 :] else []  # not to the hall but to the kitchen
+        rest = [Separator(","), *kept, *rest]
+        if not _done_instead(first, done, rest):
+            raise _forbidden(mark, ahead[:end])
+        thing = next((item.phrase for item in ahead if isinstance(item, Chunk) and item.role is None), None)
+        return done, rest if thing is None or thing.pronoun or thing.speaker else _one_of_them(rest, thing)
+    if isinstance(first, Chunk):
+        rest = ahead[1:]  # behind all that "or" joins
+        while len(rest) > 1 and isinstance(rest[0], Separator) and rest[0].word == "or" and isinstance(rest[1], Chunk):
+            rest = rest[2:]
+        at = next((n for n, item in enumerate(rest) if not isinstance(item, Separator)), len(rest))
+        new = rest[at] if at < len(rest) else None
+        if isinstance(new, Chunk) and new.phrase.stands_for_one:  # not the red cup but the blue one
+            rest = [*rest[:at], replace(new, phrase=new.phrase.instead_of_one(first.phrase)), *rest[at + 1 :]]
+        if not _meant_instead(first, mark, done, rest):
             raise _forbidden(mark, ahead[:1])
         return done, rest
     return [*done, Unknown(mark.word)], rest
@@ -79,10 +90,14 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
 
 def _forbidden(mark: Negation, ahead: Sequence[Item]) -> RefusalError:
     """The refusal of what the speaker does not want, and which is no part of a command."""
-    verb, *clause = ahead
-    end = next((n for n, item in enumerate(clause) if isinstance(item, Verb | Being | Correction)), len(clause))
-    said = spoken_words([mark, verb, *clause[:end]]).replace(" n't", "n't")
+    said = spoken_words([mark, *ahead]).replace(" n't", "n't")
     return RefusalError(f"I cannot keep to {said!r}; say only what I am to do", [said])
+
+
+def _clause_end(ahead: Sequence[Item]) -> int:
+    """Where the clause of the verb that stands first ends."""
+    ends = (n for n, item in enumerate(ahead) if n and isinstance(item, Verb | Being | Correction))
+    return next(ends, len(ahead))
 
 
 def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> bool:
@@ -98,7 +113,7 @@ def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> 
 
 def _meant_instead(negated: Chunk, mark: Negation, done: Sequence[Item], rest: Sequence[Item]) -> bool:
     """Whether something else is said in the place of what was negated: "the milk, not the juice"."""
-    if negated.role is not None and mark.word.startswith(_CONTRAST):
+    if negated.role is not None and mark.word.startswith("but"):
         return False
     before = next((n for n in range(len(done) - 1, -1, -1) if isinstance(done[n], Verb)), 0)
     meant = [item for item in (*done[before:], *rest) if _corrects(negated, item)]
@@ -106,69 +121,36 @@ def _meant_instead(negated: Chunk, mark: Negation, done: Sequence[Item], rest: S
     return bool(meant) and (not negated.phrase.stands_for_one or any(len(words) > 1 for words in told))
 
 
-def _behind_clause(ahead: list[Item]) -> list[Item]:
-    """What stands behind a negated clause; "but" lets its verb hold for what follows ("not to the hall but here")."""
-    verb, *clause = ahead
-    end = next((n for n, item in enumerate(clause) if isinstance(item, Verb | Being | Correction)), len(clause))
-    turns = (n for n, item in enumerate(clause[:end]) if isinstance(item, Separator) and item.word == _CONTRAST)
-    turn = next(turns, None)
-    kept = [] if turn is None or turn + 1 == end else [verb, *clause[turn + 1 : end]]
-    return [Separator(","), *kept, *clause[end:]]
-
-
 def _one_of_them(rest: list[Item], negated: Phrase) -> list[Item]:
     """What follows, with "one" or "it" for what was negated ("don't take the red cup, take the blue one")."""
     at = next((n for n, item in enumerate(rest) if isinstance(item, Chunk) and item.role is None), None)
     new = None if at is None else rest[at]
-    if at is None or not isinstance(new, Chunk) or not (new.phrase.stands_for_one or new.phrase.head.word in _IT):
+    one = isinstance(new, Chunk) and new.phrase.stands_for_one
+    if at is None or not isinstance(new, Chunk) or not (one or new.phrase.head.word in ("it", "them")):
         return rest
-    phrase = new.phrase.instead_of_one(negated) if new.phrase.stands_for_one else negated
+    phrase = new.phrase.instead_of_one(negated) if one else negated
     return [*rest[:at], replace(new, phrase=phrase), *rest[at + 1 :]]
-
-
-def _told_apart(rest: list[Item], negated: Phrase) -> list[Item]:
-    """What follows, with "one" standing for what was negated ("not the red cup but the blue one")."""
-    at = next((n for n, item in enumerate(rest) if not isinstance(item, Separator)), len(rest))
-    new = rest[at] if at < len(rest) else None
-    if not isinstance(new, Chunk) or not new.phrase.stands_for_one:
-        return rest
-    return [*rest[:at], replace(new, phrase=new.phrase.instead_of_one(negated)), *rest[at + 1 :]]
-
-
-def _behind_chunks(ahead: list[Item]) -> list[Item]:
-    """What stands behind a negated chunk and those joined to it by "or"."""
-    rest = ahead[1:]
-    while len(rest) > 1 and isinstance(rest[0], Separator) and rest[0].word == "or" and isinstance(rest[1], Chunk):
-        rest = rest[2:]
-    return rest
 
 
 def _corrected(done: list[Item], rest: list[Item], mark: Correction) -> tuple[list[Item], list[Item]]:
     """Put what follows in the place of what it corrects."""
     ahead = _without_separators(rest)
     verb = next((n for n in range(len(done) - 1, -1, -1) if isinstance(done[n], Verb)), None)
-    if not any(not isinstance(item, Separator) for item in done):
+    if all(isinstance(item, Separator) for item in done):
         return done, ahead
     if ahead and isinstance(ahead[0], Verb):
         return done[: verb or 0], ahead
-    if verb is not None and not ahead and not mark.soft:
-        return _corrected_by_last(done, verb, mark), rest
+    if verb is not None and not ahead and not mark.soft:  # the bag to the hall, the trunk I mean
+        last = next((n for n in range(len(done) - 1, verb, -1) if not isinstance(done[n], Separator)), verb)
+        new = done[last]
+        fits = isinstance(new, Chunk) and _corrected_index(done[verb:last], new) is not None
+        return [*done[:verb], *_replaced(done[verb:last], new)] if fits else [*done, Unknown(mark.word)], rest
     if verb is None or not ahead or not isinstance(ahead[0], Chunk | Adverb):
         return (done, rest) if mark.soft else ([*done, Unknown(mark.word)], rest)
-    while ahead and isinstance(new := ahead[0], Chunk | Adverb):
-        done = [*done[:verb], *_replaced(done[verb:], new)]
+    while ahead and isinstance(ahead[0], Chunk | Adverb):
+        done = [*done[:verb], *_replaced(done[verb:], ahead[0])]
         ahead = ahead[1:]
     return done, ahead
-
-
-def _corrected_by_last(done: list[Item], verb: int, mark: Correction) -> list[Item]:
-    """The last chunk in the place of what it corrects: "the bag to the hall, the trunk I mean"."""
-    last = next((n for n in range(len(done) - 1, verb, -1) if not isinstance(done[n], Separator)), None)
-    new = None if last is None else done[last]
-    before = done[verb:last]
-    if not isinstance(new, Chunk) or _corrected_index(before, new) is None:
-        return [*done, Unknown(mark.word)]
-    return [*done[:verb], *_replaced(before, new)]
 
 
 def _without_separators(items: list[Item]) -> list[Item]:
@@ -176,37 +158,32 @@ def _without_separators(items: list[Item]) -> list[Item]:
     return items[next(first, len(items)) :]
 
 
-def _replaced(clause: Sequence[Item], new: Chunk | Adverb) -> list[Item]:
+def _replaced(clause: Sequence[Item], new: Item) -> list[Item]:
     """The clause with the chunk that `new` corrects replaced, or with `new` added when there is none."""
     at = _corrected_index(clause, new)
     if at is None:
         return [*clause, new]
     old = clause[at]
     if isinstance(new, Chunk) and new.role is None and isinstance(old, Chunk):
-        new = replace(old, phrase=_same_kind(new.phrase, old.phrase))
+        phrase = new.phrase  # "two" and "the red one" take their noun from the old one
+        if phrase.stands_for_one:
+            phrase = phrase.instead_of_one(old.phrase)
+        elif phrase.counts:
+            phrase = old.phrase.with_count(phrase.count)
+        new = replace(old, phrase=phrase)
     return [*clause[:at], new, *clause[at + 1 :]]
 
 
-def _same_kind(new: Phrase, old: Phrase) -> Phrase:
-    """The new phrase; "two" and "the red one" take their noun from the old one."""
-    if new.stands_for_one:
-        return new.instead_of_one(old)
-    return old.with_count(new.count) if new.counts else new
-
-
-def _corrected_index(clause: Sequence[Item], new: Chunk | Adverb) -> int | None:
+def _corrected_index(clause: Sequence[Item], new: Item) -> int | None:
     """Where the last item stands that `new` can take the place of."""
-    fitting = (n for n in range(len(clause) - 1, -1, -1) if _corrects(new, clause[n]))
-    return next(fitting, None)
+    return next((n for n in range(len(clause) - 1, -1, -1) if _corrects(new, clause[n])), None)
 
 
-def _corrects(new: Chunk | Adverb, old: Item) -> bool:
+def _corrects(new: Item, old: Item) -> bool:
     if isinstance(new, Adverb):
         return isinstance(old, Adverb) or (isinstance(old, Chunk) and old.role is PrepositionRole.GOAL)
-    if isinstance(old, Adverb):
-        return new.role in _WHERE_TO
-    if not isinstance(old, Chunk):
-        return False
+    if not isinstance(new, Chunk) or not isinstance(old, Chunk):
+        return isinstance(new, Chunk) and isinstance(old, Adverb) and new.role in _WHERE_TO
     if new.role is not None:
         return old.role is not None and any({old.role, new.role} <= group for group in (_WHERE_FROM, _WHERE_TO))
     if new.phrase.person or old.phrase.person or old.phrase.speaker:

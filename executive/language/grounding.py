@@ -26,14 +26,6 @@ from skills.api import Thing
 from skills.files.errors import known_names, listing
 
 
-@dataclass(frozen=True)
-class Grounded:
-    """Commands in the world's own names, and a word on each name that was taken for another."""
-
-    commands: tuple[Command, ...]
-    notes: tuple[str, ...] = ()
-
-
 def known_line(knowledge: Knowledge | None) -> str:
     """What can be asked for and where one can be sent, in one line."""
     if knowledge is None:
@@ -41,17 +33,20 @@ def known_line(knowledge: Knowledge | None) -> str:
     return f"{ABLE}; known things: {listing(knowledge.thing_names())}; known places: {listing(knowledge.place_names())}"
 
 
-def ground(frames: Sequence[CommandFrame], knowledge: Knowledge, parser: DependencyParser) -> Grounded:
+def ground(
+    frames: Sequence[CommandFrame], knowledge: Knowledge, parser: DependencyParser
+) -> tuple[tuple[Command, ...], tuple[str, ...]]:
     """The frames as commands in the world's own names, with default places where none was said.
 
-    What the parser knows of English words widens what an unknown name may stand for.
+    Behind them is a word on each name that was taken for another. What the parser knows of English words widens what an
+    unknown name may stand for.
 
     Raises:
         RefusalError: a thing, place or person is unknown, or could be several; with a question where that helps.
     """
     grounder = _Grounder(knowledge, parser)
     commands = tuple(command for frame in grounder.needed_there(frames) for command in grounder.commands(frame))
-    return Grounded(commands, tuple(dict.fromkeys(grounder.notes)))
+    return commands, tuple(dict.fromkeys(grounder.notes))
 
 
 def check_unwanted(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge) -> None:
@@ -80,7 +75,8 @@ class _Grounder:
         found = list(frames)
         for k, (takes, brings) in enumerate(pairwise(frames)):
             place, fetched = takes.goal, takes.task is Task.GRASP and brings.item == takes.object
-            if not fetched or place is None or place.preposition not in _INSIDE or brings.goal != HERE:
+            inside = place is not None and place.preposition in ("in", "at", "inside")
+            if not fetched or place is None or not inside or brings.goal != HERE:
                 continue
             name = None if place.phrase is None else self.knowledge.place(place.name)
             if name is not None and not self.knowledge.surfaces_in(name):
@@ -92,11 +88,7 @@ class _Grounder:
         """One frame as a command; going to every room is one for each."""
         if frame.goal is not None and frame.goal.every_room and frame.item is None and frame.task is None:
             yield from (Command(goal=room, verb=frame.verb) for room in self.knowledge.places)
-        else:
-            yield self.command(frame)
-
-    def command(self, frame: CommandFrame) -> Command:
-        """One frame as a command."""
+            return
         item = None if frame.item is None else self.taken(frame.item)
         target = None if frame.object is None else self.target(frame.object, frame.task)
         if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
@@ -107,7 +99,7 @@ class _Grounder:
             raise RefusalError("everything from where? Name the surface or the room", [target.name])
         if goal is None and target is not None and frame.task in (Task.GRASP, Task.FIND):
             goal = self.knowledge.default_place(frame.task, target.name)
-        return Command(
+        yield Command(
             item=item,
             goal=goal,
             goal_at=goal_at,
@@ -120,11 +112,11 @@ class _Grounder:
 
     def target(self, phrase: Phrase, task: Task | None) -> Thing:
         """What a task is done to: a known thing, or a time."""
-        if task is Task.FIND and (person := self._sought(phrase)) is not None:
-            return Thing(person)
         if task is Task.WAIT:
             return Thing(phrase.head.lemma)
-        return self.thing(phrase) if task is Task.FIND else self.taken(phrase)
+        if task is not Task.FIND:
+            return self.taken(phrase)
+        return self.thing(phrase) if (person := self._sought(phrase)) is None else Thing(person)
 
     def taken(self, phrase: Phrase) -> Thing:
         """The known thing or category; "all the things", whatever they are, is everything."""
@@ -140,30 +132,32 @@ class _Grounder:
         if person is not None and len(self.knowledge.people) > 1:
             others = listing((name for name in self.knowledge.people if name != person), last="or")
             raise RefusalError(f"I know nobody by face, and cannot tell {person} from {others}", [phrase.text])
-        if (
-            person is None
-            and len(phrase.content) == 1
-            and not phrase.extra
-            and phrase.head.word in lexicon().any_person
-        ):
+        if person is not None:
+            return person
+        if len(phrase.content) == 1 and not phrase.extra and phrase.head.word in lexicon().any_person:
             return ANYBODY
-        somebody = phrase.person or phrase.stands_for_somebody or phrase.head.word in lexicon().anyone
-        if person is None and phrase.named_person:
+        if phrase.named_person:
             raise self._unknown(Slot.PERSON, (phrase.text,), _spellings(self.knowledge, tuple(self.knowledge.people)))
-        if person is None and somebody and self.knowledge.thing(phrase.text) is None:
-            raise RefusalError(
-                f"I see whether anybody is there, but not whether it is {phrase.spoken!r}", [phrase.text]
-            )
-        return person
+        somebody = phrase.person or phrase.stands_for_somebody or phrase.head.word in lexicon().anyone
+        if somebody and self.knowledge.thing(phrase.text) is None:
+            what = f"I see whether anybody is there, but not whether it is {phrase.spoken!r}"
+            raise RefusalError(what, [phrase.text])
+        return None
 
     def _kept_goal(self, frame: CommandFrame, location: Location, people: bool) -> tuple[str, str | None]:
-        """The frame's goal, whose relation the command keeps."""
+        """The frame's goal, whose relation the command keeps, and where it is to be found when it is a person."""
         looks = frame.task in (Task.GRASP, Task.FIND)
         if looks and location == HERE:
             raise RefusalError("I take and find things on surfaces, and people in rooms: name a place", [HERE.name])
         act = "look" if looks else "go" if frame.item is None else "bring"
         check_relation(act, _KINDS, location)
-        goal, goal_at = self.goal(location)
+        person = None if location == HERE or location.phrase is None else self._person(location.phrase)
+        if location == HERE:
+            goal, goal_at = HERE.name, None
+        elif person is None:
+            goal, goal_at = self.place(location), None
+        else:
+            goal, goal_at = person, None if location.within is None else self.place(location.within)
         if people and goal in self.knowledge.surfaces:
             raise RefusalError(f"I look for people in rooms, and the {goal} is none", [goal])
         own = (goal in self.knowledge.places, goal in self.knowledge.surfaces, True)
@@ -178,19 +172,11 @@ class _Grounder:
                 return Thing(name, attributes)
             if candidates := synonyms_of(form, known):
                 return Thing(self._only(candidates, Slot.THING, form), attributes)
-        for attributes, form in _readings(phrase):
-            if candidates := _ending_with(form, known):
+        for attributes, form in _readings(phrase):  # "bottle" for "water bottle"
+            ending = (name for spelling, name in known.items() if spelling.endswith(f" {form.lower()}"))
+            if candidates := tuple(dict.fromkeys(ending)):
                 return Thing(self._only(candidates, Slot.THING, form), attributes)
         raise self._unknown(Slot.THING, (phrase.text, phrase.singular), known)
-
-    def goal(self, location: Location) -> tuple[str, str | None]:
-        """The goal, and where it is to be found when it is a person."""
-        if location == HERE:
-            return HERE.name, None
-        person = None if location.phrase is None else self._person(location.phrase)
-        if person is None:
-            return self.place(location), None
-        return person, None if location.within is None else self.place(location.within)
 
     def place(self, location: Location) -> str:
         """The known place that the words mean.
@@ -200,9 +186,8 @@ class _Grounder:
         if location.phrase is None:
             raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
         if location.phrase.said_count not in (None, 1) or location.every_room:
-            raise RefusalError(
-                f"I go to one place at a time, not to {location.phrase.spoken!r}", [location.phrase.spoken]
-            )
+            said = location.phrase.spoken
+            raise RefusalError(f"I go to one place at a time, not to {said!r}", [said])
         known = _spellings(self.knowledge, self.knowledge.place_names())
         room = self._room(location)
         candidates = self._any_place(location.phrase) or self._places(location.phrase, room, known)
@@ -214,7 +199,9 @@ class _Grounder:
 
     def _room(self, location: Location) -> str | None:
         """The larger place around it, where one was said ("in the kitchen", "of the kitchen", "bedroom table")."""
-        around = _around(location)
+        extra = () if location.phrase is None else location.phrase.extra
+        around = " ".join(extra[1:]) if extra[:1] == ("of",) else None
+        around = around if location.within is None else location.within.text
         if around is not None:
             known = _spellings(self.knowledge, self.knowledge.place_names())
             found = self.knowledge.place(around) or next(iter(synonyms_of(around, known)), None)
@@ -311,11 +298,6 @@ def _forms(head: Token) -> tuple[str, ...]:
     return tuple(dict.fromkeys((head.word, head.lemma)))
 
 
-def _ending_with(form: str, known: Mapping[str, str]) -> tuple[str, ...]:
-    """The known names that end with this noun ("bottle" for "water bottle")."""
-    return tuple(dict.fromkeys(name for spelling, name in known.items() if spelling.endswith(f" {form.lower()}")))
-
-
 def _spellings(knowledge: Knowledge, names: Sequence[str]) -> Mapping[str, str]:
     """The names by each of their spellings in lower case."""
     return {word.lower(): name for name in names for word in knowledge.spellings([name])}
@@ -325,13 +307,4 @@ def _last(name: str) -> str:
     return name.split()[-1].lower()
 
 
-def _around(location: Location) -> str | None:
-    """The name of the larger place that was said ("in the kitchen", "of the kitchen")."""
-    if location.within is not None:
-        return location.within.text
-    extra = () if location.phrase is None else location.phrase.extra
-    return " ".join(extra[1:]) if extra[:1] == ("of",) else None
-
-
-_INSIDE: Final = frozenset({"in", "at", "inside"})
 _KINDS: Final = ("room", "surface", "person")

@@ -152,9 +152,9 @@ class Steps:
     def _command(self, trace: Trace) -> Trace:
         if self.knowledge is None:
             return replace(trace, commands=tuple(map(spoken_command, trace.frames)))
-        grounded = ground(trace.frames, self.knowledge, self.parser)
-        check_unwanted(trace.unwanted, grounded.commands, self.knowledge)
-        return replace(trace, commands=grounded.commands, notes=(*trace.notes, *grounded.notes))
+        commands, notes = ground(trace.frames, self.knowledge, self.parser)
+        check_unwanted(trace.unwanted, commands, self.knowledge)
+        return replace(trace, commands=commands, notes=(*trace.notes, *notes))
 
 
 def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError:

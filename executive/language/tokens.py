@@ -290,16 +290,6 @@ def _full(match: re.Match[str]) -> str:
     return lexicon().short_forms[match[0].lower()]
 
 
-def _are(match: re.Match[str]) -> str:
-    return "they are " if match[1].lower() == "them" else "it is "
-
-
-def _bring(match: re.Match[str]) -> str:
-    """A bare wish with "please"; it may say for whom."""
-    whom = re.search(r"\b(?:for|to)\b", match[0], re.IGNORECASE)
-    return f"bring {match[0]}" if whom else f"bring me {match[0]}"
-
-
 def _all(match: re.Match[str]) -> str:
     """Each of a kind, one after the other, is all of that kind."""
     what = match["what"].strip()
@@ -313,8 +303,6 @@ def _break(match: re.Match[str]) -> str:
 
 _FUNCTIONS: Final[Mapping[str, Callable[[re.Match[str]], str]]] = {
     "$full": _full,
-    "$are": _are,
-    "$bring": _bring,
     "$all": _all,
     "$break": _break,
 }

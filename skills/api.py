@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, Self, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,27 @@ from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
 from skills.perception.doorway import Doorway
-from skills.quantities import Angle, Coordinate, Delay, Height, Margin, Share
-from skills.robot import Clock, Image, Lease, Pose2D, Robot, Scan
+from skills.robot import Clock, Image, Lease, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 from skills.traffic import NO_TRAFFIC, Traffic
+from skills.world_model import FLOOR as FLOOR
+from skills.world_model import NO_WORK_COUNTER as NO_WORK_COUNTER
+from skills.world_model import Costmap as Costmap
+from skills.world_model import ForgettingCostmap as ForgettingCostmap
+from skills.world_model import FreeSpace as FreeSpace
+from skills.world_model import LayeredView as LayeredView
+from skills.world_model import LeavesOthersOut as LeavesOthersOut
+from skills.world_model import LocalisationEstimate as LocalisationEstimate
+from skills.world_model import Localiser as Localiser
+from skills.world_model import NoWorkCounter as NoWorkCounter
+from skills.world_model import ObjectObservation as ObjectObservation
+from skills.world_model import ParticleView as ParticleView
+from skills.world_model import PlanningError as PlanningError
+from skills.world_model import ReturnsView as ReturnsView
+from skills.world_model import SearchingLocaliser as SearchingLocaliser
+from skills.world_model import Surface as Surface
+from skills.world_model import Thing as Thing
+from skills.world_model import WorkCounter as WorkCounter
 
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform, RotationMatrix
@@ -48,14 +65,6 @@ class Cause(enum.Enum):
     TIMEOUT = "TIMEOUT"  # the robot's clock ran past the limit
     CANCELLED = "CANCELLED"  # somebody stopped it
     ERROR = "ERROR"  # a defect: an exception, a hung verb
-
-
-class PlanningError(Exception):
-    """No plan was found; the message is one plain sentence, `outputs` is what was learnt (see `Failed`)."""
-
-    def __init__(self, message: str, outputs: Mapping[str, Any] | None = None) -> None:
-        super().__init__(message)
-        self.outputs: Mapping[str, Any] = outputs or {}
 
 
 @dataclass(frozen=True)
@@ -91,146 +100,6 @@ class Failed:
 Step = Running | Succeeded | Failed
 
 
-@dataclass(frozen=True)
-class Thing:
-    """A kind of object, perhaps with attributes: "red wrench" is Thing("wrench", ("red",))."""
-
-    name: str
-    attributes: tuple[str, ...] = ()
-
-    def __str__(self) -> str:
-        return " ".join((*self.attributes, self.name))
-
-
-@dataclass(frozen=True)
-class Surface:
-    """A flat top where objects lie: outline in the world frame as (x, y) corners, height above the floor."""
-
-    name: str
-    polygon_W: tuple[tuple[Coordinate, Coordinate], ...]
-    height_m: Height
-
-
-FLOOR: Final = "floor"
-"""The name of the surface on which an object rests that lies on the floor."""
-
-
-@dataclass(frozen=True)
-class ObjectObservation:
-    """An object that was seen: position, size and score.
-
-    `position_W` is the centre of what was seen, in the world frame (m); `size_m` the extents of its points along the
-    axes of a box that is turned by `yaw_rad` about the vertical; `surface` the name of the surface that it rests on.
-    """
-
-    stamp_s: Delay
-    thing: Thing
-    position_W: tuple[Coordinate, Coordinate, Height]
-    size_m: tuple[Margin, Margin, Margin]
-    yaw_rad: Angle
-    score: Share
-    surface: str | None = None
-
-
-@dataclass(frozen=True)
-class LocalisationEstimate:
-    """The robot's pose: X_WO corrects odometry, so that X_WB = X_WO @ X_OB. Covariance over x, y (m), yaw (rad).
-
-    `health` is how far it can be trusted, from 0 to 1: the share of what the robot sees that the map explains at this
-    pose, less what speaks for other poses.
-    """
-
-    stamp_s: float
-    X_WO: RigidTransform
-    covariance: NDArray[np.float64]
-    localised: bool
-    health: float = 1.0
-
-
-class Localiser(Protocol):
-    """Estimates the robot's pose in the world."""
-
-    def estimate(self) -> LocalisationEstimate:
-        """The latest estimate."""
-
-    def update(self, robot: Robot) -> None:
-        """Update from the robot's newest sensor readings; the runner calls this before each tick."""
-
-
-@runtime_checkable
-class SearchingLocaliser(Protocol):
-    """A localiser that can search a whole map for the robot's pose, as the recovery from lost localisation does."""
-
-    def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
-        """The pose where the scan fits, within radius_m of the belief or anywhere (None); None when it fits nowhere.
-
-        Changes nothing, reads nothing that `update` changes, and may take long: call it inside a Worker job.
-        """
-
-    def accept(self, estimate: LocalisationEstimate) -> None:
-        """Use this estimate from now on."""
-
-
-@runtime_checkable
-class ParticleView(Protocol):
-    """A localiser that says where the robot may be, by sample poses."""
-
-    def particles_W(self, most: int) -> NDArray[np.float64]:
-        """Poses (N, 3) of x, y (m) and yaw (rad), `most` at most, evenly chosen by weight."""
-
-
-class FreeSpace(Protocol):
-    """Free space for the body, as planners and controllers ask for it."""
-
-    def clearance_m(self, points_W: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance from each (x, y) row to the nearest obstacle."""
-
-
-class Costmap(FreeSpace, Protocol):
-    """Free space by the surveyed keep-out grid, and by obstacles that the sensors see."""
-
-    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Take in the robot's newest sensor readings; called by the runner before each tick."""
-
-    def add_points(self, points_W: NDArray[np.float64], stamp_s: float) -> None:
-        """Take in (N, 3) points that a camera saw on objects in the way, the floor left out."""
-
-
-@runtime_checkable
-class ForgettingCostmap(Protocol):
-    """A costmap whose layer of seen objects can be cleared; what the survey knows stays."""
-
-    def forget_seen(self, within_W: NDArray[np.float64] | None = None) -> int:
-        """Forget what was seen and not surveyed; the number of cells that were blocked by it.
-
-        With discs, rows of x, y and radius (m, world), only what lies within them.
-        """
-
-
-@runtime_checkable
-class LeavesOthersOut(Protocol):
-    """A costmap or localiser that leaves other robots to those who know where they are."""
-
-    def leave_out(self, discs_W: NDArray[np.float64]) -> None:
-        """From now on take in nothing that is seen within these discs, rows of x, y and radius (m, world)."""
-
-
-@runtime_checkable
-class LayeredView(Protocol):
-    """A costmap that says what is seen and not surveyed."""
-
-    def seen_m(self) -> NDArray[np.float64]:
-        """Centres (N, 2) of the cells that are blocked by something seen that the map does not explain."""
-
-
-@runtime_checkable
-class ReturnsView(Protocol):
-    """A costmap that gives the LiDAR returns of the last scan that nothing surveyed explains."""
-
-    def unexplained(self) -> tuple[float, NDArray[np.float64]]:
-        """The scan's stamp and the returns (N, 3) in the world; of one scan alone, so not confirmed."""
-
-
 class Job(Protocol[ResultT_co]):
     """A job of the Worker."""
 
@@ -258,23 +127,6 @@ class Worker(Protocol):
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
     ) -> Job[ResultT]:
         """Start `work` on what `read` returns. `read` may block, as `Robot.image` may; in lock-step it runs at once."""
-
-
-class WorkCounter(Protocol):
-    """Counts what a run computes, so that a slower path is seen without a clock. Jobs may call it."""
-
-    def count(self, name: str, amount: int = 1) -> None:
-        """Add to the counter of this name: "planner_expansions"."""
-
-
-class NoWorkCounter:
-    """A `WorkCounter` where nobody counts."""
-
-    def count(self, name: str, amount: int = 1) -> None:
-        """Nothing."""
-
-
-NO_WORK_COUNTER: Final = NoWorkCounter()
 
 
 @dataclass(frozen=True)

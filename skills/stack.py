@@ -21,20 +21,19 @@ import numpy as np
 from skills.files.plugins import OURS, PluginDefect, distribution_of, installed_plugins, run_plugin
 from skills.files.schema_errors import first_error, nearest_of
 from skills.quantities import shown
-from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Pose2D
+from skills.robot import FloatArray, GripperCapabilities, Pose2D
 
 if TYPE_CHECKING:
-    from pydrake.math import RigidTransform
-
-    from skills.api import Costmap, Detector, FreeSpace, Localiser, WorkCounter
     from skills.arm.collision import ArmScene
-    from skills.arm.kinematics import ArmModel
+    from skills.arm.motion import ArmPlanner
+    from skills.detection import Detector
     from skills.estimate.grid_map import GridMap
     from skills.grasp.candidates import GraspCandidate, Target
     from skills.grasp.planning import GraspPlan, Surroundings
     from skills.navigate.follower import Drive
     from skills.navigate.footprint import Footprint
     from skills.navigate.path import Path as WayPath
+    from skills.world_model import Costmap, FreeSpace, Localiser, WorkCounter
 
 __all__ = [
     "DEFAULT_FILE",
@@ -130,25 +129,6 @@ class ControllerComponent(Protocol):
 
     def build(self, path: WayPath, footprint: Footprint, *, max_speed_m_s: float) -> LocalController:
         """A controller that follows a path."""
-
-
-class ArmPlanner(Protocol):
-    """Plans and times motions of the arm. A path is an array (K, J) of joint angles."""
-
-    def path(
-        self, scene: ArmScene, q_start_rad: FloatArray, q_goal_rad: FloatArray, rng: np.random.Generator
-    ) -> FloatArray:
-        """A free path from start to goal. Raises PlanningError when an end is blocked or no path was found."""
-
-    def line(
-        self, model: ArmModel, q_start_rad: FloatArray, X_BH_to: RigidTransform, scene: ArmScene | None = None
-    ) -> FloatArray:
-        """Joint path along which the hand moves straight to X_BH_to, with its orientation. Raises PlanningError."""
-
-    def timed(
-        self, path_rad: FloatArray, *, speed_rad_s: float | None = None, scene: ArmScene | None = None
-    ) -> ArmTrajectory:
-        """Time a path from rest to rest, at its usual speed unless said; corners are rounded where `scene` is given."""
 
 
 class GraspPlanner(Protocol):

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
-from skills.api import NO_WORK_COUNTER, WorkCounter
 from skills.arm.clearance import FIXED, Kind, box_gaps, touching
 from skills.arm.kinematics import ArmModel
 from skills.robot import Capabilities, FloatArray
+from skills.world_model import NO_WORK_COUNTER, WorkCounter
 
 if TYPE_CHECKING:
     from pydrake.geometry import GeometryId, SceneGraphInspector

@@ -12,21 +12,40 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import PlanningError
 from skills.arm.collision import AROUND, EDGE_STEP_RAD, ArmScene
 from skills.arm.kinematics import ArmModel
 from skills.quantities import Count, Duration, Length, Tries, Turn, TurnAcceleration, TurnRate
 from skills.robot import ArmTrajectory, FloatArray
+from skills.world_model import PlanningError
 
 _FEWEST_POINTS, _ESCAPE_TRIES = 9, 40
 _ESCAPES, _PARTS_OF_ESCAPE = (1.0, 2.0, 4.0, 8.0), (0.25, 0.5, 0.75)
 _ONE_AT_A_TIME: Final = threading.Lock()
 """OMPL's random generator is one per process, so plans of several threads take turns."""
+
+
+class ArmPlanner(Protocol):
+    """Plans and times motions of the arm. A path is an array (K, J) of joint angles."""
+
+    def path(
+        self, scene: ArmScene, q_start_rad: FloatArray, q_goal_rad: FloatArray, rng: np.random.Generator
+    ) -> FloatArray:
+        """A free path from start to goal. Raises PlanningError when an end is blocked or no path was found."""
+
+    def line(
+        self, model: ArmModel, q_start_rad: FloatArray, X_BH_to: RigidTransform, scene: ArmScene | None = None
+    ) -> FloatArray:
+        """Joint path along which the hand moves straight to X_BH_to, with its orientation. Raises PlanningError."""
+
+    def timed(
+        self, path_rad: FloatArray, *, speed_rad_s: float | None = None, scene: ArmScene | None = None
+    ) -> ArmTrajectory:
+        """Time a path from rest to rest, at its usual speed unless said; corners are rounded where `scene` is given."""
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.api import PlanningError
 from skills.arm.collision import ArmScene
 from skills.arm.kinematics import ArmModel
 from skills.robot import ArmCapabilities, FloatArray
+from skills.world_model import PlanningError
 
 UP_B = np.array([0.0, 0.0, 1.0])
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))

@@ -8,15 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import ObjectObservation, PlanningError
 from skills.arm.collision import ArmScene, Box, gaps_m
 from skills.arm.kinematics import ArmModel
+from skills.arm.motion import ArmPlanner
 from skills.arm.poses import towards_shoulder
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
-from skills.grasp.ports import IN_THE_WAY
 from skills.quantities import Margin, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities
-from skills.stack import ArmPlanner
+from skills.world_model import IN_THE_WAY, ObjectObservation, PlanningError
 
 PREGRASPS_M = (0.12, 0.07, 0.045)
 """How far before the grasp the straight approach begins, the best first."""

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import ClassVar
 
 from skills.api import Cause, ObjectObservation, Skill
 from skills.quantities import Coordinate, Cosine
-
-IN_THE_WAY: Final = "in_the_way"
-"""The output port of what stands in the way, also in a `PlanningError`."""
+from skills.world_model import IN_THE_WAY
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from skills.grasp.close_view import LOOK_HALF_SIDE_M, SURFACE_AROUND_M, CloseVie
 from skills.grasp.in_hand import held_box, turned_in_hand
 from skills.grasp.memory import others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
-from skills.grasp.ports import IN_THE_WAY, GraspInputs, GraspPorts, TriedGrasp
+from skills.grasp.ports import GraspInputs, GraspPorts, TriedGrasp
 from skills.grasp.reach import WIDE, body_heights_m, reach_check, space_about, wide_share
 from skills.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
 from skills.grasp.servo import seen_shift, shifted
@@ -36,6 +36,7 @@ from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect
 from skills.quantities import Force, Length, Margin, Turn
 from skills.robot import ArmTrajectory, FloatArray, GripperKind
 from skills.routine import Routine, SkillFailure
+from skills.world_model import IN_THE_WAY
 
 _CLOSED_RAD = 0.06
 _PER_KG_N, _PER_LEVER_N_M, _MOST_OF_FORCE = 12.0, 400.0, 0.95

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import FreeSpace
 from skills.estimate.compiled import compiled
 from skills.robot import BaseKind, Capabilities, FloatArray, Pose2D
+from skills.world_model import FreeSpace
 
 SAFE_MARGIN_M = 0.06
 """The clearance (m) that a standing or driven pose should keep: map and tracking errors fit into it."""

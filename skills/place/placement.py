@@ -14,9 +14,9 @@ from skills.api import PlanningError, Surface
 from skills.arm.arm_skill import Goal
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel
+from skills.arm.motion import ArmPlanner
 from skills.geometry import inside_polygon
 from skills.robot import FloatArray
-from skills.stack import ArmPlanner
 
 ABOVE_M, LEAST_ABOVE_M, TILT_RAD = 0.10, 0.05, 0.3
 """Height of the object's lowest point over the surface (m) before the hand goes down.

@@ -68,7 +68,11 @@ class Round:
 
 
 class Auction:
-    """Gives each mission to one robot at a time. No mission is given out again once it is over."""
+    """Gives each mission to one robot at a time. No mission is given out again once it is over.
+
+    `waiting` are the missions that no robot has, `robots` those that can be given work, and `under_way` the mission of
+    each robot that has one. Those that are `resting` charge: they bid, and begin nothing meanwhile.
+    """
 
     def __init__(
         self, missions: Iterable[int], robots: Iterable[str], places: PlacesOf = lambda mission: frozenset()
@@ -76,31 +80,11 @@ class Auction:
         """`missions` are those to be done, in the order in which they came; `robots` those that are there; `places`
         those at which a mission has work for one robot at a time."""
         self._places = places
-        self._waiting: list[int] = list(dict.fromkeys(missions))
-        self._robots: list[str] = list(dict.fromkeys(robots))
-        self._under_way: dict[str, int] = {}
-        self._resting: set[str] = set()
+        self.waiting: list[int] = list(dict.fromkeys(missions))
+        self.robots: list[str] = list(dict.fromkeys(robots))
+        self.under_way: dict[str, int] = {}
+        self.resting: set[str] = set()
         self._after: dict[int, int] = {}
-
-    @property
-    def waiting(self) -> tuple[int, ...]:
-        """The missions that no robot has."""
-        return tuple(self._waiting)
-
-    @property
-    def under_way(self) -> Mapping[str, int]:
-        """The mission of each robot that has one."""
-        return dict(self._under_way)
-
-    @property
-    def resting(self) -> frozenset[str]:
-        """The robots that charge: they bid, and begin nothing meanwhile."""
-        return frozenset(self._resting)
-
-    @property
-    def robots(self) -> tuple[str, ...]:
-        """The robots that can be given work."""
-        return tuple(self._robots)
 
     def assign(self, bid: BidOf) -> Round:
         """One round of the auction, in which robots that are busy bid as well; `bid` is asked for each pair.
@@ -109,12 +93,12 @@ class Auction:
         robot is free; so does one with work at a place where a robot is at work. Without a robot that can be given
         work, nothing is refused.
         """
-        free = [robot for robot in self._robots if robot not in self._under_way and robot not in self._resting]
+        free = [robot for robot in self.robots if robot not in self.under_way and robot not in self.resting]
         taken = self._taken if free else frozenset[str]()
-        up = [each for each in self._waiting if free and each not in self._after and not taken & self._places(each)]
+        up = [each for each in self.waiting if free and each not in self._after and not taken & self._places(each)]
         if not up:
             return Round((), {})
-        bids = {mission: [bid(mission, robot) for robot in self._robots] for mission in up}
+        bids = {mission: [bid(mission, robot) for robot in self.robots] for mission in up}
         awards = award(one for each in bids.values() for one in each)
         given = {each.mission for each in awards}
         refused = {mission: _why(each) for mission, each in bids.items() if mission not in given}
@@ -123,21 +107,21 @@ class Auction:
         for each in next_up:
             if not each.charges and not self._taken & self._places(each.mission):
                 begun.append(each)
-                self._under_way[each.robot] = each.mission
+                self.under_way[each.robot] = each.mission
         charging = [each.robot for each in next_up if each.charges]
-        self._resting.update(charging)
+        self.resting.update(charging)
         gone = {each.mission for each in begun} | set(refused)
-        self._waiting = [mission for mission in self._waiting if mission not in gone]
+        self.waiting = [mission for mission in self.waiting if mission not in gone]
         return Round(begun, refused, charging)
 
     @property
     def _taken(self) -> frozenset[str]:
         """The places where robots are at work."""
-        return frozenset[str]().union(*map(self._places, self._under_way.values()))
+        return frozenset[str]().union(*map(self._places, self.under_way.values()))
 
     def add(self, mission: int, *, after: int | None = None) -> None:
         """One more mission, which is put up when the one that it comes `after` has been done."""
-        self._waiting.append(mission)
+        self.waiting.append(mission)
         if after is not None:
             self._after[mission] = after
 
@@ -148,31 +132,19 @@ class Auction:
     def drop(self, mission: int) -> Sequence[int]:
         """A mission was not done: those that come after it are not waiting any more; their numbers."""
         dropped = [each for each, before in self._after.items() if before == mission]
-        self._waiting = [each for each in self._waiting if each not in dropped]
+        self.waiting = [each for each in self.waiting if each not in dropped]
         return [*dropped, *(later for each in dropped for later in self.drop(each))]
-
-    def over(self, robot: str) -> int:
-        """The robot's mission has come to its end; its number. Raises KeyError: it has none."""
-        return self._under_way.pop(robot)
 
     def hand_back(self, robot: str) -> int:
         """The robot's mission waits for another robot, before all others; its number. Raises KeyError: it has none."""
-        mission = self._under_way.pop(robot)
-        self._waiting.insert(0, mission)
+        mission = self.under_way.pop(robot)
+        self.waiting.insert(0, mission)
         return mission
-
-    def rest(self, robot: str) -> None:
-        """The robot charges from now on."""
-        self._resting.add(robot)
-
-    def wake(self, robot: str) -> None:
-        """The robot charges no more."""
-        self._resting.discard(robot)
 
     def lose(self, robot: str) -> None:
         """The robot can be given no work any more."""
-        self.wake(robot)
-        self._robots = [each for each in self._robots if each != robot]
+        self.resting.discard(robot)
+        self.robots = [each for each in self.robots if each != robot]
 
 
 def _why(bids: Sequence[Bid]) -> str:

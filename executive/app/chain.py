@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from executive.app.auction import Bid
 from executive.app.fleet import FleetMission, is_plain, with_commands
 from executive.app.prepared import Prepared
 from executive.words.command import Command, Task
-from executive.words.knowledge import Knowledge, SurfaceFacts
+from executive.words.knowledge import SurfaceFacts
 from skills.files.errors import InputError
 
 
@@ -81,52 +82,35 @@ def chained(mission: FleetMission, bid: BidOn, takes_from: TakesFrom) -> Chained
     prepared = next(iter(mission.options.values()))
     if len(mission.options) < 2 or not is_plain(prepared.tree):
         return None
-    parts = _Parts(mission, bid, takes_from)
-    found = [chain for split in splits(prepared.tree.commands, _tables(prepared.knowledge)) if (chain := parts(split))]
-    best = min(found, key=lambda chain: chain.ends_s, default=None)
+
+    def bids(commands: tuple[Command, ...], robots: Iterable[str]) -> Sequence[Bid]:
+        part = replace(mission, options=_options(mission, commands))
+        found = [bid(part, name) for name in robots if name in part.options]
+        return [one for one in found if not one.problems]
+
+    able: dict[tuple[Command, ...], tuple[str, ...]] = {}
+    chains: list[Chain | None] = []
+    for split in splits(prepared.tree.commands, prepared.knowledge.surfaces):
+        begins = split.first if split.table is None else split.first[:-1]
+        if begins not in able:  # what a robot could not even begin is asked once for all tables
+            able[begins] = tuple(one.robot for one in bids(begins, mission.options))
+        if first := bids(split.first, able[begins]):
+            second = bids(split.second, mission.options)
+            if (table := split.table) is not None:
+                surfaces = {name: each.knowledge.surfaces for name, each in mission.options.items()}
+                second = [one for one in second if takes_from(one.robot, surfaces[one.robot][table])]
+            chains.append(soonest(split, first, second))
+    best = min(filter(None, chains), key=lambda chain: chain.ends_s, default=None)
     if best is None:
         return None
-    split = best.split
-    return ChainedMission(parts.options(split.first), parts.options(split.second), split.table)
+    first_part, second_part = (_options(mission, commands) for commands in (best.split.first, best.split.second))
+    return ChainedMission(first_part, second_part, best.split.table)
 
 
-def _tables(knowledge: Knowledge) -> Sequence[str]:
-    return tuple(knowledge.surfaces)
-
-
-class _Parts:
-    """Asks for bids on parts of one mission; what a robot could not even begin is asked once for all tables."""
-
-    def __init__(self, mission: FleetMission, bid: BidOn, takes_from: TakesFrom) -> None:
-        self._mission, self._bid, self._takes_from = mission, bid, takes_from
-        self._able: dict[tuple[Command, ...], tuple[str, ...]] = {}
-
-    def __call__(self, split: Split) -> Chain | None:
-        """The chain for a split that is done first."""
-        begins = split.first if split.table is None else split.first[:-1]
-        if begins not in self._able:
-            self._able[begins] = tuple(bid.robot for bid in self._bids(begins, self._mission.options))
-        first = self._bids(split.first, self._able[begins])
-        if not first:
-            return None
-        second = self._bids(split.second, self._mission.options)
-        return soonest(split, first, [each for each in second if self._takes(each.robot, split.table)])
-
-    def _takes(self, robot: str, table: str | None) -> bool:
-        surfaces = self._mission.options[robot].knowledge.surfaces
-        return table is None or self._takes_from(robot, surfaces[table])
-
-    def options(self, commands: tuple[Command, ...]) -> Mapping[str, Prepared]:
-        """What each robot would do; one that has no way to do it at all is left out."""
-        options: dict[str, Prepared] = {}
-        for name, prepared in self._mission.options.items():
-            try:
-                options[name] = with_commands(prepared, commands)
-            except InputError:
-                continue
-        return options
-
-    def _bids(self, commands: tuple[Command, ...], robots: Iterable[str]) -> Sequence[Bid]:
-        part = replace(self._mission, options=self.options(commands))
-        bids = [self._bid(part, name) for name in robots if name in part.options]
-        return [bid for bid in bids if not bid.problems]
+def _options(mission: FleetMission, commands: tuple[Command, ...]) -> Mapping[str, Prepared]:
+    """What each robot would do of commands; one that has no way to do them at all is left out."""
+    options: dict[str, Prepared] = {}
+    for name, prepared in mission.options.items():
+        with suppress(InputError):
+            options[name] = with_commands(prepared, commands)
+    return options

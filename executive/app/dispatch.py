@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from executive.app.auction import Auction, Bid
+from executive.app.auction import Auction
 from executive.app.backend import Backend
 from executive.app.chain import chained
 from executive.app.fleet import (
@@ -39,7 +39,7 @@ from executive.run.visitor import Assigner, MissionEnd, Progress, RunEntry
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.node_view import node_view
-from executive.words.knowledge import BatteryFacts, SurfaceFacts
+from executive.words.knowledge import BatteryFacts
 from skills.files.errors import listing
 from skills.robot import Pose2D
 
@@ -69,7 +69,7 @@ class Dispatch(Assigner):
     battery: BatteryFacts = field(default_factory=BatteryFacts)
     tell: Callable[[str], None] = field(default=silence)
     log: EventLog | None = None
-    offers: Callable[[Mapping[str, FleetRobot], BatteryFacts, Callable[[], float]], Offers] = field(default=Offers)
+    offers: Callable[[Mapping[str, FleetRobot], BatteryFacts, Callable[[], float], Auction], Offers] = Offers
 
     def __post_init__(self) -> None:
         self._given = GivenMissions(self.store)
@@ -82,7 +82,7 @@ class Dispatch(Assigner):
             name: FleetRobot(placed, placed.start, dock=self.docks.get(name), faults=tuple(self.faults.get(name, ())))
             for name, placed in self.robots.items()
         }
-        self._offers = self.offers(self._robots, self.battery, self.backend.clock.now)
+        self._offers = self.offers(self._robots, self.battery, self.backend.clock.now, self._auction)
         self._gone: dict[str, str] = {}
         self._recalled: set[str] = set()
         self._to_dock: list[str] = []
@@ -94,16 +94,11 @@ class Dispatch(Assigner):
         """The run is ended from outside: what robots have under way stays in the queue; from signal handlers."""
         self._stopped = reason
 
-    @property
-    def waiting(self) -> tuple[int, ...]:
-        """The missions that no robot has."""
-        return self._auction.waiting
-
     def assign(self) -> Sequence[RunEntry]:
         """The missions that begin now."""
         entries: list[RunEntry] = []
         self._let_follow({})
-        given = self._auction.assign(self._bid)
+        given = self._auction.assign(lambda number, name: self._offers.known(self.missions[number], name))
         refused = {number: why for number, why in given.refused.items() if not self._split(number)}
         for number, why in refused.items():
             self._finish(number, MissionState.FAILURE, why)
@@ -127,7 +122,7 @@ class Dispatch(Assigner):
     def _split(self, number: int) -> bool:
         """Have a mission done in two parts, as no robot can do it alone; whether two can."""
         mission = self.missions[number]
-        chain = None if number in self._parts else chained(mission, self._offer, self._takes_from)
+        chain = None if number in self._parts else chained(mission, self._offers.new, self._offers.takes_from)
         if chain is None:
             return False
         names = [f"{mission.stored.request.name}, part {part} of 2" for part in (1, 2)]
@@ -232,7 +227,7 @@ class Dispatch(Assigner):
             end.result.outcome is not Outcome.FAILURE
             or mission.tried
             or not (clear and is_plain(mission.options[name].tree))
-            or all(self._offer(again, other).problems for other in others)
+            or all(self._offers.new(again, other).problems for other in others)
         ):
             return False
         self.missions[number] = again
@@ -247,7 +242,7 @@ class Dispatch(Assigner):
 
     def _leave_for_dock(self, name: str) -> None:
         """A robot is to go to its dock."""
-        self._auction.rest(name)
+        self._auction.resting.add(name)
         self._to_dock.append(name)
 
     def _look(self, robot: FleetRobot, end: MissionEnd) -> str | None:
@@ -269,7 +264,7 @@ class Dispatch(Assigner):
 
     def _charged(self, name: str, result: RobotResult, *, recalled: bool) -> None:
         """A robot's way to its dock is over. Where it could not charge, it is not sent there again."""
-        self._auction.wake(name)
+        self._auction.resting.discard(name)
         robot = self._robots[name]
         if result.outcome is not Outcome.SUCCESS and not recalled:
             robot.dock = None
@@ -278,7 +273,7 @@ class Dispatch(Assigner):
     def close(self) -> None:
         """What no robot has at the end stays in the queue; what was handed back is told as failed."""
         handed_back = self._given.all()
-        for number in self.waiting if self._stopped is None else ():
+        for number in self._auction.waiting if self._stopped is None else ():
             given = handed_back.get(number)
             if given is not None and given.robot is not None:
                 why = {**self._gone, **self.missions[number].tried}
@@ -292,19 +287,6 @@ class Dispatch(Assigner):
     def _surfaces(self, number: int) -> frozenset[str]:
         """Where a mission puts something down, or takes it from by name."""
         return surfaces_of(next(iter(self.missions[number].options.values())))
-
-    def _bid(self, mission: int, name: str) -> Bid:
-        resting = name in self._auction.resting
-        busy = resting or name in self._auction.under_way
-        return self._offers.known(self.missions[mission], name, busy=busy, resting=resting)
-
-    def _offer(self, wanted: FleetMission, name: str) -> Bid:
-        resting = name in self._auction.resting
-        busy = resting or name in self._auction.under_way
-        return self._offers.new(wanted, name, busy=busy, resting=resting)
-
-    def _takes_from(self, name: str, table: SurfaceFacts) -> bool:
-        return self._offers.takes_from(name, table)
 
     def _dock_entry(self, name: str) -> RunEntry:
         """A robot goes to its dock and charges."""
@@ -375,7 +357,7 @@ class Dispatch(Assigner):
 
     def _over(self, name: str, result: RobotResult) -> None:
         """A mission has come to its end."""
-        number = self._auction.over(name)
+        number = self._auction.under_way.pop(name)
         mission = self.missions[number]
         tree, since_s = mission.options[name].tree, mission.since_s or 0.0
         report = self.backend.judge(tree, result, before=mission.shares, since_s=since_s)

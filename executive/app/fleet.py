@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from py_trees.common import Status
 
-from executive.app.auction import Bid
+from executive.app.auction import Auction, Bid
 from executive.app.feasibility import check_prepared, route_planner_of
 from executive.app.goal_conditions import Share
 from executive.app.prepare import Setting, prepare_alone
@@ -325,33 +325,38 @@ class Offers:
         robots: Mapping[str, FleetRobot],
         battery: BatteryFacts,
         now: Callable[[], float],
+        auction: Auction,
         bid: Callable[[FleetMission, str, RobotNow], Bid] = bid_for,
     ) -> None:
         """`now` is the robots' clock (s); `bid` is what a robot offers, but for when it is free."""
-        self._robots, self._battery, self._now, self._bid = robots, battery, now, bid
+        self._robots, self._battery, self._now, self._auction, self._bid = robots, battery, now, auction, bid
         self._known: dict[tuple[int, str, int, Pose2D, float, bool], Bid] = {}
 
-    def known(self, wanted: FleetMission, name: str, *, busy: bool, resting: bool) -> Bid:
+    def known(self, wanted: FleetMission, name: str) -> Bid:
         """What a robot offers for a mission of the queue."""
         robot = self._robots[name]
         if (tried := wanted.tried.get(name)) is not None:
             return Bid(wanted.stored.id, name, 0.0, 0.0, problems=(tried,))
-        key = (wanted.stored.id, name, wanted.done, robot.pose, robot.charge, resting)
+        key = (wanted.stored.id, name, wanted.done, robot.pose, robot.charge, name in self._auction.resting)
         if key not in self._known:
-            self._known[key] = self.new(wanted, name, busy=busy, resting=resting)
-        return replace(self._known[key], ready_s=robot.ready_s(self._now(), busy=busy))
+            self._known[key] = self.new(wanted, name)
+        return replace(self._known[key], ready_s=self._ready_s(name))
 
-    def new(self, wanted: FleetMission, name: str, *, busy: bool, resting: bool) -> Bid:
-        """What a robot offers from where it is free next; one that is `resting` from its dock, and is `busy` as one is
-        that has a mission."""
+    def new(self, wanted: FleetMission, name: str) -> Bid:
+        """What a robot offers from where it is free next; one that charges from its dock."""
         robot = self._robots[name]
         if robot.planner is None:
             some = wanted.options.get(name, next(iter(wanted.options.values())))
             robot.planner = route_planner_of(some.world, robot.placed, kept=False)
         now = RobotNow(robot.pose, robot.charge, self._battery.low, robot.planner, robot.dock)
-        if resting and robot.dock is not None:
+        if name in self._auction.resting and robot.dock is not None:
             now = replace(now, pose=robot.dock.world.dock or robot.pose, charge=self._battery.charged)
-        return replace(self._bid(wanted, name, now), ready_s=robot.ready_s(self._now(), busy=busy))
+        return replace(self._bid(wanted, name, now), ready_s=self._ready_s(name))
+
+    def _ready_s(self, name: str) -> float:
+        """In how long a robot is free (s); one that charges is as busy as one that has a mission."""
+        busy = name in self._auction.resting or name in self._auction.under_way
+        return self._robots[name].ready_s(self._now(), busy=busy)
 
     def takes_from(self, name: str, table: SurfaceFacts) -> bool:
         """Whether a robot that has offered something has a way to where it reaches what another one puts on a table.

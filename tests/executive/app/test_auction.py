@@ -77,7 +77,7 @@ def test_no_mission_is_given_to_two_robots_and_none_is_lost(missions, robots, du
         if busy and how != "stays":
             robot = busy[number % len(busy)]
             if how == "over":
-                over.append(dispatcher.over(robot))
+                over.append(dispatcher.under_way.pop(robot))
             else:
                 handed_back[dispatcher.hand_back(robot)] += 1
                 dispatcher.lose(robot)
@@ -91,7 +91,7 @@ def test_a_mission_that_is_handed_back_comes_before_the_others():
     dispatcher.lose("Alice")
     assert dispatcher.hand_back("Alice") == 1
     assert not dispatcher.assign(bid).begun  # Bob is busy
-    assert dispatcher.over("Bob") == 2
+    assert dispatcher.under_way.pop("Bob") == 2
     assert [(each.mission, each.robot) for each in dispatcher.assign(bid).begun] == [(1, "Bob")]
 
 
@@ -99,14 +99,14 @@ def test_what_no_robot_can_do_is_refused_with_the_reason_of_each():
     dispatcher = Auction([1], ["Alice", "Bob"])
     turn = dispatcher.assign(bid_of([10.0], {(1, "Alice"), (1, "Bob")}))
     assert turn.refused == {1: "no robot can do it: Alice: out of reach; Bob: out of reach"}
-    assert (dispatcher.waiting, dict(dispatcher.under_way)) == ((), {})
+    assert (dispatcher.waiting, dict(dispatcher.under_way)) == ([], {})
 
 
 def test_without_a_robot_nothing_is_refused():
     dispatcher = Auction([1], ["Alice"])
     dispatcher.lose("Alice")
     assert dispatcher.assign(bid_of([10.0])).refused == {}
-    assert dispatcher.waiting == (1,)
+    assert dispatcher.waiting == [1]
 
 
 def test_a_mission_that_goes_to_a_robot_that_has_to_charge_waits_until_it_has():
@@ -116,9 +116,9 @@ def test_a_mission_that_goes_to_a_robot_that_has_to_charge_waits_until_it_has():
         return Bid(mission, robot, 0.0, 10.0 if robot == "Alice" else 99.0, charges=robot == "Alice")
 
     turn = dispatcher.assign(bid)
-    assert (turn.begun, turn.charging, dispatcher.waiting) == ([], ["Alice"], (1,))
+    assert (turn.begun, turn.charging, dispatcher.waiting) == ([], ["Alice"], [1])
     assert not dispatcher.assign(bid).begun  # Bob is free, and Alice is still done before him
-    dispatcher.wake("Alice")
+    dispatcher.resting.discard("Alice")
     charged = dispatcher.assign(lambda mission, robot: Bid(mission, robot, 0.0, 10.0))
     assert [(each.mission, each.robot) for each in charged.begun] == [(1, "Alice")]
 
@@ -128,9 +128,9 @@ def test_a_mission_with_work_where_a_robot_is_at_work_waits_while_others_begin()
     dispatcher = Auction([1, 2, 3], NAMES[:2], lambda mission: frozenset(places[mission]))
     bid = bid_of([10.0], {(3, "Alice")})
     assert [(each.mission, each.robot) for each in begun_now(dispatcher, bid)] == [(1, "Alice"), (3, "Bob")]
-    dispatcher.over("Alice")
+    dispatcher.under_way.pop("Alice")
     assert not begun_now(dispatcher, bid)  # the shelf is still taken
-    dispatcher.over("Bob")
+    dispatcher.under_way.pop("Bob")
     assert [(each.mission, each.robot) for each in begun_now(dispatcher, bid)] == [(2, "Alice")]
 
 

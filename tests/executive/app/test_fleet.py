@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from executive.app.auction import Auction
 from executive.app.fleet import FleetMission, FleetRobot, Offers, RobotNow, bid_for
 from executive.app.prepare import prepare
 from executive.mission.request import Request
@@ -97,7 +98,7 @@ class EastOf:
 @pytest.mark.parametrize(("x_m", "reached"), [(9.5, True), (10.6, False)])
 def test_a_robot_takes_over_only_what_it_can_come_near_to(clock, x_m, reached):
     robot = FleetRobot(SimpleNamespace(kind="spot"), Pose2D(11.0, 2.0, 0.0), planner=EastOf(x_m))
-    offers = Offers({"Bob": robot}, BatteryFacts(), clock.now)
+    offers = Offers({"Bob": robot}, BatteryFacts(), clock.now, Auction((), ["Bob"]))
     assert offers.takes_from("Bob", TABLE) is reached
 
 

@@ -25,8 +25,8 @@ LINES = {
     "executive/conversation": 613,
     "executive/view": 1411,
     "executive/testing": 821,
-    "executive/app": 7714,
-    "executive/cli": 3911,
+    "executive/app": 7626,
+    "executive/cli": 3912,
     "skills": 25259,
     "plant": 12222,
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import gc
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +20,7 @@ from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.report import RefereeReport, RobotReport, RunReport
 from executive.app.report_file import EndedTree, with_findings, write_report
-from executive.app.signals import cancelled_by_signals
+from executive.app.signals import ended_by_signals
 from executive.app.simulated import SimulatedBackend, compile_first
 from executive.mission.request import Request
 from executive.record.announce import announce, map_message
@@ -156,14 +156,15 @@ def run_watched(
     spare: Sequence[RunEntry],
 ) -> RunResult:
     """Run missions, or all that an assigner gives, on a backend's clock; signals of the process cancel them."""
-    with cancelled_by_signals(control or Control(pace=None)) as controlled, LockStepWorker(backend.clock) as worker:
+    control = control or Control(pace=None)
+    with ended_by_signals(control.cancel), LockStepWorker(backend.clock) as worker:
         return run(
             missions,
             clock=backend.clock,
             worker=worker,
             visitors=visitors,
             settings=settings,
-            control=controlled,
+            control=control,
             spare=spare,
         )
 
@@ -230,23 +231,32 @@ def mission_events(log: Path) -> tuple[Event, ...]:
 def _judged(
     prepared: Prepared, backend: Backend, result: RunResult, log: EventLog
 ) -> tuple[Finished, Sequence[EndedTree]]:
-    """The report of a run with what the referee saw, and the tree of each robot as it ended."""
+    """The report of a run with what the referee saw, and the tree of each robot as it ended.
+
+    What the others moved in the same run was moved by a robot's mission, too.
+    """
     trees = {each.tree.robot_name: result.trees.get(each.tree.robot_name, each.tree) for each in prepared.all}
     shares = {each.robot_name: Share(trees[each.robot_name], each, 0) for each in result.robots}
-    robots = {name: _robot_report(name, shares, backend, prepared) for name in shares}
+    robots: dict[str, RobotReport] = {}
+    for name, own in shares.items():
+        seen = backend.judge(own.tree, own.result, before=[each for each in shares.values() if each is not own])
+        robots[name] = robot_report(own.result, own.tree, prepared.robots[name].kind, seen)
     worst = min(robots, key=lambda name: (robots[name].achieved, name != result.worst.robot_name))
-    views = {each.robot_name: node_view(trees[each.robot_name].root, each.states) for each in result.robots}
-    ended = [EndedTree(trees[name], view, robots[name]) for name, view in views.items()]
-    report = _report(prepared, robots[worst], result, log=str(log.path))
-    return Finished(replace(report, robots=robots) if prepared.request.robots else report, views[worst]), ended
-
-
-def _robot_report(name: str, shares: Mapping[str, Share], backend: Backend, prepared: Prepared) -> RobotReport:
-    """What one robot did; what the others moved in the same run was moved by the mission, too."""
-    own = shares[name]
-    others = [share for other, share in shares.items() if other != name]
-    seen = backend.judge(own.tree, own.result, before=others)
-    return robot_report(own.result, own.tree, prepared.robots[name].kind, seen)
+    views = {name: node_view(trees[name].root, each.result.states) for name, each in shares.items()}
+    ending = {name: value for name, value in vars(robots[worst]).items() if name != "kind"}
+    report = RunReport(
+        **ending,
+        world=prepared.world.name,
+        seed=prepared.request.seed,
+        sim_time_s=round(result.sim_time_s, 3),
+        wall_time_s=round(result.wall_time_s, 3),
+        real_time_factor=round(result.sim_time_s / max(result.wall_time_s, 1e-6), 2),
+        ticks=result.ticks,
+        log=str(log.path),
+        scenario=(*prepared.request.scenario.lines(), *prepared.request.variation.lines()),
+        robots=robots if prepared.request.robots else {},
+    )
+    return Finished(report, views[worst]), [EndedTree(trees[name], view, robots[name]) for name, view in views.items()]
 
 
 def robot_report(ended: RobotResult, tree: CompiledTree, kind: str, seen: RefereeReport | None) -> RobotReport:
@@ -258,24 +268,6 @@ def robot_report(ended: RobotResult, tree: CompiledTree, kind: str, seen: Refere
         message=ended.message,
         referee=seen,
         commands=tuple(map(str, tree.commands)),
-    )
-
-
-def _report(prepared: Prepared, worst: RobotReport, result: RunResult, *, log: str) -> RunReport:
-    return RunReport(
-        outcome=worst.outcome,
-        cause=worst.cause,
-        message=worst.message,
-        referee=worst.referee,
-        commands=worst.commands,
-        world=prepared.world.name,
-        seed=prepared.request.seed,
-        sim_time_s=round(result.sim_time_s, 3),
-        wall_time_s=round(result.wall_time_s, 3),
-        real_time_factor=round(result.sim_time_s / max(result.wall_time_s, 1e-6), 2),
-        ticks=result.ticks,
-        log=log,
-        scenario=(*prepared.request.scenario.lines(), *prepared.request.variation.lines()),
     )
 
 

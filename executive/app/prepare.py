@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from executive.app.mission_files import mission_file
 from executive.app.prepared import Prepared, together
-from executive.app.robots import PlacedRobot, knowledge_for, only_robot, placed_robots
-from executive.app.worlds import knowledge_of, open_world, refuse_blocked, with_map
+from executive.app.robots import PlacedRobot, knowledge_for, only_robot, placed_robots, refuse_blocked
+from executive.app.worlds import knowledge_of, open_world, with_map
 from executive.language.parser import load_parser
 from executive.language.questions import Answerer, ClarifyingQuestion, answer_by
 from executive.mission.load import for_robot, import_folders, load_mission, overridden, routes_in

@@ -75,16 +75,13 @@ def placed_robots(world: World, knowledge: Knowledge, configs: Sequence[RobotCon
     Raises:
         InputError: two overlap, a robot stands in something, a dock is no place, or there is no room.
     """
-    from skills.estimate.grid_map import load_grid_map
-
-    free = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     placed: dict[str, PlacedRobot] = {}
     told = {each.name: each.start or (world.start if each is configs[0] else None) for each in configs}
     for each in sorted(configs, key=lambda one: told[one.name] is None):
         try:
-            start = told[each.name] or _free_start(free, world, each.kind, placed.values())
+            start = told[each.name] or _free_start(world, each.kind, placed.values())
             if each.start is not None:
-                _refuse_overlap(each, each.start, placed.values(), free)
+                _refuse_overlap(each, each.start, placed.values(), world)
             dock = _dock(each, knowledge) or (world.dock if each is configs[0] else start)
         except InputError as error:
             raise InputError.at(each.source, error.message, hint=error.hint) from error
@@ -118,14 +115,14 @@ def _dock(robot: RobotConfig, knowledge: Knowledge) -> Pose2D | None:
     return Pose2D(pose.x, pose.y, pose.yaw)
 
 
-def _free_start(free: GridMap, world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2D:
+def _free_start(world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2D:
     """The free pose nearest to the world's start, clear of the robots that stand already and of where people may be.
 
     Raises InputError: there is none.
     """
     from plant.worlds.placement import people_stand_W
 
-    reach_m = _reach_m(kind)
+    reach_m, free = _reach_m(kind), _free_ground(world)
     places = free.centres(np.argwhere(free.distance > max(TURNING_M, reach_m)))
     for other in placed:
         away_m = np.hypot(*(places - [other.start.x_m, other.start.y_m]).T)
@@ -138,7 +135,7 @@ def _free_start(free: GridMap, world: World, kind: str, placed: Iterable[PlacedR
     return Pose2D(float(x), float(y), world.start.yaw_rad)
 
 
-def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRobot], free: GridMap) -> None:
+def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRobot], world: World) -> None:
     """Raise InputError where a robot would stand in another, or in something."""
     own = _discs(robot.kind, start)
     for other in placed:
@@ -146,9 +143,23 @@ def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRo
         apart = np.hypot(*(own[:, None, :2] - theirs[None, :, :2]).transpose(2, 0, 1))
         if np.any(apart < own[:, None, 2] + theirs[None, :, 2]):
             raise InputError(f"the starts of {robot.name} and {other.name} overlap", hint="put them further apart")
-    if float(np.min(free.distance_m(own[:, :2]) - own[:, 2])) < 0.0:
-        there = f"({start.x_m:g}, {start.y_m:g}, {start.yaw_rad:g})"
-        raise InputError(f"at the start {there} {robot.name} stands in something", hint="give a free pose")
+    refuse_blocked(world, start, robot.name, robot.kind)
+
+
+def refuse_blocked(world: World, pose: Pose2D, name: str = "the robot", kind: str = DEFAULT_KIND) -> None:
+    """Raise InputError unless a robot's body is free at a pose on the world's surveyed map, which must be there."""
+    discs = _discs(kind, pose)
+    if float(np.min(_free_ground(world).distance_m(discs[:, :2]) - discs[:, 2])) < 0.0:
+        there = f"({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g})"
+        hint = "give a free pose; `errand world show` draws the world"
+        raise InputError(f"at the start {there} {name} stands in something or outside of {world.name}", hint=hint)
+
+
+def _free_ground(world: World) -> GridMap:
+    """The world's surveyed map, in which unknown ground is none to stand on."""
+    from skills.estimate.grid_map import load_grid_map
+
+    return load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
 
 
 def _discs(kind: str, pose: Pose2D) -> FloatArray:
@@ -184,9 +195,8 @@ def stand_at(world: World, start: Start, seed: int) -> Pose2D:
     if isinstance(start, Pose2D):
         return start
     from plant.worlds.placement import place_people
-    from skills.estimate.grid_map import load_grid_map
 
-    keepout = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
+    keepout = _free_ground(world)
     places = keepout.centres(np.argwhere(keepout.distance > TURNING_M))
     for person in place_people(world, seed):
         places = places[np.hypot(*(places - person.X_WO.translation()[:2]).T) > FROM_PEOPLE_M]

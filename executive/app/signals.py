@@ -10,19 +10,10 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Final
 
-from executive.run.control import Control
-
 _OUTPUTS: Final = (1, 2)
 _REASON: Final = "cancelled by {}"
 HUNG_UP: Final = _REASON.format(signal.SIGHUP.name)
 """The reason of a run that ended since its terminal was closed."""
-
-
-@contextmanager
-def cancelled_by_signals(control: Control) -> Iterator[Control]:
-    """The control, which Ctrl-C, a polite kill and closing the terminal cancel, as `ended_by_signals` says."""
-    with ended_by_signals(control.cancel):
-        yield control
 
 
 @contextmanager

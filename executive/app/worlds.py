@@ -5,14 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from executive.words.knowledge import Knowledge, load_knowledge
 from plant.worlds.world import WORLDS_FOLDER, World, WorldError, known_worlds, load_world
 from skills.files.errors import InputError, known_names, suggestion
-
-if TYPE_CHECKING:
-    from skills.robot import Pose2D
 
 
 def open_world(name: str) -> World:
@@ -46,26 +42,6 @@ def _try(directives: Path | None, models: tuple[Path, ...]) -> None:
     from plant.diagram import try_geometry
 
     try_geometry(directives, models)
-
-
-def refuse_blocked(world: World, pose: Pose2D) -> None:
-    """Raise InputError unless the robot's body is free at a pose on the world's surveyed map, which must be there."""
-    import math
-
-    import numpy as np
-
-    from plant.spot.capabilities import spot_capabilities
-    from skills.estimate.grid_map import load_grid_map
-    from skills.navigate.footprint import Footprint
-
-    grid = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
-    discs = Footprint.of(spot_capabilities()).discs
-    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-    middles = discs[:, :2] @ np.array([[c, s], [-s, c]]) + [pose.x_m, pose.y_m]
-    if float(np.min(grid.distance_m(middles) - discs[:, 2])) < 0.0:
-        there = f"({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g})"
-        hint = "give a free pose; `errand world show` draws the world"
-        raise InputError(f"at the start {there} the robot stands in something or outside of {world.name}", hint=hint)
 
 
 def with_map(world: World, folder: Path) -> World:

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import typer
 
-from executive.app.signals import cancelled_by_signals
+from executive.app.signals import ended_by_signals
 from executive.app.worlds import open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.options import AS_JSON
@@ -78,7 +78,8 @@ def build(
 
     compile_first()
     building = _Building(opened, seed, mapper, points, out, console)
-    with cancelled_by_signals(Control(pace=None)) as control:
+    control = Control(pace=None)
+    with ended_by_signals(control.cancel):
         ended = building.drive(most_s, lambda: control.poll().cancel is not None)
     result = building.result()
     if ended is not None:

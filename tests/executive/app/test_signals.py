@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.app.signals import cancelled_by_signals, ended_by_signals, interrupted_by_hang_up
+from executive.app.signals import ended_by_signals, interrupted_by_hang_up
 from executive.record.history import read_events
 from executive.run.control import Control
 from executive.store.missions import MissionState, MissionStore
@@ -63,7 +63,7 @@ RUN = """
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_cancels_and_the_handlers_are_put_back(number):
     control, before = Control(pace=None), signal.getsignal(number)
-    with cancelled_by_signals(control):
+    with ended_by_signals(control.cancel):
         signal.raise_signal(number)
     assert control.poll().cancel == f"cancelled by {signal.Signals(number).name}"
     assert signal.getsignal(number) == before
@@ -72,7 +72,7 @@ def test_a_signal_cancels_and_the_handlers_are_put_back(number):
 def test_what_ends_by_a_signal_within_something_that_does_ends_both():
     reasons, control = [], Control(pace=None)
     with ended_by_signals(reasons.append):
-        with cancelled_by_signals(control):
+        with ended_by_signals(control.cancel):
             signal.raise_signal(signal.SIGTERM)
         assert (control.poll().cancel, reasons) == ("cancelled by SIGTERM", ["cancelled by SIGTERM"])
         with pytest.raises(KeyboardInterrupt):
@@ -80,7 +80,7 @@ def test_what_ends_by_a_signal_within_something_that_does_ends_both():
 
 
 def test_a_second_ctrl_c_breaks_in_and_a_second_hang_up_does_not():
-    with cancelled_by_signals(Control(pace=None)):
+    with ended_by_signals(Control(pace=None).cancel):
         for number in (signal.SIGHUP, signal.SIGHUP, signal.SIGINT):
             signal.raise_signal(number)
         with pytest.raises(KeyboardInterrupt):
@@ -95,7 +95,7 @@ def test_a_hang_up_ends_listening_as_ctrl_c_does():
 def test_under_nohup_the_run_goes_on():
     before, control = signal.signal(signal.SIGHUP, signal.SIG_IGN), Control(pace=None)
     try:
-        with cancelled_by_signals(control):
+        with ended_by_signals(control.cancel):
             signal.raise_signal(signal.SIGHUP)
     finally:
         signal.signal(signal.SIGHUP, before)

@@ -7,9 +7,8 @@ import pytest
 from tiny_detector import CLASSES, model_bytes, write_model
 
 from executive.app import simulated
-from executive.app.robots import TURNING_M, shared_detector, stand_at
+from executive.app.robots import TURNING_M, refuse_blocked, shared_detector, stand_at
 from executive.app.simulated import compile_first
-from executive.app.worlds import refuse_blocked
 from plant.worlds.placement import place_people
 from plant.worlds.world import load_world
 from skills.estimate.grid_map import load_grid_map

@@ -2,15 +2,77 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+from executive.tree.board import Constant, FromBoard
 from executive.tree.node import NodeSpec
-from executive.tree.ports import Port, ports_of
 from executive.tree.snapshot import NodeState
+from executive.tree.types import describe_type, field_types
 from skills.files.errors import SourceLine
+
+
+@dataclass(frozen=True)
+class Port:
+    """An input or output with its value as text; `on_board` when the value is a blackboard key."""
+
+    name: str
+    value: str
+    type: str = ""
+    output: bool = False
+    on_board: bool = False
+
+
+def ports_of(spec: NodeSpec) -> tuple[Port, ...]:
+    """The ports of a skill, or the options of any other node."""
+    if spec.kind == "skill":
+        return tuple(_skill_ports(spec.options))
+    return tuple(Port(name, plain(value)) for name, value in spec.options.items())
+
+
+def _skill_ports(options: Mapping[str, Any]) -> Iterator[Port]:
+    skill, bound = options["skill"], options.get("inputs", {})
+    types = field_types(skill.Inputs)
+    for port in fields(skill.Inputs):
+        kind = describe_type(types[port.name])
+        match bound.get(port.name):
+            case FromBoard(key):
+                yield Port(port.name, key, kind, on_board=True)
+            case Constant(value):
+                yield Port(port.name, plain(value), kind)
+            case _:
+                yield Port(port.name, "" if port.default is MISSING else plain(port.default), kind)
+    for name, key in options.get("outputs", {}).items():
+        yield Port(name, key, describe_type(skill.outputs.get(name, Any)), output=True, on_board=True)
+
+
+def plain(value: Any) -> str:
+    """A value in few words: numbers short, enum members by name, objects and surfaces by their own text or name."""
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, enum.Enum):
+        return str(value.value)
+    if isinstance(value, frozenset | set):
+        return ", ".join(sorted(map(plain, value)))
+    if isinstance(value, Mapping):
+        return ", ".join(f"{plain(key)}: {plain(item)}" for key, item in value.items())
+    if isinstance(value, tuple | list):
+        return ", ".join(map(plain, value))
+    if is_dataclass(value) and not isinstance(value, type):
+        return _record(value)
+    return "" if value is None else str(value)
+
+
+def _record(value: Any) -> str:
+    names = [each.name for each in fields(value) if each.repr]
+    if any("__str__" in vars(kind) for kind in type(value).__mro__[:-1]):
+        return str(value)
+    if "name" in names:
+        return str(value.name)
+    return " ".join(f"{name}={plain(getattr(value, name))}" for name in names)
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
-from executive.tree.node_view import NodeView
-from executive.tree.ports import Port
+from executive.tree.node_view import NodeView, Port
 from executive.view.html import render
 from executive.view.styles import NodeStyle, Styles, style_of
 from executive.view.text import note_of, printable

@@ -8,8 +8,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.record.history import Event
-from executive.tree.node_view import NodeView, to_json
-from executive.tree.ports import Port
+from executive.tree.node_view import NodeView, Port, to_json
 from executive.tree.snapshot import NodeState
 from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.html import log_page

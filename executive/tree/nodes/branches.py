@@ -1,4 +1,4 @@
-"""Deciding between two branches: the plan and its node."""
+"""Branches: one that a decision chooses, and one for when another fails; the plans and the nodes."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from executive.mission.gripper import either
 from executive.tree.assembly import Assembler, StepPlans
-from executive.tree.behaviour import MemoryComposite
+from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.board import Board
 from executive.tree.nodes.decisions import decide_plan
+from executive.tree.nodes.policies import FINAL_CAUSES
 from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import steps as model
 from executive.words.expression import Value
@@ -35,7 +37,7 @@ class Choose(MemoryComposite):
         return self.branches.get(self.board.get(self.key)) if decided else None
 
 
-def _plan(assembler: Assembler, block: model.Choose, builder: PlanBuilder) -> Assembled:
+def _choose_plan(assembler: Assembler, block: model.Choose, builder: PlanBuilder) -> Assembled:
     decide, key, parts = decide_plan(assembler.flow, block.condition, builder.at("if"))
     flow = assembler.flow
     then, after_then = assembler.branch(block.then, builder.at("then"), "then", flow)
@@ -47,4 +49,34 @@ def _plan(assembler: Assembler, block: model.Choose, builder: PlanBuilder) -> As
     return Assembled((node,), (*parts, *then.parts, *other.parts))
 
 
-PLANS: Final[StepPlans] = {model.Choose: _plan}
+class Try(MemoryComposite):
+    """The first child, or when it fails the second.
+
+    First child RUNNING or SUCCESS: the same. First child FAILURE with ERROR or CANCELLED: FAILURE with it. Else on to
+    the second in the same tick; its status, and the sentences of both.
+    """
+
+    kind = "try"
+
+    def _following(self, child: Behaviour) -> int | None:
+        failed = child.status == Status.FAILURE and cause_of(child) not in FINAL_CAUSES
+        return 1 if self._index == 0 and failed else None
+
+    def _take_over(self, child: Behaviour) -> None:
+        super()._take_over(child)
+        if self._index == 1:
+            self.message = f"{self.message}, since {message_of(self.children[0])}"
+
+
+def _try_plan(assembler: Assembler, block: model.Try, builder: PlanBuilder) -> Assembled:
+    flow = assembler.flow
+    tried, after_tried = assembler.branch(block.steps, builder.at("try"), "try", flow)
+    midway = flow.copy()
+    if after_tried.held != flow.held:
+        midway.held, midway.opening = either(flow.held, after_tried.held), False
+    other, after_other = assembler.branch(block.otherwise, builder.at("else"), "else", midway)
+    flow.join([after_tried, after_other])
+    return Assembled((builder.node("try", "else the other", *tried.nodes, *other.nodes),), (*tried.parts, *other.parts))
+
+
+PLANS: Final[StepPlans] = {model.Choose: _choose_plan, model.Try: _try_plan}

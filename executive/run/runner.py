@@ -33,6 +33,8 @@ from skills.files.errors import disk_is_full
 from skills.robot import Clock
 
 _PATHS_PERIOD_S: Final = 0.5
+_LOOK_PERIOD_S: Final = 0.5
+_EPSILON_S: Final = 1e-9
 
 
 def run(
@@ -103,6 +105,8 @@ class _Run:
         self._ends: list[MissionEnd] = []  # that the visitors are to hear of
         self._idle: list[Session] = []  # whose missions ended in the last tick
         self._seen: dict[str, RobotStatus] = {}
+        self._looks_always = type(assigner).recall is not Assigner.recall
+        self._look_due_s = shared.clock.now()
         self._stopping = False
         self._paths_due_s = shared.clock.now()
         self._ticks = self._overruns = 0
@@ -275,9 +279,12 @@ class _Run:
         return notes
 
     def _note_ends(self, live: Sequence[Session]) -> None:
-        """See how the robots are, and close the missions that have ended."""
+        """See how the robots are, each tick for an assigner that recalls them, else twice a second; close the missions
+        that have ended."""
+        due = self._looks_always or self._clock.now() >= self._look_due_s - _EPSILON_S
+        self._look_due_s += _LOOK_PERIOD_S if due else 0.0
         for session in live:
-            if not session.finished and self._look(session):
+            if not session.finished and (not due or self._look(session)):
                 continue
             result = session.close()
             session.context.traffic.release()

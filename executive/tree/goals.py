@@ -15,11 +15,7 @@ __all__ = [
     "clearing_goals",
     "command_goal",
     "door_goal",
-    "drive_goal",
-    "given_goal",
-    "held_goal",
-    "lifted_goal",
-    "put_goal",
+    "square_region",
     "surface_region",
     "surfaces_to_search",
 ]
@@ -56,31 +52,6 @@ def door_goal(knowledge: Knowledge, between: tuple[str, str]) -> GoalCondition:
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     square = tuple((x + DOOR_NEAR_M * i, y + DOOR_NEAR_M * j) for i, j in corners)
     return GoalCondition(GoalKind.DOOR_OPEN, source=(Region(f"door between {between[0]} and {between[1]}", square),))
-
-
-def drive_goal(pose: Pose) -> GoalCondition:
-    """The robot at a pose."""
-    return GoalCondition(GoalKind.WENT, goal=(_square(f"({pose.x:.2f}, {pose.y:.2f})", pose, POSE_NEAR_M),))
-
-
-def held_goal() -> GoalCondition:
-    """Anything in the gripper all the time."""
-    return GoalCondition(GoalKind.GRASPED, when=When.ALWAYS)
-
-
-def lifted_goal() -> GoalCondition:
-    """Anything lifted, and held."""
-    return GoalCondition(GoalKind.GRASPED)
-
-
-def put_goal(knowledge: Knowledge, surface: str) -> GoalCondition:
-    """Anything put on a surface."""
-    return GoalCondition(GoalKind.PLACED, goal=(surface_region(knowledge, surface),))
-
-
-def given_goal(person: str | None) -> GoalCondition:
-    """Anything handed over to a person (None: to anyone)."""
-    return GoalCondition(GoalKind.HANDED_OVER, person=person)
 
 
 def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
@@ -164,7 +135,7 @@ def _waited(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) 
 def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondition | None:
     if knowledge.dock is None:
         return None
-    return GoalCondition(GoalKind.WENT, goal=(_square("the dock", knowledge.dock, POSE_NEAR_M),))
+    return GoalCondition(GoalKind.WENT, goal=(square_region("the dock", knowledge.dock, POSE_NEAR_M),))
 
 
 def _place_region(knowledge: Knowledge, goal: str) -> Region:
@@ -172,10 +143,11 @@ def _place_region(knowledge: Knowledge, goal: str) -> Region:
     place = knowledge.place(goal)
     if place in knowledge.places:
         return Region(place, knowledge.places[place].polygon)
-    return _square(goal, knowledge.start if goal == START or place is None else knowledge.place_pose(place))
+    return square_region(goal, knowledge.start if goal == START or place is None else knowledge.place_pose(place))
 
 
-def _square(name: str, pose: Pose, near_m: float = NEAR_M) -> Region:
+def square_region(name: str, pose: Pose, near_m: float = NEAR_M) -> Region:
+    """A square about a pose."""
     sides = ((-near_m, -near_m), (near_m, -near_m), (near_m, near_m), (-near_m, near_m))
     return Region(name, tuple((pose.x + dx, pose.y + dy) for dx, dy in sides))
 

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from executive.mission.gripper import InGripper
-from executive.tree.board import Binding, Constant, FromBoard
+from executive.tree.board import Constant, FromBoard
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.registry import missing
@@ -122,17 +122,28 @@ class PlanBuilder:
         return self.node("sequence", name, *steps, part=part)
 
     def skill(
-        self, name: str, inputs: Mapping[str, object] | None = None, outputs: Mapping[str, str] | None = None
+        self,
+        name: str,
+        inputs: Mapping[str, object] | None = None,
+        outputs: Mapping[str, str] | None = None,
+        *,
+        here: bool = False,
     ) -> NodeSpec:
-        """A leaf that runs the registered skill `name`; inputs that are no binding are constants.
+        """A leaf that runs the registered skill `name`, below this path id or `here`; inputs that are no binding are
+        constants, `outputs` are blackboard keys.
 
+        Before a skill that moves the base and leaves the arm to others, the arm is brought in where it may be anywhere.
         Raises InputError: no skill of that name is registered.
         """
         if name not in self.registry:
             raise self.error(*missing(name, self.registry))
-        bound = {port: _binding(value) for port, value in (inputs or {}).items()}
-        path_id = f"{self.path_id}/{slug(name)}"
-        return skill_spec(self.registry, name, path_id, self.source, bound, outputs or {})
+        skill = self.registry[name]
+        bound = {port: v if isinstance(v, Constant | FromBoard) else Constant(v) for port, v in (inputs or {}).items()}
+        drives = Part.BASE in skill.uses and Part.ARM not in skill.uses
+        first = {"first": self.registry[STOW]} if drives and STOW in self.registry else {}
+        ports = {"inputs": MappingProxyType(bound), "outputs": MappingProxyType(dict(outputs or {}))}
+        options = {"skill": skill, **ports, "limit_s": skill.default_timeout_s, **first}
+        return self.node("skill", name, part="" if here else slug(name), **options)
 
     def recover(
         self,
@@ -223,27 +234,3 @@ class PlanBuilder:
     def error(self, message: str, hint: str) -> InputError:
         """An error at the step's line."""
         return InputError.at(self.source, f"{message} (in '{self.command}')", hint=hint)
-
-
-def skill_spec(
-    registry: Registry,
-    name: str,
-    path_id: str,
-    source: SourceLine | None,
-    inputs: Mapping[str, Binding],
-    outputs: Mapping[str, str],
-) -> NodeSpec:
-    """A leaf that runs a registered skill with its ports bound; `outputs` maps output ports to blackboard keys.
-
-    Before a skill that moves the base, and leaves the arm to others, the arm is brought in where it may be anywhere.
-    """
-    skill = registry[name]
-    drives = Part.BASE in skill.uses and Part.ARM not in skill.uses
-    first = {"first": registry[STOW]} if drives and STOW in registry else {}
-    ports = {"inputs": MappingProxyType(dict(inputs)), "outputs": MappingProxyType(dict(outputs))}
-    options = MappingProxyType({"skill": skill, **ports, "limit_s": skill.default_timeout_s, **first})
-    return NodeSpec("skill", path_id, name, options, source=source)
-
-
-def _binding(value: object) -> Binding:
-    return value if isinstance(value, Constant | FromBoard) else Constant(value)

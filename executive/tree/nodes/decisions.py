@@ -139,6 +139,9 @@ class Decision:
         key, board = next(answers), view.context.board
         return bool(board.get(key)) if key in board else None
 
+    def __str__(self) -> str:
+        return str(self.condition)
+
     @property
     def looks(self) -> tuple[tuple[str, Look | DoorOpen], ...]:
         """The looks that it takes, by the keys of their answers."""

@@ -11,7 +11,6 @@ from py_trees.common import Status
 from executive.tree.assembly import PYTHON_TYPES, Assembler, Flow, StepPlans
 from executive.tree.behaviour import cause_of, message_of
 from executive.tree.context import RunContext
-from executive.tree.goals import held_goal
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decisions import MustHold, MustNotBegin, instant_decision
 from executive.tree.nodes.interrupts import HANDLING
@@ -22,6 +21,7 @@ from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import steps as model
 from executive.words.condition import AllOf, Condition, ValueIs
 from executive.words.expression import Expression, Template, kind_of, literal
+from executive.words.goal import GoalCondition, GoalKind, When
 from executive.words.leaf_steps import UseMission
 from executive.words.mission import Mission
 from skills.files.errors import InputError
@@ -99,7 +99,7 @@ def framed(
         condition = MustHold(decision, str(holds))
         node = builder.node("guard", f"while {holds}", node, part="while", condition=condition)
         if _is_holding(holds):
-            parts = (StepPart(node.path_id, goal=held_goal()), *parts)
+            parts = (StepPart(node.path_id, goal=GoalCondition(GoalKind.GRASPED, when=When.ALWAYS)), *parts)
     if group.always:
         assembler.flow.join([before.copy(), assembler.flow.copy()])
         last = assembler.row(group.always, builder.at("always"), "in the end")

@@ -14,12 +14,12 @@ from executive.tree.assembly import Assembler, Named, StepPlans
 from executive.tree.behaviour import ExplainedLeaf, StoppableTime
 from executive.tree.board import Binding, Constant, FromBoard
 from executive.tree.context import RunContext
-from executive.tree.goals import drive_goal, given_goal, lifted_goal, put_goal
-from executive.tree.plan import Assembled, PlanBuilder, StepPart, skill_spec
+from executive.tree.goals import POSE_NEAR_M, square_region, surface_region
+from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.tree.port_values import FROM_KEY, PortValueError, gathered, port_value
 from executive.tree.registry import missing
 from executive.tree.types import conforms, describe_type, field_types
-from executive.words.goal import GoalCondition
+from executive.words.goal import GoalCondition, GoalKind
 from executive.words.knowledge import Knowledge, Pose
 from executive.words.leaf_steps import CallSkill
 from executive.words.slug import slug
@@ -279,7 +279,7 @@ def _plan(assembler: Assembler, call: CallSkill, builder: PlanBuilder) -> Assemb
         port: assembler.give(name, f"{path_id}/{slug(port)}", skill.outputs[port], builder)
         for port, name in gives.items()
     }
-    leaf = skill_spec(builder.registry, call.skill, path_id, call.source, inputs, outputs)
+    leaf = builder.skill(call.skill, inputs, outputs, here=True)
     goal = _goal(call.skill, inputs, builder.knowledge)
     part = StepPart(path_id, skill=skill, goal=goal, held=flow.held, opening=flow.opening)
     flow.held = {None: flow.held, True: UNNAMED, False: None}[skill.gripper_after]
@@ -292,13 +292,16 @@ def _goal(skill: str, bound: Mapping[str, Binding], knowledge: Knowledge) -> Goa
     inputs = {port: each.value for port, each in bound.items() if isinstance(each, Constant)}
     match skill:
         case "navigate" if isinstance(pose := inputs.get("goal"), Pose2D):
-            return drive_goal(Pose(x=pose.x_m, y=pose.y_m, yaw=pose.yaw_rad))
+            at, name = Pose(x=pose.x_m, y=pose.y_m, yaw=pose.yaw_rad), f"({pose.x_m:.2f}, {pose.y_m:.2f})"
+            return GoalCondition(GoalKind.WENT, goal=(square_region(name, at, POSE_NEAR_M),))
         case "grasp":
-            return lifted_goal()
+            return GoalCondition(GoalKind.GRASPED)
         case "place" if isinstance(surface := inputs.get("surface"), Surface):
-            return put_goal(knowledge, surface.name) if surface.name in knowledge.surfaces else None
+            known = surface.name in knowledge.surfaces
+            goal = (surface_region(knowledge, surface.name),) if known else ()
+            return GoalCondition(GoalKind.PLACED, goal=goal) if known else None
         case "hand_over":
-            return given_goal(knowledge.person(str(inputs.get("person", ""))))
+            return GoalCondition(GoalKind.HANDED_OVER, person=knowledge.person(str(inputs.get("person", ""))))
     return None
 
 

@@ -8,9 +8,12 @@ import pytest
 from executive.tree.board import Constant, FromBoard
 from executive.tree.compiler import check_wiring
 from executive.tree.node import NodeSpec
-from executive.tree.plan import skill_spec
+from executive.tree.plan import PlanBuilder
+from executive.words.command import Command
+from executive.words.knowledge import Knowledge
 from skills.api import Skill, Succeeded
 from skills.files.errors import InputError
+from tests.executive.conftest import KNOWLEDGE
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,8 @@ class Wired(Skill[Inputs]):
 
 def plan(inputs: dict[str, Any], outputs: dict[str, str] | None = None, path_id: str = "a/wired") -> NodeSpec:
     bound = {k: v if isinstance(v, FromBoard) else Constant(v) for k, v in inputs.items()}
-    return skill_spec({"wired": Wired}, "wired", path_id, None, bound, outputs or {})
+    builder = PlanBuilder(Knowledge.model_validate(KNOWLEDGE), {"wired": Wired}, path_id, "a/start", Command(), None)
+    return builder.skill("wired", bound, outputs, here=True)
 
 
 def check(*nodes: NodeSpec) -> None:

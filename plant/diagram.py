@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 from pydrake.geometry import (
@@ -18,16 +19,17 @@ from pydrake.geometry import (
     HalfSpace,
     Meshcat,
     MeshcatVisualizer,
+    ProximityProperties,
     RenderEngineVtkParams,
+    RoleAssign,
     SceneGraph,
 )
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, ModelInstanceIndex, PlanarJoint, RigidBody
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from plant.friction import multiply_friction
 from plant.happenings.doors import add_panel
 from plant.kinds import BodyOptions, RobotBody, robot_kind
 from plant.locomotion.floating_base import FloatingBaseLimits
@@ -251,3 +253,19 @@ def _floor_geometries(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[Ge
             if isinstance(shape, Box | HalfSpace) and top_m <= FLOOR_TOP_M:
                 floor.append(geometry)
     return floor
+
+
+_MATERIAL: Final = "material"
+_FRICTION: Final = "coulomb_friction"
+
+
+def multiply_friction(plant: MultibodyPlant, scene_graph: SceneGraph, factor: float) -> None:
+    """Multiplies the friction coefficients of all bodies that are not fixed to the world; the plant is finalized."""
+    inspector, source = scene_graph.model_inspector(), plant.get_source_id()
+    for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
+        for geometry in () if plant.IsAnchored(body) else plant.GetCollisionGeometriesForBody(body):
+            properties = ProximityProperties(inspector.GetProximityProperties(geometry))
+            known = properties.GetPropertyOrDefault(_MATERIAL, _FRICTION, CoulombFriction(1.0, 1.0))
+            changed = CoulombFriction(factor * known.static_friction(), factor * known.dynamic_friction())
+            properties.UpdateProperty(_MATERIAL, _FRICTION, changed)
+            scene_graph.AssignRole(source, geometry, properties, RoleAssign.kReplace)

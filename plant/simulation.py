@@ -16,14 +16,12 @@ from plant.diagram import LooseModel, build_diagram
 from plant.engine import Engine
 from plant.happenings.moves import Moves
 from plant.kept import State
-from plant.live_scene import LiveScene
 from plant.locomotion.floating_base import FloatingBaseLimits
-from plant.recording import Recorder, View, save_html
+from plant.recording import LiveScene, Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.snapshot import SnapshotWriter, read_snapshot, restore
-from plant.worlds.clutter import place_clutter
 from plant.worlds.lights import render_parameters
-from plant.worlds.placement import Placement, place_objects, place_people
+from plant.worlds.placement import Placement, place_clutter, place_objects, place_people
 from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot
 

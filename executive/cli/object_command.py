@@ -12,7 +12,7 @@ import typer
 from executive.cli.number_options import quantity_option
 from executive.cli.options import AS_JSON
 from executive.cli.output import new_folder, print_json, writing
-from plant.models.imported import ImportedObject, read_imported
+from plant.models.catalogue import ImportedObject, read_imported
 from skills.files.errors import InputError, count_text
 from skills.perception.class_forms import class_forms
 from skills.quantities import Factor, Mass

@@ -53,8 +53,8 @@ def from_map(
     wall_height: Annotated[float, quantity_option(WallHeight, help="Height of the walls, m.")] = 2.5,
 ) -> None:
     """Make a world of a map: walls, both grids, rooms and doors to be named."""
-    from plant.worlds.builder.maps import FREE, OCCUPIED, UNKNOWN, Grid
     from plant.worlds.builder.own import world_from_grid
+    from plant.worlds.builder.rooms import FREE, OCCUPIED, UNKNOWN, Grid
 
     read = load_grid_map(map_file)
     for note in read.notes:

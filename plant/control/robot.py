@@ -7,10 +7,8 @@ from abc import ABC, abstractmethod
 import numpy as np
 from pydrake.systems.framework import Context
 
-from plant.control.arm import ArmServos
 from plant.control.commands import CommandTable, Part
-from plant.control.gripper import Closing, GripperGoal, GripperServo, GripperTolerances
-from plant.control.joints import ActuatedJoints
+from plant.control.joints import ActuatedJoints, ArmServos, Closing, GripperGoal, GripperServo, GripperTolerances
 from plant.kept import Kept, State
 from plant.kinds import RobotBody
 from plant.sensors.suite import SensorSuite

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from plant.control.commands import Part
-from plant.control.gripper import GripperTolerances, gripper_set_point
+from plant.control.joints import GripperTolerances, gripper_set_point
 from plant.control.robot import CommandedRobot
 from plant.fetch.model import FINGER_GAIN_N_M, FetchModel, JointIndex
 from plant.fetch.sensing import FetchSensors, axle

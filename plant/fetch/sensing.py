@@ -13,8 +13,8 @@ from plant.fetch.model import FetchModel
 from plant.fetch.wheels import Axle, WheelOdometer
 from plant.kinds import SensorOptions
 from plant.models.fetch.description import HAND_LINK, HEAD_JOINTS, HEAD_LINK, LIFT_JOINT, arm_joint_names, fetch_facts
-from plant.sensors.gripper import GripperNoise
 from plant.sensors.lidar import LidarSpec
+from plant.sensors.proprioception import GripperNoise
 from plant.sensors.suite import LidarMount, SensorSuite
 from skills.robot import FloatArray
 

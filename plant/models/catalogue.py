@@ -6,10 +6,15 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
+from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from skills.files.errors import InputError
+from skills.files.schema import validate
+from skills.files.yaml_scalars import yaml_of
 from skills.files.yaml_source import read_yaml
+from skills.robot import quantities
 
 MODELS_FOLDER = Path(__file__).resolve().parent
 
@@ -43,3 +48,56 @@ def load_catalogue() -> Mapping[str, ModelClass]:
     """All classes by name, read once."""
     entries = read_yaml(MODELS_FOLDER / "catalogue.yaml").data
     return MappingProxyType({name: ModelClass.model_validate(entry) for name, entry in entries.items()})
+
+
+FACTS_FILE: Final = "object.yaml"
+_AGAIN: Final = "make it by `errand object import`"
+NAME: Final = r"^[A-Za-z][A-Za-z0-9_]{0,39}$"
+Inertia = Annotated[float, quantities.Quantity(ge=-1e6, le=1e6)]
+Parts = Annotated[int, quantities.Quantity(ge=1, le=10_000_000)]
+
+
+class ImportedObject(BaseModel):
+    """One imported object: `class` is what a detector takes it for, its own name where no class was given.
+
+    Its frame has the origin in the centre of the bounding box `size_m`, z up as it rests; `inertia_kg_m2` is xx, yy,
+    zz, xy, xz, yz about its centre of mass.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, allow_inf_nan=False)
+
+    name: Annotated[str, Field(pattern=NAME)]
+    class_name: Annotated[str, Field(alias="class", pattern=NAME)]
+    mass_kg: quantities.Mass
+    size_m: tuple[quantities.Length, quantities.Length, quantities.Length]
+    com_m: tuple[quantities.Coordinate, quantities.Coordinate, quantities.Coordinate]
+    inertia_kg_m2: tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia]
+    collision_parts: Parts
+    triangles: Parts
+    round: bool = False
+
+    def form(self, folder: Path) -> ModelForm:
+        """Its form, with its files in a folder."""
+        x, y, z = self.size_m
+        file = str((folder / f"{self.name}.sdf").resolve())
+        return ModelForm(file=file, half_extents_m=(x / 2, y / 2), rest_height_m=z / 2, round=self.round)
+
+
+def read_imported(folder: Path) -> ImportedObject:
+    """The object in a folder. Raises InputError: there is none, or it is damaged."""
+    path = folder / FACTS_FILE
+    if not path.exists():
+        raise InputError(f"there is no imported object ({FACTS_FILE} is missing)", hint=_AGAIN, file=folder)
+    try:
+        found = validate(ImportedObject, read_yaml(path))
+    except InputError as error:
+        raise InputError(error.message, hint=f"{error.hint}, or {_AGAIN}", file=path, line=error.line) from error
+    if not (folder / f"{found.name}.sdf").is_file():
+        raise InputError(f"{found.name}.sdf is missing", hint=_AGAIN, file=folder)
+    return found
+
+
+def write_imported(folder: Path, made: ImportedObject) -> None:
+    """Write what `read_imported` reads."""
+    text = yaml_of(made.model_dump(mode="json", by_alias=True))
+    (folder / FACTS_FILE).write_text(f"# Made by `errand object import`, don't edit.\n{text}", encoding="utf-8")

@@ -11,8 +11,28 @@ from executive.words.goal import GoalCondition, GoalKind, Region, When
 from plant.referee.contacts import Collision
 from plant.referee.object_history import SETTLE_S, Lift, ObjectHistory
 from plant.referee.truth import ON_TRAY_GAP_S, TimedPath, Truth
-from plant.referee.verdict import Verdict
 from skills.robot import FloatArray
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the referee saw: whether all goal conditions hold (None: that was not judged), a sentence on each, and the
+    counts of the whole run, or since the conditions count.
+
+    `collisions` are the robots' own, `people_hit` those of them with people, `robots_hit` those between two robots;
+    `hit_by_people` counts who walked into a robot that stood. `holds` tells of a run that failed whether its goal
+    conditions hold nevertheless.
+    """
+
+    success: bool | None
+    why: str
+    collisions: int
+    drops: int
+    people_hit: int = 0
+    hit_by_people: int = 0
+    robots_hit: int = 0
+    holds: bool | None = None
+
 
 NEAR_PERSON_M = 2.0
 NAMED_REGIONS = 3

@@ -17,10 +17,9 @@ from executive.words.goal import GoalCondition
 from plant.kept import Kept, State
 from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
 from plant.referee.entities import Entities, Kind
-from plant.referee.judge import judge
+from plant.referee.judge import Verdict, judge
 from plant.referee.object_history import Lift, ObjectHistory, ObjectSample
 from plant.referee.truth import TimedPath, Truth, extend, note_stay
-from plant.referee.verdict import Verdict
 from skills.robot import FloatArray
 
 if TYPE_CHECKING:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from typing import TypeVar, cast
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import SceneGraphInspector
@@ -16,9 +18,183 @@ from pydrake.systems.framework import Context
 
 from plant.sensors.camera_noise import NoiseTile
 from plant.sensors.noisy import NoisySensor
-from plant.sensors.ray_cast import NO_RETURN_M, cast_rays
 from plant.sensors.ray_shapes import RayScene, ShapeArrays
-from skills.robot import Scan
+from skills.robot import FloatArray, Scan
+
+Rays = tuple[FloatArray, FloatArray, FloatArray]
+"""Of one column, in a shape's frame: origin, the horizontal direction and up, (3,) each."""
+FunctionT = TypeVar("FunctionT", bound=Callable[..., object])
+
+NO_RETURN_M = 1.0e6
+_EPS = 1.0e-9
+
+
+def _compiled(function: FunctionT) -> FunctionT:
+    """numba's njit with a disk cache, fast arithmetic and without the GIL, keeping the function's type."""
+    return cast(FunctionT, numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")(function))
+
+
+@_compiled
+def cast_rays(
+    kinds: NDArray[np.int64],
+    half_extents: FloatArray,
+    rotations_W: FloatArray,
+    positions_W: FloatArray,
+    R_WL: FloatArray,
+    p_WL: FloatArray,
+    elevations: FloatArray,
+    azimuths: FloatArray,
+) -> FloatArray:
+    """Ranges (azimuths, rings) in metres from the lidar frame L to the shapes.
+
+    `azimuths` are evenly spaced, increasing, and cover one turn from azimuths[0]; shapes are given in the world.
+    """
+    shapes = len(kinds)
+    columns, rings = len(azimuths), len(elevations)
+    ranges = np.full((columns, rings), NO_RETURN_M)
+    farthest = np.full(columns, NO_RETURN_M)
+    cos_e, sin_e = np.cos(elevations), np.sin(elevations)
+    cos_a, sin_a = np.cos(azimuths), np.sin(azimuths)
+    R_LW = R_WL.T.copy()
+    nearest = np.empty(shapes)
+    for i in range(shapes):
+        nearest[i] = _box_distance(rotations_W[i], positions_W[i], half_extents[i], p_WL)
+    for i in np.argsort(nearest):
+        R_LG = R_LW @ rotations_W[i].copy()
+        p_LG = R_LW @ (positions_W[i] - p_WL)
+        origin = -(R_LG.T.copy() @ p_LG)
+        first, count = _columns_spanned(R_LG, p_LG, half_extents[i], azimuths)
+        for k in range(count):
+            column = (first + k) % columns
+            if farthest[column] <= nearest[i]:
+                continue
+            across = R_LG[0] * cos_a[column] + R_LG[1] * sin_a[column]
+            row = ranges[column]
+            rays = (origin, across, R_LG[2])
+            if kinds[i] == 0:
+                _cast_box(row, rays, cos_e, sin_e, half_extents[i])
+            elif kinds[i] == 1:
+                _cast_cylinder(row, rays, cos_e, sin_e, half_extents[i])
+            elif kinds[i] == 2:
+                _cast_capsule(row, rays, cos_e, sin_e, half_extents[i])
+            else:
+                _cast_ellipsoid(row, rays, cos_e, sin_e, half_extents[i])
+            farthest[column] = row.max()
+    return ranges
+
+
+@_compiled
+def _box_distance(R_WG: FloatArray, p_WG: FloatArray, half: FloatArray, p_W: FloatArray) -> float:
+    """Distance from a point to an oriented box, 0 inside."""
+    total = 0.0
+    for axis in range(3):
+        along = 0.0
+        for j in range(3):
+            along += R_WG[j, axis] * (p_W[j] - p_WG[j])
+        outside = max(abs(along) - half[axis], 0.0)
+        total += outside * outside
+    return float(np.sqrt(total))
+
+
+@_compiled
+def _columns_spanned(R_LG: FloatArray, p_LG: FloatArray, half: FloatArray, azimuths: FloatArray) -> tuple[int, int]:
+    """First column and number of columns whose vertical plane may meet the box; all of them around the axis."""
+    columns = len(azimuths)
+    centre = np.arctan2(p_LG[1], p_LG[0])
+    low, high = 0.0, 0.0
+    for corner in range(8):
+        sx = half[0] if corner & 1 else -half[0]
+        sy = half[1] if corner & 2 else -half[1]
+        sz = half[2] if corner & 4 else -half[2]
+        x = p_LG[0] + R_LG[0, 0] * sx + R_LG[0, 1] * sy + R_LG[0, 2] * sz
+        y = p_LG[1] + R_LG[1, 0] * sx + R_LG[1, 1] * sy + R_LG[1, 2] * sz
+        angle = np.arctan2(y, x) - centre
+        if angle > np.pi:
+            angle -= 2.0 * np.pi
+        elif angle < -np.pi:
+            angle += 2.0 * np.pi
+        low, high = min(low, angle), max(high, angle)
+    if high - low >= np.pi - 1e-6:
+        return 0, columns
+    step = 2.0 * np.pi / columns
+    first = int(np.ceil((centre + low - azimuths[0]) / step - 1e-6))
+    last = int(np.floor((centre + high - azimuths[0]) / step + 1e-6))
+    return first, max(0, last - first + 1)
+
+
+@_compiled
+def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
+    """Shorten one column's ranges to a box; the loop has no branches, so that it runs on vector units."""
+    origin, across, up = rays
+    ox, oy, oz = origin[0], origin[1], origin[2]
+    hx, hy, hz = half[0], half[1], half[2]
+    for ring in range(len(cos_e)):
+        dx = cos_e[ring] * across[0] + sin_e[ring] * up[0]
+        dy = cos_e[ring] * across[1] + sin_e[ring] * up[1]
+        dz = cos_e[ring] * across[2] + sin_e[ring] * up[2]
+        ix = 1.0 / (dx if abs(dx) > _EPS else _EPS)
+        iy = 1.0 / (dy if abs(dy) > _EPS else _EPS)
+        iz = 1.0 / (dz if abs(dz) > _EPS else _EPS)
+        ax, bx = (-hx - ox) * ix, (hx - ox) * ix
+        ay, by = (-hy - oy) * iy, (hy - oy) * iy
+        az, bz = (-hz - oz) * iz, (hz - oz) * iz
+        near = max(max(min(ax, bx), min(ay, by)), min(az, bz))
+        far = min(min(max(ax, bx), max(ay, by)), max(az, bz))
+        hit = near if (near <= far) & (near > 0.0) else NO_RETURN_M
+        row[ring] = min(row[ring], hit)
+
+
+@_compiled
+def _cast_cylinder(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
+    """Shorten one column's ranges to a cylinder along its z: the round wall cut by the slab of the caps."""
+    origin, across, up = rays
+    ox, oy, oz = origin[0], origin[1], origin[2]
+    c = ox * ox + oy * oy - half[0] * half[0]
+    for ring in range(len(cos_e)):
+        dx = cos_e[ring] * across[0] + sin_e[ring] * up[0]
+        dy = cos_e[ring] * across[1] + sin_e[ring] * up[1]
+        dz = cos_e[ring] * across[2] + sin_e[ring] * up[2]
+        a = max(dx * dx + dy * dy, 1e-12)
+        b = ox * dx + oy * dy
+        discriminant = b * b - a * c
+        root = np.sqrt(max(discriminant, 0.0))
+        iz = 1.0 / (dz if abs(dz) > _EPS else _EPS)
+        az, bz = (-half[2] - oz) * iz, (half[2] - oz) * iz
+        near = max((-b - root) / a, min(az, bz))
+        far = min((-b + root) / a, max(az, bz))
+        hit = near if (near <= far) & (near > 0.0) & (discriminant >= 0.0) else NO_RETURN_M
+        row[ring] = min(row[ring], hit)
+
+
+@_compiled
+def _cast_ellipsoid(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
+    """Shorten one column's ranges to an ellipsoid, by scaling space until it is the unit ball."""
+    origin, across, up = rays
+    ox, oy, oz = origin[0] / half[0], origin[1] / half[1], origin[2] / half[2]
+    c = ox * ox + oy * oy + oz * oz - 1.0
+    for ring in range(len(cos_e)):
+        dx = (cos_e[ring] * across[0] + sin_e[ring] * up[0]) / half[0]
+        dy = (cos_e[ring] * across[1] + sin_e[ring] * up[1]) / half[1]
+        dz = (cos_e[ring] * across[2] + sin_e[ring] * up[2]) / half[2]
+        a = dx * dx + dy * dy + dz * dz
+        b = ox * dx + oy * dy + oz * dz
+        discriminant = b * b - a * c
+        near = (-b - np.sqrt(max(discriminant, 0.0))) / a
+        hit = near if (discriminant >= 0.0) & (near > 0.0) else NO_RETURN_M
+        row[ring] = min(row[ring], hit)
+
+
+@_compiled
+def _cast_capsule(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
+    """Shorten one column's ranges to a capsule along its z: a cylinder and two balls (half[2] includes a ball)."""
+    origin, across, up = rays
+    straight = half[2] - half[0]
+    barrel = np.array([half[0], half[0], straight])
+    ball = np.array([half[0], half[0], half[0]])
+    end = np.array([0.0, 0.0, straight])
+    _cast_cylinder(row, rays, cos_e, sin_e, barrel)
+    _cast_ellipsoid(row, (origin - end, across, up), cos_e, sin_e, ball)
+    _cast_ellipsoid(row, (origin + end, across, up), cos_e, sin_e, ball)
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,16 @@ from plant.kinds import RobotBody, SensorOptions
 from plant.scene import RENDERER
 from plant.sensors.camera import Camera
 from plant.sensors.camera_spec import CameraSpec
-from plant.sensors.gripper import GripperModel, GripperNoise
 from plant.sensors.lidar import Lidar, LidarSpec
-from plant.sensors.proprioception import BatteryModel, BatterySpec, ImuModel, JointModel, OdometryModel
+from plant.sensors.proprioception import (
+    BatteryModel,
+    BatterySpec,
+    GripperModel,
+    GripperNoise,
+    ImuModel,
+    JointModel,
+    OdometryModel,
+)
 from skills.robot import Battery, FloatArray, FrameTree, Gripper, Image, Imu, Joints, Odometry, Scan
 
 _DOCKED_WITHIN_M = 0.2

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+from plant.kinds import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
+from plant.models.spot.description import FACTS, FINGER_LINK, HAND_LINK, LEGS
 from functools import cache
 from typing import Any
-
 import numpy as np
-
 from plant.models.spot.description import CAMERAS, GRIPPER_JOINT, LEGS, spot_facts, spot_urdf
 from plant.sensors.camera_spec import load_cameras
 from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, FloatArray, GripperCapabilities, Mount
 
+if TYPE_CHECKING:
+    from pydrake.multibody.plant import MultibodyPlant
 
 def nominal_footholds() -> FloatArray:
     """Resting places of the feet in the body frame, (4, 2), ordered as LEGS."""
@@ -61,3 +64,32 @@ def _cameras() -> tuple[CameraCapabilities, ...]:
 
 def _mount(link: str) -> Mount:
     return Mount.BODY if link == "body" else Mount.HAND
+
+
+def _add(plant: MultibodyPlant, name: str, options: BodyOptions) -> RobotBody:
+    from plant.locomotion.floating_base import FloatingBaseLimits
+    from plant.spot.model import SpotModel
+
+    limits = options.locomotion if isinstance(options.locomotion, FloatingBaseLimits) else None
+    return SpotModel(plant, name, kind=SPOT, visuals=options.visuals, carried=options.carried, limits=limits)
+
+
+def _drive(body: RobotBody, options: SensorOptions) -> PlantRobot:
+    from plant.spot.model import SpotModel
+    from plant.spot.robot import SpotRobot
+    from plant.spot.sensing import SpotSensors
+
+    assert isinstance(body, SpotModel)
+    return SpotRobot(body, SpotSensors(body, options), options.context)
+
+
+SPOT = RobotKind(
+    name="spot",
+    gripper_links=(HAND_LINK, FINGER_LINK),
+    trunk_links=("body", "lidar"),
+    leg_links=tuple(f"{leg}_{part}" for leg in LEGS for part in ("hip", "uleg", "lleg")),
+    facts=FACTS,
+    capabilities=spot_capabilities,
+    add=_add,
+    drive=_drive,
+)

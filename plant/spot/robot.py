@@ -9,15 +9,14 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from plant.control.commands import Part
-from plant.control.gripper import GripperTolerances, gripper_set_point
+from plant.control.joints import GripperTolerances, gripper_set_point
 from plant.control.robot import CommandedRobot
 from plant.locomotion.floating_base import Velocity
-from plant.locomotion.trot import BodyMotion, Trot
 from plant.models.spot.description import spot_facts
 from plant.spot.capabilities import nominal_footholds
 from plant.spot.model import JointIndex, SpotModel
 from plant.spot.sensing import SpotSensors
-from plant.spot.servos import LegServos
+from plant.spot.servos import BodyMotion, LegServos, Trot
 from skills.robot import CommandId, CommandState, FloatArray, Lease
 
 _GRIPPER_TOLERANCES = GripperTolerances(arrived=0.03, stall_rate=0.03)

@@ -3,18 +3,62 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import shapely
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from executive.words.mission import Route, Stop
 from plant.models.catalogue import ModelClass, ModelForm, load_catalogue
-from plant.worlds.route import PointRoute, point_route
 from plant.worlds.world import Lengths, ObjectRule, PersonRule, Point, SurfaceTop, World, WorldError
 from skills.robot import FloatArray
+
+
+@dataclass(frozen=True)
+class PointStop:
+    """A waypoint in the world frame, and how long the person stands there (s)."""
+
+    at_W: Point
+    pause_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class PointRoute:
+    """Where and how a person walks: m/s, set off at `start_s`, back from the last stop to the first if it `loops`.
+
+    A person who `yields` stops for a robot that is close ahead.
+    """
+
+    stops: tuple[PointStop, ...]
+    speed_m_s: float = 1.2
+    loops: bool = False
+    start_s: float = 0.0
+    yields: bool = True
+    yaw_rad: float | None = None
+
+    def begun_at(self, at_W: Point, yaw_rad: float) -> PointRoute:
+        """The same for somebody who stands somewhere at first."""
+        return replace(self, stops=(PointStop(at_W), *self.stops), yaw_rad=yaw_rad)
+
+    @property
+    def first_yaw_rad(self) -> float:
+        """The way that the person looks at first: as they stand, or towards the second stop."""
+        if self.yaw_rad is not None:
+            return self.yaw_rad
+        (x0, y0), (x1, y1) = self.stops[0].at_W, self.stops[min(1, len(self.stops) - 1)].at_W
+        return math.atan2(y1 - y0, x1 - x0)
+
+
+def point_route(route: Route, standing: Mapping[str, Point]) -> PointRoute:
+    """The route whose places are known in `standing`."""
+    stops = (each if isinstance(each, Stop) else Stop(at=each) for each in route.waypoints)
+    points = (PointStop(standing[each.at] if isinstance(each.at, str) else each.at, each.pause) for each in stops)
+    return PointRoute(tuple(points), route.speed, route.loop, route.start, route.yields)
+
 
 ATTEMPTS = 500
 ROUND_SIDES = 16
@@ -194,3 +238,53 @@ def outline_W(form: ModelForm, centre: Point, yaw_rad: float) -> FloatArray:
 def polygon_distance(a: FloatArray, b: FloatArray) -> float:
     """Distance between two polygons (m), 0 when they overlap."""
     return float(shapely.distance(shapely.Polygon(a), shapely.Polygon(b)))
+
+
+PAUSE_S = 4.0
+_CLUTTER_STREAM, _PASSING_STREAM = 11, 12
+_NEVER = frozenset({"person", "extinguisher"})
+"""What is not strewn about: people, and what is too large for most surfaces."""
+_STOPS = 4
+
+
+def place_clutter(
+    world: World, objects: Sequence[Placement], count: int, seed: int, *, spared: Collection[str] = ()
+) -> tuple[Placement, ...]:
+    """Up to so many more objects beside those that are placed, of none of the `spared` classes.
+
+    Each lies at rest on a surface that the rules allow; one that finds no free spot is left out.
+    """
+    surfaces = tuple(sorted(name for name, fronts in world.seed_rules.fronts.items() if fronts))
+    classes = [name for name in load_catalogue() if name not in _NEVER and name not in spared]
+    if not surfaces or not classes:
+        return ()
+    outlines, placed = [outline_of(each) for each in objects], list[Placement]()
+    for index in range(count):
+        rng = np.random.default_rng([seed, _CLUTTER_STREAM, index])
+        model = classes[int(rng.integers(len(classes)))]
+        form = [*load_catalogue()[model].forms.values()][int(rng.integers(len(load_catalogue()[model].forms)))]
+        rule = ObjectRule(name=f"spare {model} {index + 1}", model=model, surfaces=surfaces)
+        try:
+            placement, outline = place_one(world, rule, (model, form), outlines, rng)
+        except WorldError:
+            continue
+        placed.append(placement)
+        outlines.append(outline)
+    return tuple(placed)
+
+
+def with_passers_by(world: World, count: int, seed: int) -> World:
+    """The world with so many more people, each of whom walks between some of its places, again and again.
+
+    Raises WorldError: the world has not places enough.
+    """
+    places = sorted({place for name, place in world.standing.items() if name in world.rooms})
+    if count and len(places) < 2:
+        raise WorldError(f"{world.name} has not two places between which somebody could walk")
+    walks = {}
+    for index in range(count):
+        rng = np.random.default_rng([seed, _PASSING_STREAM, index])
+        chosen = rng.permutation(len(places))[:_STOPS]
+        stops = tuple(Stop(at=places[int(each)], pause=PAUSE_S) for each in chosen)
+        walks[f"passer-by {index + 1}"] = Route(waypoints=stops, loop=True, start=float(rng.uniform(0.0, 10.0)))
+    return world.with_walks(walks) if walks else world

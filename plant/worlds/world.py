@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.words.mission import Route, Stop
-from plant.models.catalogue import load_catalogue
-from plant.models.imported import ImportedObject, read_imported
+from plant.models.catalogue import ImportedObject, load_catalogue, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
 from skills.files.errors import InputError, did_you_mean, suggestion
 from skills.files.outside import is_file

@@ -53,7 +53,7 @@ from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from plant.models.imported import FACTS_FILE, read_imported
+from plant.models.catalogue import FACTS_FILE, read_imported
 from plant.pictures import best_view, render_view, save_png
 from plant.simulation import Simulation
 from plant.worlds.placement import place_objects

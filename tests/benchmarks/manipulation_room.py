@@ -11,7 +11,7 @@ import yaml
 
 from errand_train.worlds.__main__ import build
 from errand_train.worlds.plan import Plan
-from plant.models.imported import read_imported
+from plant.models.catalogue import read_imported
 from plant.scenery import OWN_PACKAGE
 from plant.worlds.world import World, load_world
 

@@ -34,7 +34,7 @@ from executive.words.knowledge import load_knowledge
 from plant.models.builder.importing import ObjectImportError
 from plant.models.builder.importing.reading import read_patches
 from plant.models.builder.importing.solid import solid_of
-from plant.models.imported import read_imported
+from plant.models.catalogue import read_imported
 from plant.worlds.world import WORLDS_FOLDER, load_world
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError

@@ -29,8 +29,8 @@ from executive.app.robots import only_robot
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.words.mission import Route
-from plant.worlds.builder.maps import FREE, OCCUPIED, Grid
 from plant.worlds.builder.own import world_from_grid
+from plant.worlds.builder.rooms import FREE, OCCUPIED, Grid
 from skills.robot import Pose2D
 
 CELL_M, HALL_M, DEPTH_M = 0.05, (11.0, 4.4), 1.6

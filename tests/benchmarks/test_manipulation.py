@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from plant.models.imported import read_imported
+from plant.models.catalogue import read_imported
 from tests.benchmarks.carry import doors, entered
 from tests.benchmarks.manipulation import (
     TimedWorker,

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.friction import multiply_friction
+from plant.diagram import multiply_friction
 
 
 def friction_of(plant: MultibodyPlant, scene_graph: SceneGraph, body: str) -> tuple[float, float]:

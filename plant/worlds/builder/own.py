@@ -12,8 +12,22 @@ from plant.models.builder.mesh import Material, Mesh, mtl_text, obj_text, palett
 from plant.models.builder.sdf import Model, model_sdf
 from plant.models.builder.shapes import Box, Cylinder, Shape
 from plant.pictures import save_png
-from plant.worlds.builder.maps import BANDS_M, FREE, OCCUPIED, UNKNOWN, Bools, Grid, pgm_bytes, yaml_text
-from plant.worlds.builder.rooms import Door, Room, body_margin_m, clearance_m, find_rooms, most_open_pose
+from plant.worlds.builder.rooms import (
+    BANDS_M,
+    FREE,
+    OCCUPIED,
+    UNKNOWN,
+    Bools,
+    Door,
+    Grid,
+    Room,
+    body_margin_m,
+    clearance_m,
+    find_rooms,
+    most_open_pose,
+    pgm_bytes,
+    yaml_text,
+)
 from plant.worlds.geometry_files import OWN_PACKAGE
 from plant.worlds.world import WorldError
 from skills.files.yaml_scalars import yaml_of

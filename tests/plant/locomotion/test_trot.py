@@ -2,8 +2,8 @@ import math
 
 import numpy as np
 
-from plant.locomotion.trot import BodyMotion, Trot
 from plant.spot.capabilities import nominal_footholds
+from plant.spot.servos import BodyMotion, Trot
 
 DT_S = 0.01
 

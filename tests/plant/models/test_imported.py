@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from plant.models.imported import ImportedObject, read_imported, write_imported
+from plant.models.catalogue import ImportedObject, read_imported, write_imported
 from skills.files.errors import InputError
 
 DRILL = ImportedObject(

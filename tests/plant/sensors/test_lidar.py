@@ -10,8 +10,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.sensors.lidar import Lidar, LidarSpec
-from plant.sensors.ray_cast import NO_RETURN_M
+from plant.sensors.lidar import NO_RETURN_M, Lidar, LidarSpec
 
 QUIET = LidarSpec(sigma_m=0.0, dropout=0.0)
 FRICTION = CoulombFriction(0.8, 0.8)

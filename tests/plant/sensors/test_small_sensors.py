@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.sensors.gripper import GripperModel
-from plant.sensors.proprioception import BatteryModel, BatterySpec, ImuModel, ImuNoise, JointModel, discharged
+from plant.sensors.proprioception import (
+    BatteryModel,
+    BatterySpec,
+    GripperModel,
+    ImuModel,
+    ImuNoise,
+    JointModel,
+    discharged,
+)
 
 ZERO = np.zeros(3)
 QUIET_IMU = ImuNoise(0.0, 0.0, 0.0, 0.0)

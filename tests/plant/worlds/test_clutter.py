@@ -7,8 +7,14 @@ import itertools
 import numpy as np
 import pytest
 
-from plant.worlds.clutter import place_clutter, with_passers_by
-from plant.worlds.placement import outline_of, place_objects, place_people, polygon_distance
+from plant.worlds.placement import (
+    outline_of,
+    place_clutter,
+    place_objects,
+    place_people,
+    polygon_distance,
+    with_passers_by,
+)
 from plant.worlds.world import World, load_world
 
 SEEDS = (1, 2)

@@ -5,7 +5,17 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from plant.models.builder.importing.errors import ObjectsExtraMissingError
+
+class ObjectImportError(Exception):
+    """The file or what is wanted of it cannot be used; the message says why, `hint` what to do."""
+
+    def __init__(self, message: str, hint: str) -> None:
+        self.message, self.hint = message, hint
+        super().__init__(f"{message}; {hint}")
+
+
+class ObjectsExtraMissingError(ImportError):
+    """A library of the extra `objects` is not installed."""
 
 
 def objects_module(name: str) -> Any:

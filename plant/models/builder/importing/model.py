@@ -12,11 +12,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.models.builder.importing.errors import ObjectImportError
+from plant.models.builder.importing.libraries import ObjectImportError
 from plant.models.builder.importing.reading import Patch, read_patches
 from plant.models.builder.importing.resting import feet, resting_rotation
 from plant.models.builder.importing.solid import Solid, convex_parts, hull_of, same_points, solid_of
-from plant.models.builder.inertia import scaled_to, solid_mass
 from plant.models.builder.mesh import (
     SMOOTH_COSINE,
     Colour,
@@ -29,9 +28,8 @@ from plant.models.builder.mesh import (
     write_text,
 )
 from plant.models.builder.sdf import Model, model_sdf
-from plant.models.builder.shapes import ConvexMesh, MassProperties
-from plant.models.catalogue import load_catalogue
-from plant.models.imported import NAME, ImportedObject, write_imported
+from plant.models.builder.shapes import ConvexMesh, MassProperties, scaled_to, solid_mass
+from plant.models.catalogue import NAME, ImportedObject, load_catalogue, write_imported
 from plant.pictures import save_png
 from skills.robot import FloatArray, Picture
 

@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from plant.diagram import build_diagram
-from plant.worlds.builder.maps import FREE, OCCUPIED, UNKNOWN, Grid
 from plant.worlds.builder.own import rectangles, world_from_cylinders, world_from_grid
+from plant.worlds.builder.rooms import FREE, OCCUPIED, UNKNOWN, Grid
 from plant.worlds.world import WorldError, load_world
 from skills.robot import Pose2D
 

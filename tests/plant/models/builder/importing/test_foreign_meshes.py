@@ -11,7 +11,7 @@ import pytest
 
 from plant.models.builder.importing import ObjectImportError, Wanted, import_object
 from plant.models.builder.importing.solid import solid_of
-from plant.models.imported import ImportedObject
+from plant.models.catalogue import ImportedObject
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("coacd")

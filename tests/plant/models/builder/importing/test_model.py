@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 from errand_train.models.outlines import triangles_of
 from plant.models.builder.importing import ObjectImportError, ObjectsExtraMissingError, Wanted, import_object
-from plant.models.imported import ImportedObject, read_imported
+from plant.models.catalogue import ImportedObject, read_imported
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("coacd")

@@ -31,8 +31,7 @@ from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, ModelInst
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from plant.happenings.doors import add_panel
-from plant.kinds import BodyOptions, RobotBody, robot_kind
-from plant.locomotion.floating_base import FloatingBaseLimits
+from plant.kinds import BodyOptions, LocomotionLimits, RobotBody, robot_kind
 from plant.scene import Scene
 from plant.scenery import add_model, add_scenery
 from plant.worlds.world import DoorRule
@@ -94,7 +93,7 @@ def build_diagram(
     doors: Sequence[DoorRule] = (),
     visuals: bool = True,
     carried: bool = True,
-    locomotion: Mapping[str, FloatingBaseLimits] = MappingProxyType({}),
+    locomotion: Mapping[str, LocomotionLimits] = MappingProxyType({}),
     render: bool = True,
     renderer_parameters: RenderEngineVtkParams | None = None,
     meshcat: Meshcat | None = None,

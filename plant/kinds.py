@@ -75,15 +75,17 @@ class PlantRobot(Robot, Protocol):
 
 
 @dataclass(frozen=True)
-class BodyOptions:
-    """How a robot is put into a plant: with meshes where they are installed, moved within the limits of its stack.
+class LocomotionLimits:
+    """What bears a robot can do. Each kind of robot has its own, and takes no other's."""
 
-    Limits of another kind of robot's locomotion do not concern it.
-    """
+
+@dataclass(frozen=True)
+class BodyOptions:
+    """How a robot is put into a plant: with meshes where they are installed, moved within the limits of its stack."""
 
     visuals: bool = True
     carried: bool = True
-    locomotion: object | None = None
+    locomotion: LocomotionLimits | None = None
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from functools import partial
 
 import numpy as np
 
-from plant.control.commands import CommandStatuses
-from plant.control.joints import arm_set_point
+from plant.control.command_table import CommandStatuses
+from plant.control.servos import arm_set_point
 from plant.engine import Engine
 from skills.robot import (
     ArmTrajectory,

@@ -1,4 +1,4 @@
-"""What happened in the plant, kept as states over time, and shown afterwards as one HTML file."""
+"""What happens in the plant: kept as states over time and shown afterwards as one HTML file, or shown while it does."""
 
 from __future__ import annotations
 

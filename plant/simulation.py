@@ -16,7 +16,7 @@ from plant.diagram import LooseModel, build_diagram
 from plant.engine import Engine
 from plant.happenings.moves import Moves
 from plant.kept import State
-from plant.locomotion.floating_base import FloatingBaseLimits
+from plant.kinds import LocomotionLimits
 from plant.recording import LiveScene, Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.snapshot import SnapshotWriter, read_snapshot, restore
@@ -41,7 +41,7 @@ class Simulation:
         record: bool = False,
         visuals: bool = True,
         charge: float = 1.0,
-        locomotion: Mapping[str, FloatingBaseLimits] = MappingProxyType({}),
+        locomotion: Mapping[str, LocomotionLimits] = MappingProxyType({}),
         extra_models: Sequence[LooseModel] = (),
         starts: Mapping[str, Pose2D] = MappingProxyType({}),
         docks: Mapping[str, Pose2D] = MappingProxyType({}),

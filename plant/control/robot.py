@@ -7,8 +7,8 @@ from abc import ABC, abstractmethod
 import numpy as np
 from pydrake.systems.framework import Context
 
-from plant.control.commands import CommandTable, Part
-from plant.control.joints import ActuatedJoints, ArmServos, Closing, GripperGoal, GripperServo, GripperTolerances
+from plant.control.command_table import CommandTable, Part
+from plant.control.servos import ActuatedJoints, ArmServos, Closing, GripperGoal, GripperServo, GripperTolerances
 from plant.kept import Kept, State
 from plant.kinds import RobotBody
 from plant.sensors.suite import SensorSuite

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RigidBody
 from pydrake.systems.framework import Context
 
-from plant.control.joints import ActuatedJoints
+from plant.control.servos import ActuatedJoints
 from plant.fetch.wheels import WheelLimits
 from plant.kinds import RobotKind
 from plant.models.fetch.description import (

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import Context
 
-from plant.control.commands import Part
-from plant.control.joints import GripperTolerances, gripper_set_point
+from plant.control.command_table import Part
 from plant.control.robot import CommandedRobot
+from plant.control.servos import GripperTolerances, gripper_set_point
 from plant.fetch.model import FINGER_GAIN_N_M, FetchModel, JointIndex
 from plant.fetch.sensing import FetchSensors, axle
 from plant.fetch.wheels import WheelServos

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.fetch.capabilities import HEAD_CAMERA, head_camera
+from plant.fetch.kind import HEAD_CAMERA, head_camera
 from plant.fetch.model import FetchModel
 from plant.fetch.wheels import Axle, WheelOdometer
 from plant.kinds import SensorOptions

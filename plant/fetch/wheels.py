@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant.kept import Kept
+from plant.kinds import LocomotionLimits
 from skills.robot import FloatArray, Pose2D, quantities
 
 _MEAN_AHEAD = 0.75
@@ -15,7 +16,7 @@ _MEAN_AHEAD = 0.75
 
 
 @dataclass(frozen=True)
-class WheelLimits:
+class WheelLimits(LocomotionLimits):
     """Two driven wheels that bear a base: what they make of a velocity; the motors alone could push at 2.6 m/s^2.
 
     `lead_rad` is how far a wheel's set point runs ahead of it where it cannot follow.

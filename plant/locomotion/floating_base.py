@@ -28,11 +28,12 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from plant.kept import Kept
+from plant.kinds import LocomotionLimits
 from skills.robot import FloatArray, Pose2D, quantities
 
 
 @dataclass(frozen=True)
-class FloatingBaseLimits:
+class FloatingBaseLimits(LocomotionLimits):
     """A planar floating base that bears the body: what it can do; forces in N, torques in N m."""
 
     speed_m_s: quantities.Speed = 1.6

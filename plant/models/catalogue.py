@@ -1,4 +1,4 @@
-"""The catalogue of object classes in `plant/models`."""
+"""The classes of objects in `plant/models`, and the folders of models that `errand object import` has written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Proprioceptive sensors with bias and noise: joints, inertial measurement unit, battery, odometry."""
+"""Proprioceptive sensors with bias and noise: joints, inertial measurement unit, battery, odometry, gripper."""
 
 from __future__ import annotations
 

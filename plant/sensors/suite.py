@@ -13,7 +13,7 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
 
-from plant.control.joints import ActuatedJoints
+from plant.control.servos import ActuatedJoints
 from plant.kept import Kept
 from plant.kinds import RobotBody, SensorOptions
 from plant.scene import RENDERER

@@ -13,7 +13,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RevoluteJoint, RigidBody
 from pydrake.systems.framework import Context
 
-from plant.control.joints import ActuatedJoints
+from plant.control.servos import ActuatedJoints
 from plant.kinds import RobotKind
 from plant.locomotion.floating_base import FloatingBase, FloatingBaseLimits
 from plant.models.cache import kept_folder, user_cache

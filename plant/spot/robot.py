@@ -8,15 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.systems.framework import Context
 
-from plant.control.commands import Part
-from plant.control.joints import GripperTolerances, gripper_set_point
+from plant.control.command_table import Part
 from plant.control.robot import CommandedRobot
+from plant.control.servos import GripperTolerances, gripper_set_point
 from plant.locomotion.floating_base import Velocity
 from plant.models.spot.description import spot_facts
-from plant.spot.capabilities import nominal_footholds
+from plant.spot.kind import nominal_footholds
+from plant.spot.legs import BodyMotion, LegServos, Trot
 from plant.spot.model import JointIndex, SpotModel
 from plant.spot.sensing import SpotSensors
-from plant.spot.servos import BodyMotion, LegServos, Trot
 from skills.robot import CommandId, CommandState, FloatArray, Lease
 
 _GRIPPER_TOLERANCES = GripperTolerances(arrived=0.03, stall_rate=0.03)

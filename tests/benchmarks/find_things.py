@@ -36,7 +36,7 @@ from executive.testing.bench import SkillBench
 from plant.diagram import LooseModel, build_diagram
 from plant.engine import Engine
 from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
-from plant.spot.capabilities import spot_capabilities
+from plant.spot.kind import spot_capabilities
 from plant.worlds.lights import render_parameters
 from skills.api import Detection, Detector, Surface
 from skills.detect.skill import Detect, DetectInputs

@@ -2,7 +2,7 @@
 
 import pytest
 
-from plant.control.commands import MOST_KEPT, CommandTable, Part
+from plant.control.command_table import MOST_KEPT, CommandTable, Part
 from skills.robot import CommandId, CommandState
 
 

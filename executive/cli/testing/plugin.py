@@ -84,7 +84,7 @@ def _plant_bench(_robot: Any, world: Any) -> SkillBench:
 
 def _spot() -> Capabilities:
     logging.getLogger("drake").setLevel("WARNING")
-    from plant.spot.capabilities import spot_capabilities
+    from plant.spot.kind import spot_capabilities
 
     return spot_capabilities()
 

@@ -1,4 +1,4 @@
-"""Collision shapes and their SDF form; of the primitive ones also their inertias."""
+"""Collision shapes and their SDF form; mass properties of primitive shapes and of triangle meshes."""
 
 from __future__ import annotations
 

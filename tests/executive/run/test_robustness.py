@@ -19,7 +19,7 @@ from executive.run.watchdog import Watchdog
 from executive.run.worker import LockStepWorker, ThreadWorker
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
-from plant.spot.capabilities import spot_capabilities
+from plant.spot.kind import spot_capabilities
 from skills.api import Cause, Running, Skill, Succeeded
 from skills.faults.faulty_robot import with_faults
 from skills.faults.kinds import VERBS, Effect

@@ -7,7 +7,7 @@ import pytest
 
 from plant.diagram import LooseModel, build_diagram
 from plant.engine import Engine
-from plant.fetch.capabilities import fetch_capabilities
+from plant.fetch.kind import fetch_capabilities
 from plant.fetch.sensing import lidar_spec
 from plant.fetch.wheels import Axle, WheelOdometer
 from skills.robot import BaseKind, Mount, Pose2D

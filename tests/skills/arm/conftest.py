@@ -2,7 +2,7 @@
 
 import pytest
 
-from plant.spot.capabilities import spot_capabilities
+from plant.spot.kind import spot_capabilities
 
 
 @pytest.fixture(scope="session")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from plant.fetch.capabilities import fetch_capabilities
-from plant.spot.capabilities import spot_capabilities
+from plant.fetch.kind import fetch_capabilities
+from plant.spot.kind import spot_capabilities
 from skills.arm.collision import AROUND, ArmScene, Box, gaps_m
 from skills.arm.kinematics import arm_model
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from plant.fetch.capabilities import fetch_capabilities
+from plant.fetch.kind import fetch_capabilities
 from skills.api import PlanningError
 from skills.arm.gaze import head_angles, without_arm
 from skills.robot import FrameTree, Image, Intrinsics

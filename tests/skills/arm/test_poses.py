@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from plant.fetch.capabilities import fetch_capabilities
+from plant.fetch.kind import fetch_capabilities
 from skills.api import PlanningError
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model

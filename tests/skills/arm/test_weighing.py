@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plant.spot.capabilities import spot_capabilities
+from plant.spot.kind import spot_capabilities
 from skills.arm.arm_skill import held_mass_kg
 from skills.arm.collision import ArmScene
 from skills.arm.kinematics import arm_model

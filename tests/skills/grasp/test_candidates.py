@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from plant.fetch.capabilities import fetch_capabilities
-from plant.spot.capabilities import spot_capabilities
+from plant.fetch.kind import fetch_capabilities
+from plant.spot.kind import spot_capabilities
 from skills.arm.kinematics import arm_model
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.grasp.planning import within_reach

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from plant.spot.capabilities import spot_capabilities
+from plant.spot.kind import spot_capabilities
 from skills.api import ObjectObservation, PlanningError, Thing
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model

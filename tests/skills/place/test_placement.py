@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from plant.spot.capabilities import spot_capabilities
+from plant.spot.kind import spot_capabilities
 from skills.api import Surface
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model

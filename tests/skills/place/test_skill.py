@@ -9,7 +9,7 @@ from scripted_robot import ScriptedRobot, context_of, failed
 from table_scene import RED, Can
 from table_scene import TABLE as TOP
 
-from plant.spot.capabilities import spot_capabilities
+from plant.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Running, Succeeded, Surface
 from skills.arm.kinematics import arm_model
 from skills.place.placement import HeldObject

@@ -1,4 +1,4 @@
-"""The one place that imports the packages of the extra `objects`, which may be missing."""
+"""Imports the packages of the extra `objects`, which may be missing; errors of importing meshes."""
 
 from __future__ import annotations
 

@@ -71,11 +71,6 @@ def outward(points: FloatArray, faces: Faces, piece: NDArray[np.int64]) -> NDArr
     return turn
 
 
-def _volume(triangles: FloatArray) -> float:
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
-
-
 def _is_inside(probe: FloatArray, triangles: FloatArray) -> bool:
     """Whether a closed surface winds about all of some points."""
     for point in probe:
@@ -98,7 +93,6 @@ _EFFORT: Final = MappingProxyType({"mcts_iterations": 60, "mcts_nodes": 10, "res
 """Half of CoACD's usual search, which takes a quarter of the time and finds no worse parts."""
 _SAME_POINT: Final = 1e-6
 _LEAST_VOLUME: Final = 1e-6
-Faces = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from py_trees.common import Status
 
 from executive.tree.board import Constant, FromBoard
 from executive.tree.nodes.skill import SkillLeaf
-from plant.spot.capabilities import spot_capabilities
+from plant.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Part, Running, Skill, Succeeded
 
 

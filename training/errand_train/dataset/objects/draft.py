@@ -7,11 +7,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from plant.models.builder.inertia import scaled_to, shell_mass, solid_mass
 
 from errand_train.models.pictures import to_picture
 from plant.models.builder.mesh import IDENTITY, Colour, Material, Mesh
-from plant.models.builder.shapes import Box, Cylinder, MassProperties, Shape, Sphere, together
+from plant.models.builder.shapes import (
+    Box,
+    Cylinder,
+    MassProperties,
+    Shape,
+    Sphere,
+    scaled_to,
+    shell_mass,
+    solid_mass,
+    together,
+)
 from skills.robot import FloatArray, Picture
 
 PROUD_M = 0.0003

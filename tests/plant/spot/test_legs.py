@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from plant.models.spot.description import LEGS
-from plant.spot.servos import LegKinematics, UnreachableFootError
+from plant.spot.legs import LegKinematics, UnreachableFootError
 
 
 @pytest.mark.parametrize("leg", LEGS)

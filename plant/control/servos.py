@@ -1,4 +1,4 @@
-"""Where a robot's joints stand in the plant's state, and what their servos do."""
+"""A robot's joints and their servos: where they stand in the plant's state, set points of an arm and of a gripper."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Set points of the servos of Spot's legs."""
+"""Spot's legs: the trot says where its feet go, and the servos put them there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the simulated Fetch is and can do."""
+"""Fetch as a kind of robot: what it is and can do."""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@ import math
 
 import numpy as np
 
-from plant.spot.capabilities import nominal_footholds
-from plant.spot.servos import BodyMotion, Trot
+from plant.spot.kind import nominal_footholds
+from plant.spot.legs import BodyMotion, Trot
 
 DT_S = 0.01
 

@@ -1,19 +1,29 @@
-"""What the simulated Spot is and can do."""
+"""Spot as a kind of robot: what it is and can do."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-from plant.kinds import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
-from plant.models.spot.description import FACTS, FINGER_LINK, HAND_LINK, LEGS
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
-from plant.models.spot.description import CAMERAS, GRIPPER_JOINT, LEGS, spot_facts, spot_urdf
+
+from plant.kinds import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
+from plant.models.spot.description import (
+    CAMERAS,
+    FACTS,
+    FINGER_LINK,
+    GRIPPER_JOINT,
+    HAND_LINK,
+    LEGS,
+    spot_facts,
+    spot_urdf,
+)
 from plant.sensors.camera_spec import load_cameras
 from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, FloatArray, GripperCapabilities, Mount
 
 if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
+
 
 def nominal_footholds() -> FloatArray:
     """Resting places of the feet in the body frame, (4, 2), ordered as LEGS."""

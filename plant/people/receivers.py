@@ -2,7 +2,8 @@
 
 A person knows the plant's truth. The tray is a free body without weight whose pose and velocity are set, whatever is
 laid on it; it touches robots and loose objects. While it is not in use it is out of sight within the torso. The pull
-is a force on the object, and ends as soon as the gripper gives way.
+is a force on the object, and ends as soon as the gripper gives way. What a robot holds out is a loose object in a
+gripper before the robot's outline, clear of everything, and still.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Moves the people who walk: before each step of the plant, each is put where their walk has them.
 
 A walker's body slides on the floor by a planar joint. Its pose and velocity are set, whatever pushes it; it touches
-robots and loose objects, and passes through the scenery, around which its way is planned. Somebody who stands is not
-touched at all, as long as nobody pushes.
+robots and loose objects, and passes through the scenery, around which its way is planned: by shortest paths on a grid
+of the world's collision shapes. Somebody who stands is not touched at all, as long as nobody pushes.
 """
 
 from __future__ import annotations

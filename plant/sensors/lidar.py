@@ -1,4 +1,10 @@
-"""A spinning 16-beam LiDAR: rays against the scene's collision shapes, with range noise and lost returns."""
+"""A spinning 16-beam LiDAR: rays against the scene's collision shapes, with range noise and lost returns.
+
+The casting of rays is compiled, one call per revolution. Shapes are taken nearest first. A shape is tried only on the
+columns (azimuths) that its bounding box spans, and a column is skipped when all its rings already end nearer than the
+shape begins: indoors walls hide most of the rest. Ranges are along the ray; `NO_RETURN_M` stands for no hit (finite,
+since the kernels use fast arithmetic).
+"""
 
 from __future__ import annotations
 

@@ -152,7 +152,11 @@ class BodyMotion:
 
 
 class Trot(Kept, keeps=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_progress_s")):
-    """Where the four feet shall be, step by step. Feet are ordered as `LEGS`."""
+    """Where the four feet shall be, step by step. Feet are ordered as `LEGS`.
+
+    Diagonal pairs of feet swing in turn, and the others stay where they are on the floor. Footholds follow Raibert's
+    rule (Legged Robots That Balance, 1986): a foot lands where the hip will be in the middle of its next stance.
+    """
 
     def __init__(self, nominal_B: FloatArray, parameters: TrotParameters | None = None) -> None:
         """`nominal_B`: (4, 2) resting places of the feet in the body frame."""

@@ -1,4 +1,4 @@
-"""Where the seed puts objects and people: pure functions of a world and a seed."""
+"""Where the seed puts objects and people, those of the world and more besides: pure functions of a world and a seed."""
 
 from __future__ import annotations
 

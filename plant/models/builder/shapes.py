@@ -157,7 +157,7 @@ def _corners(mesh: Mesh) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _gathered(a: FloatArray, b: FloatArray, c: FloatArray, masses: FloatArray, *, apex: bool) -> MassProperties:
-    """Sum triangles, or tetrahedra with their apex at the origin, of the given masses."""
+    """Sum triangles, or tetrahedra with their apex at the origin, of the given masses (Blow and Binstock, 2004)."""
     total = float(masses.sum())
     if total <= 0:
         raise ValueError("the mesh has no mass: it is empty, open or inside out")

@@ -55,9 +55,10 @@ class Reply:
 
 @dataclass(frozen=True)
 class Waiting:
-    """A question of the robot that waits for an answer until `until_s` (robot's clock)."""
+    """A question of the robot, to what was said, that waits for an answer until `until_s` (robot's clock)."""
 
     question: ClarifyingQuestion
+    sentence: str
     until_s: float
 
 

@@ -65,15 +65,6 @@ class _Spoken:
     steps: tuple[Step, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Open:
-    """A question that waits, and what was said that led to it."""
-
-    question: ClarifyingQuestion
-    sentence: str
-    at_s: float
-
-
 class _When(enum.Enum):
     """When a mission is done, in a word for the reply."""
 
@@ -96,7 +87,7 @@ class Conversation(RunVisitor):
         self._lock = threading.Lock()
         self._progress: Progress | None = None
         self._last: _Spoken | None = None
-        self._open: _Open | None = None
+        self._open: Waiting | None = None
         self._names: frozenset[str] = frozenset()
         self._seen: frozenset[str] = frozenset()  # missions that have begun
         self._remarks = RemarkAnswers(speech, control)
@@ -117,7 +108,7 @@ class Conversation(RunVisitor):
         """See how far the run is."""
         self._progress = self._remarks.progress = progress
         tree = progress.trees.get(self._speech.robot_name)
-        if tree is not None and tree.mission_name not in self._seen:
+        if tree is not None:
             self._seen |= {tree.mission_name}
 
     def hear(self, text: str, now_s: float | None = None) -> Reply:
@@ -131,9 +122,8 @@ class Conversation(RunVisitor):
             said, ignored = self._addressed(text, now_s)
             reply = ignored or self._reply(said, now_s)
             waiting = self._waiting(now_s)
-        asked = None if waiting is None else Waiting(waiting.question, waiting.at_s + REMEMBERED_S)
         for listener in self._listeners:
-            listener(asked)
+            listener(waiting)
         return reply
 
     # -- to whom -----------------------------------------------------------------------------------------------------
@@ -195,11 +185,11 @@ class Conversation(RunVisitor):
         self._open = waiting
         return Reply(ReplyKind.QUESTION, f"I did not understand. {waiting.question.text}", question=waiting.question)
 
-    def _waiting(self, now_s: float) -> _Open | None:
-        return self._open if self._open is not None and now_s - self._open.at_s <= REMEMBERED_S else None
+    def _waiting(self, now_s: float) -> Waiting | None:
+        return self._open if self._open is not None and now_s <= self._open.until_s else None
 
     def _ask(self, question: ClarifyingQuestion, sentence: str, now_s: float) -> Reply:
-        self._open = _Open(question, sentence, now_s)
+        self._open = Waiting(question, sentence, now_s + REMEMBERED_S)
         return Reply(ReplyKind.QUESTION, question.text, question=question)
 
     # -- requests ----------------------------------------------------------------------------------------------------
@@ -227,16 +217,12 @@ class Conversation(RunVisitor):
         meant = self._understood(text, now_s)
         if meant.status is not Status.OK:
             return self._not_ok(meant, text, now_s)
-        when = _When.FIRST
+        when, refers = _When.FIRST, re.search(_PRONOUN, text, re.IGNORECASE)
         if re.match(_LATER, text, re.IGNORECASE):
             when = _When.AFTERWARDS
-        elif (
-            re.search(_PRONOUN, text, re.IGNORECASE)
-            and self._can_be_changed(now_s)
-            and self._same_thing(meant.commands)
-        ):
+        elif refers and self._can_be_changed(now_s) and self._same_thing(meant.commands):
             when = _When.INSTEAD
-        return self._begin(meant.commands, when, now_s, notes=meant.notes, memory=meant.memory, steps=meant.steps)
+        return self._begin_meant(meant, when, now_s)
 
     def _not_ok(self, meant: Understanding, text: str, now_s: float) -> Reply:
         if meant.question is not None:
@@ -255,7 +241,7 @@ class Conversation(RunVisitor):
             when = _When.INSTEAD if self._can_be_changed(now_s) else _When.FIRST
         whole = self._understood(follow_up.whole, now_s)
         if whole.status is Status.OK:
-            return self._begin(whole.commands, when, now_s, notes=whole.notes, memory=whole.memory, steps=whole.steps)
+            return self._begin_meant(whole, when, now_s)
         if last.steps:
             return refusal("I cannot change a part of what decides, repeats or waits; say it again")
         named = self._named(follow_up, now_s)
@@ -295,6 +281,9 @@ class Conversation(RunVisitor):
 
     # -- missions ----------------------------------------------------------------------------------------------------
 
+    def _begin_meant(self, meant: Understanding, when: _When, now_s: float) -> Reply:
+        return self._begin(meant.commands, when, now_s, notes=meant.notes, memory=meant.memory, steps=meant.steps)
+
     def _begin(
         self,
         commands: Sequence[Command],
@@ -312,14 +301,15 @@ class Conversation(RunVisitor):
         todo = tuple(commands)
         if when is _When.INSTEAD and not steps:
             todo = without_fetching(todo, self._held(), self._speech.knowledge)
+        whole = steps or steps_of_commands(todo)
         try:
-            tree = self._speech.compile(steps or steps_of_commands(todo), self._names)
+            tree = self._speech.compile(whole, self._names)
         except InputError as error:
             return refusal(str(error))
         give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, self._replace)
         mode = state.robots.get(self._speech.robot_name, state).mode
         still = "; I stand still until you say 'go on'" if mode in (Mode.PAUSED, Mode.STOPPED) else ""
-        told = "; ".join("; ".join(map(str, step.commands)) or step.words for step in steps or steps_of_commands(todo))
+        told = "; ".join("; ".join(map(str, step.commands)) or step.words for step in whole)
         text = "; ".join((*notes, f"{when.value}: {told}{still}"))
         reply = self._tried(partial(give, tree), text, todo)
         if reply.kind is ReplyKind.DONE:

@@ -10,6 +10,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
+from pydantic import Json
+
 from executive.mission.request import Request
 from executive.store.database import STORE_FILE, Database, form
 from executive.store.journal import StoreJournal, of_robot, prefix_of
@@ -53,13 +55,13 @@ class StoredMission:
 
     id: int
     state: MissionState
-    request: Request
+    request: Json[Request]
     queued: bool
     starts: int
     message: str
     clock_s: float | None
-    poses: Mapping[str, Pose2D]
-    instead: Mapping[str, Request]
+    poses: Json[dict[str, Pose2D]]
+    instead: Json[dict[str, Request]]
     standing: int | None = None
     why: str = ""
 
@@ -102,20 +104,21 @@ class MissionStore(Database):
 
     def begin(self, number: int) -> None:
         """Notes that the mission is started, or started again."""
-        with self.writing() as connection:
-            connection.execute("UPDATE mission SET state = 'running', starts = starts + 1 WHERE id = ?", (number,))
+        self._change("state = 'running', starts = starts + 1", number)
 
     def never_began(self, before: StoredMission) -> None:
         """Puts a mission that could not begin back into the state that it had `before`."""
-        with self.writing() as connection:
-            values = (before.state.value, before.message, before.starts, before.id)
-            connection.execute("UPDATE mission SET state = ?, message = ?, starts = ? WHERE id = ?", values)
+        values = (before.state.value, before.message, before.starts)
+        self._change("state = ?, message = ?, starts = ?", before.id, *values)
 
     def finish(self, number: int, state: MissionState, message: str) -> None:
         """Notes how the mission ended."""
+        values = (state.value, message, self.now().isoformat())
+        self._change("state = ?, message = ?, ended = ?", number, *values)
+
+    def _change(self, columns: str, number: int, *values: object) -> None:
         with self.writing() as connection:
-            values = (state.value, message, self.now().isoformat(), number)
-            connection.execute("UPDATE mission SET state = ?, message = ?, ended = ? WHERE id = ?", values)
+            connection.execute(f"UPDATE mission SET {columns} WHERE id = ?", (*values, number))
 
     def has_steps(self, number: int) -> bool:
         """Whether anything was done of a mission."""
@@ -147,27 +150,14 @@ class MissionStore(Database):
     def place(self, number: int, poses: Mapping[str, Pose2D]) -> None:
         """Notes where robots are when a mission begins (world frame); an earlier note of a robot stays."""
         known = {**poses, **self.mission(number).poses}
-        with self.writing() as connection:
-            text = form(dict[str, Pose2D]).dump_json(known).decode()
-            connection.execute("UPDATE mission SET poses = ? WHERE id = ?", (text, number))
+        self._change("poses = ?", number, form(dict[str, Pose2D]).dump_json(known).decode())
 
     def _mission(self, row: sqlite3.Row) -> StoredMission:
         try:
-            return StoredMission(
-                id=row["id"],
-                state=MissionState(row["state"]),
-                request=Request.from_json(row["request"]),
-                queued=bool(row["queued"]),
-                starts=row["starts"],
-                message=row["message"],
-                clock_s=row["clock_s"],
-                poses=form(dict[str, Pose2D]).validate_json(row["poses"]),
-                instead=form(dict[str, Request]).validate_json(row["instead"]),
-                standing=row["standing"],
-                why=row["why"],
-            )
+            mission: StoredMission = form(StoredMission).validate_python(dict(row))
         except ValueError as error:
             raise STORE_FILE.damaged(self.path, error) from error
+        return mission
 
 
 def insert(connection: sqlite3.Connection, request: Request, *, state: MissionState, **more: object) -> int:

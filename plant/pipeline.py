@@ -9,33 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from plant.control.command_table import CommandStatuses
 from plant.control.servos import arm_set_point
 from plant.engine import Engine
-from skills.robot import (
-    ArmTrajectory,
-    Battery,
-    Capabilities,
-    CommandId,
-    CommandState,
-    CommandStatus,
-    Gripper,
-    Image,
-    Imu,
-    Joints,
-    Lease,
-    Odometry,
-    Robot,
-    Scan,
-)
+from skills.robot import ArmTrajectory, CommandId, CommandState, CommandStatus, Lease, Robot
 
 Background = Callable[[Callable[[], None]], "Future[None]"]
 """Begins work beside the caller's."""
 
 _EXACT_S, _LEAST_S = 1e-9, 1e-6
+_BEGIN_LATER = frozenset({"drive", "stand", "sit", "point_head", "set_gripper"})
 
 
 class Pipeline:
@@ -95,7 +82,7 @@ class PipelinedRobot:
     """A robot whose commands begin when the step under way is done; until then they count as running.
 
     Verbs of the lease wait for that step, since they are answered at once. The time of an arm's trajectory counts from
-    its command: the arm takes it up where it should be by then.
+    its command: the arm takes it up where it should be by then. All else is passed on.
     """
 
     def __init__(self, robot: Robot, pipeline: Pipeline) -> None:
@@ -126,62 +113,16 @@ class PipelinedRobot:
         self.begin_commands()
         return self._robot
 
-    # -- know and sense -------------------------------------------------------------------------------------------
+    def __getattr__(self, verb: str) -> Any:
+        """A verb of the robot: those that move it begin later, those that sense or tell are its own."""
+        value = getattr(self._robot, verb)
+        if verb in _BEGIN_LATER:
+            value = partial(self._begin_later, value)
+        self.__dict__[verb] = value
+        return value
 
-    @property
-    def name(self) -> str:
-        """The robot's name."""
-        return self._robot.name
-
-    def capabilities(self) -> Capabilities:
-        """What this robot is and can do."""
-        return self._robot.capabilities()
-
-    def odometry(self) -> Odometry:
-        """Latest dead reckoning."""
-        return self._robot.odometry()
-
-    def imu(self) -> Imu:
-        """Latest inertial measurement."""
-        return self._robot.imu()
-
-    def scan(self) -> Scan | None:
-        """Latest LiDAR revolution, None before the first."""
-        return self._robot.scan()
-
-    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        """Take a picture as of the last readings. Raises ValueError for an unknown source."""
-        return self._robot.image(source, visual=visual, depth=depth)
-
-    def joints(self) -> Joints:
-        """Latest joint state."""
-        return self._robot.joints()
-
-    def gripper(self) -> Gripper:
-        """Latest gripper state."""
-        return self._robot.gripper()
-
-    def battery(self) -> Battery:
-        """Latest battery state."""
-        return self._robot.battery()
-
-    def faults(self) -> tuple[str, ...]:
-        """Present faults, empty when well."""
-        return self._robot.faults()
-
-    # -- act ------------------------------------------------------------------------------------------------------
-
-    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move at a body-frame velocity until the clock reads until_s."""
-        return self._later(partial(self._robot.drive, vx, vy, wz, until_s=until_s, lease=lease))
-
-    def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Hold the body origin at a height above the floor and a pitch."""
-        return self._later(partial(self._robot.stand, height_m, pitch_rad, until_s=until_s, lease=lease))
-
-    def sit(self, *, until_s: float, lease: Lease) -> CommandId:
-        """Lower the body to the floor."""
-        return self._later(partial(self._robot.sit, until_s=until_s, lease=lease))
+    def _begin_later(self, verb: Callable[..., CommandId], *given: Any, **named: Any) -> CommandId:
+        return self._later(partial(verb, *given, **named))
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follow a joint trajectory; done when its end is reached and the arm is still."""
@@ -192,14 +133,6 @@ class PipelinedRobot:
             return self._robot.move_arm(_taken_up(trajectory, late_s), until_s=until_s, lease=lease)
 
         return self._later(begin)
-
-    def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Turn the head, if there is one; done when it is there and still."""
-        return self._later(partial(self._robot.point_head, pan_rad, tilt_rad, until_s=until_s, lease=lease))
-
-    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
-        return self._later(partial(self._robot.set_gripper, opening, force_n, until_s=until_s, lease=lease))
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stop all motion, or only the given command if it still runs."""
@@ -212,12 +145,6 @@ class PipelinedRobot:
     def command_status(self, command: CommandId) -> CommandStatus:
         """What became of a command, as of the last readings. Raises KeyError for an id never given."""
         return self._statuses.status(command)
-
-    # -- own ------------------------------------------------------------------------------------------------------
-
-    def lease_holder(self) -> Lease | None:
-        """The lease that counts now; None while it is free."""
-        return self._robot.lease_holder()
 
     def acquire_lease(self, holder: str) -> Lease:
         """Take a free lease. Raises LeaseError when another holds it."""

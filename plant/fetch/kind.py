@@ -7,9 +7,6 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from pydrake.math import RollPitchYaw, RotationMatrix
-
 from plant.fetch.wheels import WheelLimits
 from plant.kinds import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
 from plant.models.fetch.description import (
@@ -19,14 +16,15 @@ from plant.models.fetch.description import (
     FACTS,
     FINGERS,
     HAND_LINK,
+    HEAD_CAMERA,
     HEAD_JOINTS,
     LIFT_JOINT,
     WHEELS,
     arm_joint_names,
     fetch_facts,
     fetch_urdf,
+    head_camera,
 )
-from plant.sensors.camera_spec import CameraSpec
 from skills.robot import (
     ArmCapabilities,
     BaseKind,
@@ -41,7 +39,6 @@ from skills.robot import (
 if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
 
-HEAD_CAMERA = "head"
 _CORNERS = 12
 
 
@@ -105,31 +102,6 @@ def _round(radius_m: float) -> tuple[tuple[float, float], ...]:
     out_m = radius_m / math.cos(math.pi / _CORNERS)
     angles = [(k + 0.5) * math.tau / _CORNERS for k in range(_CORNERS)]
     return tuple((out_m * math.cos(a), out_m * math.sin(a)) for a in angles)
-
-
-@cache
-def head_camera() -> CameraSpec:
-    """The head's camera: colour and depth of the same size."""
-    camera = fetch_facts()["camera"]
-    width, height = camera["width"], camera["height"]
-    focal = width / 2.0 / math.tan(math.radians(camera["horizontal_field_of_view_deg"]) / 2.0)
-    ahead = RotationMatrix(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
-    rpy = np.degrees(RollPitchYaw(ahead).vector())
-    return CameraSpec(
-        name=HEAD_CAMERA,
-        link=camera["link"],
-        colour=True,
-        rpy_deg=(float(rpy[0]), float(rpy[1]), float(rpy[2])),
-        xyz_m=tuple(camera["xyz"]),
-        width=width,
-        height=height,
-        fx=focal,
-        fy=focal,
-        cx=(width - 1) / 2.0,
-        cy=(height - 1) / 2.0,
-        depth_shrink=camera["depth_shrink"],
-        depth_range_m=tuple(camera["depth"]),
-    )
 
 
 def _add(plant: MultibodyPlant, name: str, options: BodyOptions) -> RobotBody:

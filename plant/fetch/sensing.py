@@ -8,11 +8,19 @@ from collections.abc import Mapping
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.fetch.kind import HEAD_CAMERA, head_camera
 from plant.fetch.model import FetchModel
 from plant.fetch.wheels import Axle, WheelOdometer
 from plant.kinds import SensorOptions
-from plant.models.fetch.description import HAND_LINK, HEAD_JOINTS, HEAD_LINK, LIFT_JOINT, arm_joint_names, fetch_facts
+from plant.models.fetch.description import (
+    HAND_LINK,
+    HEAD_CAMERA,
+    HEAD_JOINTS,
+    HEAD_LINK,
+    LIFT_JOINT,
+    arm_joint_names,
+    fetch_facts,
+    head_camera,
+)
 from plant.sensors.lidar import LidarSpec
 from plant.sensors.proprioception import GripperNoise
 from plant.sensors.suite import LidarMount, SensorSuite

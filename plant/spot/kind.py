@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from plant.kinds import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
 from plant.models.spot.description import (
@@ -19,19 +17,10 @@ from plant.models.spot.description import (
     spot_urdf,
 )
 from plant.sensors.camera_spec import load_cameras
-from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, FloatArray, GripperCapabilities, Mount
+from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, GripperCapabilities, Mount
 
 if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
-
-
-def nominal_footholds() -> FloatArray:
-    """Resting places of the feet in the body frame, (4, 2), ordered as LEGS."""
-    facts = spot_facts()["legs"]
-    x = facts["hip"]["offset"][0]
-    y = facts["hip"]["offset"][1] + facts["upper_leg"]["offset"][1]
-    signs: dict[str, Any] = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}
-    return np.array([[sx * x, sy * y] for sx, sy in (signs[leg] for leg in LEGS)], dtype=np.float64)
 
 
 @cache

@@ -21,6 +21,15 @@ class UnreachableFootError(ValueError):
     """The foot's target lies outside the leg's reach."""
 
 
+def nominal_footholds() -> FloatArray:
+    """Resting places of the feet in the body frame, (4, 2), ordered as LEGS."""
+    facts = spot_facts()["legs"]
+    x = facts["hip"]["offset"][0]
+    y = facts["hip"]["offset"][1] + facts["upper_leg"]["offset"][1]
+    signs: dict[str, tuple[int, int]] = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}
+    return np.array([[sx * x, sy * y] for sx, sy in (signs[leg] for leg in LEGS)], dtype=np.float64)
+
+
 @dataclass(frozen=True)
 class LegKinematics:
     """Geometry of one leg: `p_BHip` is the hip-x joint, `side_m` the signed offset to hip y, the rest link vectors."""

@@ -13,8 +13,7 @@ from plant.control.robot import CommandedRobot
 from plant.control.servos import GripperTolerances, gripper_set_point
 from plant.locomotion.floating_base import Velocity
 from plant.models.spot.description import spot_facts
-from plant.spot.kind import nominal_footholds
-from plant.spot.legs import BodyMotion, LegServos, Trot
+from plant.spot.legs import BodyMotion, LegServos, Trot, nominal_footholds
 from plant.spot.model import JointIndex, SpotModel
 from plant.spot.sensing import SpotSensors
 from skills.robot import CommandId, CommandState, FloatArray, Lease

@@ -10,8 +10,10 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+from pydrake.math import RollPitchYaw, RotationMatrix
 
 from plant.models import urdf
+from plant.sensors.camera_spec import CameraSpec
 from skills.files.yaml_source import read_yaml
 
 FACTS = Path(__file__).with_name("fetch.yaml")
@@ -20,6 +22,7 @@ WHEELS = ("left_wheel", "right_wheel")
 FINGERS = ("left_finger", "right_finger")
 LIFT_JOINT = "torso_lift"
 HEAD_JOINTS = ("head_pan", "head_tilt")
+HEAD_CAMERA = "head"
 
 
 @cache
@@ -27,6 +30,31 @@ def fetch_facts() -> Mapping[str, Any]:
     """The facts in `fetch.yaml`."""
     facts: Mapping[str, Any] = read_yaml(FACTS).data
     return facts
+
+
+@cache
+def head_camera() -> CameraSpec:
+    """The head's camera: colour and depth of the same size."""
+    camera = fetch_facts()["camera"]
+    width, height = camera["width"], camera["height"]
+    focal = width / 2.0 / math.tan(math.radians(camera["horizontal_field_of_view_deg"]) / 2.0)
+    ahead = RotationMatrix(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
+    rpy = np.degrees(RollPitchYaw(ahead).vector())
+    return CameraSpec(
+        name=HEAD_CAMERA,
+        link=camera["link"],
+        colour=True,
+        rpy_deg=(float(rpy[0]), float(rpy[1]), float(rpy[2])),
+        xyz_m=tuple(camera["xyz"]),
+        width=width,
+        height=height,
+        fx=focal,
+        fy=focal,
+        cx=(width - 1) / 2.0,
+        cy=(height - 1) / 2.0,
+        depth_shrink=camera["depth_shrink"],
+        depth_range_m=tuple(camera["depth"]),
+    )
 
 
 def fetch_urdf(*, root: str = BASE_LINK) -> str:

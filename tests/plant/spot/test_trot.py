@@ -2,8 +2,7 @@ import math
 
 import numpy as np
 
-from plant.spot.kind import nominal_footholds
-from plant.spot.legs import BodyMotion, Trot
+from plant.spot.legs import BodyMotion, Trot, nominal_footholds
 
 DT_S = 0.01
 

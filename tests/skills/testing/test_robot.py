@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from plant.fetch.kind import HEAD_CAMERA, fetch_capabilities
+from plant.fetch.kind import fetch_capabilities
+from plant.models.fetch.description import HEAD_CAMERA
 from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
 from skills.testing.blocks import ROOM, TABLE_CAN, Block, can_at
 from skills.testing.clock import VirtualClock

@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 821,
     "executive/app": 7626,
     "executive/cli": 3912,
-    "skills": 25259,
+    "skills": 25262,
     "plant": 12010,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 497, 88, 27

@@ -1,4 +1,4 @@
-"""The skill that goes to a place: it plans a path, follows it, makes way for other robots, and stands at the goal."""
+"""The navigate skill: plans a path, follows it, clears the paths of other robots, and stops at the goal."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _EARLY = 0.4
 
 
 class _InTheWay(Exception):  # noqa: N818 - no program error
-    """The robot stands on paths that other robots, `of` these names, have reserved."""
+    """The robot stands on paths that the robots `of` these names have reserved."""
 
     def __init__(self, of: Sequence[str]) -> None:
         super().__init__()
@@ -44,18 +44,21 @@ class _InTheWay(Exception):  # noqa: N818 - no program error
 
 @dataclass
 class _Progress:
-    """The least way (m) that was left so far, and when (s) that was, or when the robot last stood with a reason."""
+    """Progress along the path: the shortest rest of it so far (m), and when that was reached (s).
+
+    Time in which the robot stands for a reason does not count against it.
+    """
 
     best_s: float
     best_m: float = math.inf
     whole_m: float | None = None
 
     def restart(self, now_s: float) -> None:
-        """Count anew, along another path."""
+        """Starts again, along another path."""
         self.best_m, self.best_s = math.inf, now_s
 
     def note(self, left_m: float, now_s: float) -> float:
-        """Take in how much of the path is left; the share of the whole way that is done, 0 to 1."""
+        """Notes how much of the path is left; returns the share of the whole path that is done, 0 to 1."""
         if left_m < self.best_m - 0.03:
             self.best_m, self.best_s = left_m, now_s
         return min(1.0, max(0.0, 1.0 - left_m / max(self.whole_m or left_m, left_m, 1e-3)))
@@ -64,8 +67,8 @@ class _Progress:
 class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
     """The skill that `NavigatePorts` declares.
 
-    The attempt goes from stage to stage: localise, plan, follow, wait aside, settle; each returns the next one. A
-    robot that plans or follows and stands on another's reserved path goes aside first.
+    An attempt goes through the stages localise, plan, follow, wait aside and settle; each stage returns the next one.
+    A robot that stands on the reserved path of another leaves its stage and goes aside first.
     """
 
     Options: ClassVar[type] = NavigateOptions
@@ -76,7 +79,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         self._base = Base(context)
 
     def begin(self, inputs: NavigateInputs) -> None:
-        """Start anew to the goal of `inputs`."""
+        """Starts a new attempt to reach the goal of `inputs`."""
         super().begin(inputs)
         context, options, clock = self.context, self.options, self.context.clock
         self._base, self._inputs = Base(context), inputs
@@ -90,21 +93,21 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         self._around_due_s = self._review_due_s = -math.inf
 
     def end(self) -> None:
-        """Stop what this skill set in motion, and give the way back."""
+        """Stops the base and releases the reserved path."""
         self._base.stop()
         self.context.traffic.release()
         super().end()
 
     def suspend(self) -> None:
-        """End the attempt: the way is free for others meanwhile."""
+        """Ends the attempt, so that others may pass meanwhile."""
         self.end()
 
     def resume(self, inputs: NavigateInputs) -> None:
-        """Plan anew from here."""
+        """Starts a new attempt from here."""
         self.begin(inputs)
 
     def undone(self, inputs: NavigateInputs) -> str | None:
-        """The robot's place tells; skills that came after may have gone a little aside."""
+        """Uses the robot's pose; within 1 m it counts as there, because later skills may have moved it a little."""
         pose, goal = self.context.pose(), inputs.goal
         off_m = math.hypot(goal.x_m - pose.x_m, goal.y_m - pose.y_m)
         return None if off_m < _STILL_THERE_M else f"the robot is {off_m:.1f} m from where it went"
@@ -114,14 +117,14 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return ArmFootprint(self.context).now()
 
     def run(self, inputs: NavigateInputs) -> Routine[Succeeded]:
-        """One attempt, from stage to stage. Raises SkillFailure."""
+        """Runs one attempt, stage by stage. Raises SkillFailure."""
         stage: _Stage | Succeeded = self._localise
         while not isinstance(stage, Succeeded):
             try:
                 stage = yield from stage()
             except _InTheWay as way:
                 self._base.stop()
-                self._planning.go_aside(way.of, anew=True)
+                self._planning.go_aside(way.of, forget=True)
                 yield Running(f"making way for {', '.join(way.of)}")
                 self._around.look(self._base.last_velocity)
                 stage = self._plan
@@ -132,7 +135,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return self._stands() or super().step()
 
     def _stands(self) -> Step | None:
-        """Stand while the LiDAR does not work or the robot refuses to drive; fail once patience with these is over."""
+        """Stands while the LiDAR fails or the robot refuses to drive; fails when that lasts too long."""
         trouble = self._around.scans.trouble()
         if trouble is not None:
             self._base.stop()
@@ -158,23 +161,26 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
 
     @property
     def _refusal_cause(self) -> Cause:
-        """The cause where the robot does not drive at all, or does not drive on."""
+        """PRECONDITION before the robot has accepted a command, EXECUTION afterwards."""
         return Cause.EXECUTION if self._base.accepted else Cause.PRECONDITION
 
     def _now(self) -> float:
         return self.context.clock.now()
 
     def _tick(self, message: str, progress: float | None = None, *, waits_aside: bool = False) -> Routine[None]:
-        """Wait for the next tick, and look about. Raises _InTheWay, but for a robot that is on its way aside."""
+        """Waits for the next tick and updates the surroundings.
+
+        Raises _InTheWay when the robot stands on a reserved path, unless it is going aside already.
+        """
         yield Running(message, progress)
         if waits_aside or self._planning.aside is None:
-            first = self._planning.in_whose_way()
+            first = self._planning.robots_blocked()
             if first:
                 raise _InTheWay(first)
         self._around.look(self._base.last_velocity)
 
     def _localise(self) -> Routine[_Stage]:
-        """Wait for the first agreement of a scan with the map."""
+        """Waits until a scan agrees with the map."""
         while not self.context.localiser.estimate().localised:
             yield Running("finding out where I am")
         self._placed = True
@@ -183,7 +189,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return self._plan
 
     def _plan(self) -> Routine[_Stage]:
-        """Stand and wait for a plan, or for the time of the next attempt."""
+        """Waits for a plan, or for the time of the next one."""
         planning = self._planning
         while True:
             if not planning.under_way and self._now() < planning.wait_until_s:
@@ -197,7 +203,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
                 return stage
 
     def _after_plan(self) -> _Stage | None:
-        """The stage after a plan that is done; None while there is nothing new. Raises SkillFailure: give up."""
+        """The stage that follows a finished plan; None while none has finished. Raises SkillFailure to give up."""
         try:
             path = self._planning.path()
         except PlanningError as error:
@@ -209,7 +215,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return self._follow
 
     def _take(self, path: Path) -> None:
-        """Follow a path from now on."""
+        """Starts to follow a path."""
         controller, speed = self.context.stack.controller, self._inputs.max_speed_m_s
         self._follower: LocalController = controller.build(path, self._around.footprint, max_speed_m_s=speed)
         self._progress.whole_m = self._progress.whole_m or max(self._follower.length_m, 1e-3)
@@ -219,7 +225,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         self.context.publish("path", {"robot": self.context.robot.name, "frame": "world", "poses": poses})
 
     def _follow(self) -> Routine[_Stage]:
-        """Drive along the path, slowly near people; plan anew around what stays in the way."""
+        """Drives along the path, slowly near people; plans again around obstacles that stay."""
         while True:
             stage = self._after_plan()
             if stage is not None and stage != self._follow:
@@ -241,7 +247,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
                 yield from self._tick(*self._goes_on(answer))
 
     def _wait_aside(self) -> Routine[_Stage]:
-        """Stand at a waiting place until there is a way that nobody has reserved."""
+        """Stands at a waiting place until no other robot comes past, then plans on."""
         robots = self._around.robots
         while True:
             robots.stand(self.context.pose(), self._around.footprint)
@@ -254,7 +260,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return self._plan
 
     def _settle(self) -> Routine[Succeeded]:
-        """Come to rest, then look whether the robot really is at the goal. Raises SkillFailure: it is not."""
+        """Stops, then checks that the robot stands at the goal. Raises SkillFailure when it does not."""
         until_s, still = self._now() + self.options.settle_s, False
         while not still and self._now() < until_s:
             yield Running("stopping at the goal", 1.0)
@@ -271,7 +277,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return Succeeded(f"standing {sentence}")
 
     def _stands_at_once(self) -> str | None:
-        """Stand where the place is not known just now, or something comes into the way, and tell why."""
+        """Stops for a lost pose or a sudden obstacle; returns the reason, or None when the robot may drive."""
         if not self.context.localiser.estimate().localised:
             self._base.drive((0.0, 0.0, 0.0))
             return "standing until scans agree with the map again"
@@ -283,7 +289,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return f"standing, since something comes into the way at {place_text(danger_W)}"
 
     def _drive(self) -> tuple[Drive, str | None]:
-        """Give the base its next velocity; for whom the robot waits, None where it goes on. Raises SkillFailure."""
+        """Sends the next velocity; returns it with whom the robot waits for, or None. Raises SkillFailure."""
         follower, goal = self._follower, self._planning.goal
         pace = self._around.pace(follower, self._inputs.max_speed_m_s, goal)
         most_m_s, waits = self._give_way()
@@ -301,7 +307,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return answer, waits
 
     def _give_way(self) -> tuple[float, str | None]:
-        """How fast others' rights let the robot go (m/s), and what it does while it stands for them."""
+        """The speed that reserved paths allow (m/s), and the message while the robot waits for another."""
         robots, footprint, options = self._around.robots, self._around.footprint, self.options.giving_way
         robots.announce(self._follower, footprint)
         if self._planning.aside is not None:
@@ -320,7 +326,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return 0.0, self._waits(f"waiting for {name} to pass")
 
     def _waits(self, message: str) -> str:
-        """Stand with a good reason: that counts neither as blocked nor as stuck."""
+        """Counts this tick neither as blocked nor as stuck; returns the message."""
         self._progress.best_s = self._now()
         self._blocked.over()
         return message
@@ -330,18 +336,18 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return f"waiting for the way to become free at {place_text(obstacle_W) if obstacle_W else 'ahead'}"
 
     def _goes_on(self, answer: Drive) -> tuple[str, float | None]:
-        """Plan anew where the path does not do; what the robot does, and how much of it is done."""
+        """Plans again when the path fails; returns the message and the progress, 0 to 1."""
         done = self._progress.note(answer.remaining_m, self._now())
         trouble = self._trouble(answer)
         if not self._planning.under_way:
             if trouble is not None:
                 return self._replan(trouble), None
-            if self._leaves_little_clearance() or self._around.outgrown():
+            if self._lacks_clearance() or self._around.outgrown():
                 self._planning.ask(self._pose_then())
         return f"on the way, {answer.remaining_m:.1f} m to go", done
 
     def _trouble(self, answer: Drive) -> str | None:
-        """Why the path should be given up, None when all goes well."""
+        """The reason to give up the path; None when there is none."""
         if answer.blocked_at is None:
             self._blocked.over()
         else:
@@ -353,8 +359,8 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         stuck = self._now() - self._progress.best_s > self.options.stuck_s
         return "The robot does not get on." if stuck else None
 
-    def _leaves_little_clearance(self) -> bool:
-        """Whether what is seen by now leaves the path too little clearance; looked at every `review_s`."""
+    def _lacks_clearance(self) -> bool:
+        """Whether obstacles leave the path too little clearance; checked every `review_s`."""
         through = self._planning.avoided is Avoided.WORKING and self._planning.aside is None
         if through or not self.options.review_m or self._now() < self._review_due_s:
             return False
@@ -369,14 +375,14 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return True
 
     def _replan(self, why: str) -> str:
-        """Plan anew from where the robot will be. Raises SkillFailure: that was done too often."""
+        """Plans again from where the robot will be. Raises SkillFailure after too many plans."""
         self._progress.restart(self._now())
         self._blocked.over()
         self._planning.plan_again(why, self._pose_then())
         return f"{why} Planning a way around."
 
     def _pose_then(self) -> Pose2D | None:
-        """Where the path will have led when a plan asked for now is there; None when the robot is off it."""
+        """The pose on the path where a plan that is requested now will arrive; None when the robot is off the path."""
         vx, vy, _ = self.context.robot.odometry().velocity
         then = self._follower.pose_after(math.hypot(vx, vy) * self.options.planning_latency_s)
         off = relative(self.context.pose(), then)
@@ -384,7 +390,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return then if on_path else None
 
     def _arrived(self, share: float) -> bool:
-        """Whether the robot is within a share of the tolerances of where it goes just now."""
+        """Whether the robot is within a share of the tolerances of its present goal."""
         off = relative(self._planning.goal, self.context.pose())
         near = math.hypot(off.x_m, off.y_m) <= share * self._inputs.position_tolerance_m
         return near and abs(off.yaw_rad) <= share * self._inputs.yaw_tolerance_rad

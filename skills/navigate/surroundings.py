@@ -1,4 +1,4 @@
-"""What the navigate skill senses around the robot: obstacles, people, doors and other robots, and its own outline."""
+"""Perception of the navigate skill: obstacles, people, doors, other robots, and the robot's own footprint."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _OUTLINE_PERIOD_S = 0.5
 
 
 class Surroundings:
-    """The surroundings of one trip, by the sensors alone.
+    """What the sensors show around the robot during one trip.
 
-    `footprint` is the outline that plans and checks use, `room_m` the distance that plans keep to people.
+    Plans and checks use `footprint`; plans keep `room_m` from people.
     """
 
     def __init__(self, context: SkillContext, options: NavigateOptions) -> None:
@@ -44,12 +44,12 @@ class Surroundings:
         self._guard = CollisionGuard(context, self.footprint, options.guard)
 
     def look(self, velocity: FloatArray) -> None:
-        """Look for low obstacles and for people; what was seen comes in later. `velocity` (3,) was commanded last."""
+        """Takes pictures for low obstacles and people; results arrive later. `velocity` (3,) is the last command."""
         self._low.step()
         self._people.step(velocity)
 
-    def look_anew(self) -> None:
-        """Measure the outline, judge the doors, and give people their full room again once nobody is near."""
+    def refresh(self) -> None:
+        """Updates footprint and doors before a plan; restores `room_m` once nobody is near."""
         if not self.persons():
             self.room_m = self._space.room_m
         self.doors.look()
@@ -57,47 +57,47 @@ class Surroundings:
         self._measured_s = self._context.clock.now()
 
     def outgrown(self) -> bool:
-        """Whether the arm, or what it holds, reaches farther than `footprint`; measured every _OUTLINE_PERIOD_S."""
+        """Whether the arm or its load now reaches beyond `footprint`; measured every _OUTLINE_PERIOD_S."""
         if self._context.clock.now() < self._measured_s + _OUTLINE_PERIOD_S:
             return False
         self._measured_s = self._context.clock.now()
         return self._outline.outgrows(self.footprint)
 
     def persons(self) -> tuple[SeenPerson, ...]:
-        """The people near; what a camera takes for one where a robot says that it stands is that robot."""
+        """The people near, without detections at the poses that other robots report."""
         return tuple(one for one in self._people.people() if not self.robots.is_robot(one.place_W))
 
-    def comes_nearer(self) -> bool:
-        """Whether plans keep less distance to people from now on; False where nobody is near, or they do already."""
+    def reduce_distance_to_people(self) -> bool:
+        """Lets plans pass people more closely from now on; False when nobody is near, or they do already."""
         if not self.persons() or self.room_m <= self._space.least_room_m:
             return False
         self.room_m = self._space.least_room_m
         return True
 
     def costmap(self, here: Pose2D, goal: Pose2D, avoided: Avoided = Avoided.BODIES) -> FreeSpace:
-        """The costmap with doors and robots, and with room about people as far as `here` and the goal leave it."""
+        """The costmap with closed doors, robots, and as much room around people as `here` and the goal allow."""
         costmap = self.robots.costmap(self.doors.costmap(self._context.costmap), avoided)
         return spaced(costmap, self.footprint, (here, goal), self.persons(), self.room_m)
 
     def danger(self, follower: LocalController, most_m_s: float) -> tuple[float, float] | None:
-        """The place (x, y) of what comes into the robot's way so suddenly that it must stand; None: nothing does."""
+        """The point (x, y) of an obstacle for which the robot must stop at once; None when there is none."""
         return self._guard.danger(self._context.pose(), follower, most_m_s)
 
     def pace(self, follower: LocalController, most_m_s: float, goal: Pose2D) -> Pace:
-        """How fast people near the way let the robot go, most_m_s at most."""
+        """The speed that people near the path allow, at most `most_m_s`."""
         ahead = follower.ahead(self._space.look_ahead_m)
         return self._pace.pace(self._context.clock.now(), self._context.pose(), ahead, self.persons(), most_m_s, goal)
 
     def closed_doors(self, goals: Sequence[Pose2D]) -> tuple[Doorway, ...]:
-        """The doors that were seen closed and leave no path to any of the goals."""
+        """The closed doors that leave no path to any of the goals."""
         people_W = [one.place_W for one in self.persons()]
         return self.doors.in_the_way(self.footprint, self._context.pose(), goals, people_W)
 
     def cut_off(self, goals: Sequence[Pose2D]) -> bool:
-        """Whether surely none of the goals can be reached."""
+        """Whether none of the goals can be reached for sure."""
         return self.doors.regions(self.footprint, self._context.pose(), goals).cut_off
 
-    def forget(self) -> bool:
-        """Forget what the costmap saw, so that it is seen anew; whether there was anything to forget."""
+    def clear_obstacles(self) -> bool:
+        """Clears the obstacle layer of the costmap; whether there was anything to clear."""
         costmap = self._context.costmap
         return isinstance(costmap, ForgettingCostmap) and bool(costmap.forget_seen())

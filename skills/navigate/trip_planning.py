@@ -1,4 +1,4 @@
-"""The plans of one trip: asks the planner for them, and decides what is tried after one failed."""
+"""Path planning of one trip: requests plans, and decides what to try after a plan failed."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ __all__ = ["TripPlanning", "place_text"]
 
 
 @dataclass
-class _Lately:
-    """Whether somebody was near within the last gap_s, who may be why a plan fails, and has not been for too long."""
+class _Presence:
+    """Recent presence of people or robots that may leave: near within the last `gap_s`, and not for too long."""
 
     gap_s: float
     last_s: float = -math.inf
     since_s: float = -math.inf
 
     def note(self, now_s: float) -> None:
-        """Somebody is near now."""
+        """Notes that somebody is near now."""
         self.since_s = now_s if now_s - self.last_s > self.gap_s else self.since_s
         self.last_s = now_s
 
     def may_go(self, now_s: float, patience_s: float) -> bool:
-        """Whether it is worth waiting for them."""
+        """Whether they were near lately, and for less than `patience_s`."""
         return now_s - self.last_s < self.gap_s and now_s - self.since_s < patience_s
 
 
 class TripPlanning:
-    """The plans of one trip.
+    """Requests the plans of one trip.
 
-    `aside` is the pose to which the robot goes to let others pass, None on its way to the goal; `avoided` what plans
-    lead around of other robots; `obstacle_W` the last place (x, y) that was found blocked. The next plan is not asked
-    for before `wait_until_s`.
+    `aside` is the waiting pose to which the robot goes while others pass, None when it goes to the goal. `avoided` says
+    what plans avoid of other robots, `obstacle_W` the last blocked point (x, y). No plan is requested before
+    `wait_until_s`.
     """
 
     def __init__(
@@ -52,9 +52,9 @@ class TripPlanning:
     ) -> None:
         self._context, self._options, self._inputs, self._around = context, options, inputs, around
         self._job: Job[Path] | None = None
-        self._map_alone = self._map_leads = self._seen_anew = self._waited = False
+        self._map_alone = self._map_leads = self._looked_again = self._waited = False
         self._replans = 0
-        self._people, self._robots = _Lately(options.after_person_s), _Lately(options.after_person_s)
+        self._people, self._robots = _Presence(options.after_person_s), _Presence(options.after_person_s)
         self._closed = Patience(context.clock, options.doors.patience_s)
         self._tried: tuple[Pose2D, ...] = ()
         self._asked_due_s = -math.inf
@@ -65,21 +65,21 @@ class TripPlanning:
 
     @property
     def goal(self) -> Pose2D:
-        """Where the robot goes just now: the goal, or a place where it waits for others to pass."""
+        """The present goal: that of the inputs, or the waiting pose."""
         return self.aside or self._inputs.goal
 
     @property
     def under_way(self) -> bool:
-        """Whether a plan was asked for and not taken yet."""
+        """Whether a plan is requested and not taken yet."""
         return self._job is not None
 
     def ask(self, start: Pose2D | None = None, *, map_alone: bool = False) -> None:
-        """Sample the costmap now and plan in the Worker, from a pose or from here.
+        """Samples the costmap now and plans in the Worker, from `start` or from here.
 
-        `map_alone`: as if nobody stood about, only to see whether there is a way.
+        With `map_alone` the plan ignores people and robots, to find out whether a path exists at all.
         """
         context, around = self._context, self._around
-        around.look_anew()
+        around.refresh()
         begin, self._map_alone = start or context.pose(), map_alone
         avoided = self.avoided if self.aside is None else Avoided.BODIES
         plan = context.stack.planner.problem(
@@ -93,7 +93,7 @@ class TripPlanning:
         self._job = context.worker.submit(plan, latency_s=self._options.planning_latency_s, name="plan a path")
 
     def path(self) -> Path | None:
-        """The path of a plan that is done, once; None: there is none to follow. Raises PlanningError."""
+        """The path of a finished plan, returned once; None when there is none to follow. Raises PlanningError."""
         if self._job is None or not self._job.done():
             return None
         job, self._job = self._job, None
@@ -106,35 +106,35 @@ class TripPlanning:
         return path
 
     def plan_again(self, why: str, start: Pose2D | None) -> None:
-        """Plan anew, since the path does not do. Raises SkillFailure: that was done too often."""
+        """Requests another plan, because the path failed for the reason `why`. Raises SkillFailure after too many."""
         self._replans += not self._around.robots.somebody_goes()
         self.avoided = Avoided.WAYS
         if self._replans > self._options.replans:
-            text = f"{why} Planning anew {self._options.replans} times did not help."
+            text = f"{why} Planning again {self._options.replans} times did not help."
             raise SkillFailure(Cause.EXECUTION, text)
         self.ask(start)
 
     def try_instead(self, why: str) -> bool:
-        """Decide what is done after a plan failed, and whether the robot waits aside before it plans again.
+        """Decides what to try after a plan failed; returns whether the robot waits aside before the next plan.
 
-        Raises SkillFailure: nothing is left to try.
+        Raises SkillFailure when nothing is left to try.
         """
-        if self._map_alone:  # nobody is in the way: there is none
+        if self._map_alone:  # nobody blocks this plan, so no path exists
             raise SkillFailure(Cause.PLANNING, why)
         waited, self._waited = self._waited, False
         if waited and self.aside is None and self._around.robots.ahead_of_us():
             return True
-        if not (self._goes_around_less() or self._around.comes_nearer()):
+        if not (self._asks_for_less() or self._around.reduce_distance_to_people()):
             self._wait_or_give_up(why)
         return False
 
-    def go_aside(self, first: Sequence[str], *, anew: bool = False) -> None:
-        """Plan to the nearest waiting place; where none is left to try, change turns, so that the others make way.
+    def go_aside(self, first: Sequence[str], *, forget: bool = False) -> None:
+        """Plans to the nearest waiting pose; where none is left to try, lets the robots `first` clear the path instead.
 
-        `anew`: no place was tried yet.
+        With `forget` the waiting poses that were tried before count again.
         """
         context, robots = self._context, self._around.robots
-        self._tried = () if anew else self._tried
+        self._tried = () if forget else self._tried
         place = None
         if len(self._tried) < self._options.giving_way.places:
             place = robots.waiting_place(context.costmap, self._around.footprint, context.pose(), self._tried)
@@ -145,13 +145,13 @@ class TripPlanning:
         self.ask()
 
     def go_on(self) -> None:
-        """Plan to the goal after waiting aside."""
+        """Plans to the goal again after waiting aside."""
         self.wait_until_s = self._now() + self._options.giving_way.again_s
         self.aside, self.avoided, self._waited = None, Avoided.WAYS, True
         self.ask()
 
-    def in_whose_way(self) -> Sequence[str]:
-        """The robots for which this one has to make way, where it stands now; none for a while after it could not."""
+    def robots_blocked(self) -> Sequence[str]:
+        """Names of the robots on whose reserved path this one stands; none for a while after it failed to go aside."""
         if self._now() < self._asked_due_s:
             return ()
         return self._around.robots.in_whose_way(self._context.pose(), self._around.footprint)
@@ -161,12 +161,12 @@ class TripPlanning:
 
     @property
     def _goals(self) -> tuple[Pose2D, ...]:
-        """The goal, and the poses nearby that will do as well."""
+        """The goal, and the poses near it that count as reached too."""
         goal = self._inputs.goal
         return (goal, *(compose(goal, Pose2D(*offset, 0.0)) for offset in self._inputs.nearby_m))
 
-    def _goes_around_less(self) -> bool:
-        """Whether a plan is asked for that avoids less of other robots, or leads to another waiting place."""
+    def _asks_for_less(self) -> bool:
+        """Requests a plan that avoids less of other robots, or leads to another waiting pose, where there is one."""
         robots = self._around.robots
         if self.aside is not None:
             self._tried = (*self._tried, self.aside)
@@ -179,7 +179,7 @@ class TripPlanning:
         return less is not None
 
     def _wait_or_give_up(self, why: str) -> None:
-        """Wait for what may go away, and see it anew; at the bound raise SkillFailure."""
+        """Waits for people, robots or doors, or looks again. Raises SkillFailure at the limits of the options."""
         robot = self._robot_may_go()
         may_go = robot or self._people_may_go()
         if not robot and self._waits_for_doors():
@@ -188,7 +188,7 @@ class TripPlanning:
         if self._replans < self._options.replans and self._around.doors.forget_distant(self._context.pose()):
             self.ask()
             return
-        if not may_go and self._sees_anew():
+        if not may_go and self._looks_again():
             return
         if self.obstacle_W is None or self._replans >= self._options.replans:
             who = self._around.robots.name_at(self.obstacle_W) or "something seen"
@@ -200,7 +200,7 @@ class TripPlanning:
             self.ask(map_alone=True)
 
     def _waits_for_doors(self) -> bool:
-        """Whether closed doors leave no path, and may still be opened. Raises SkillFailure: patience is over."""
+        """Whether to wait for closed doors that leave no path. Raises SkillFailure once patience with them is over."""
         doors, options = self._around.closed_doors(self._goals), self._options.doors
         if not doors:
             return False
@@ -210,34 +210,31 @@ class TripPlanning:
         self.wait_until_s = self._now() + options.look_s
         return True
 
-    def _sees_anew(self) -> bool:
-        """Forget once what was seen and look again, before the goal is taken for cut off by it."""
-        if self._seen_anew or not self._around.cut_off(self._goals):
+    def _looks_again(self) -> bool:
+        """Clears the costmap's obstacle layer once before the goal counts as cut off; whether that removed anything."""
+        if self._looked_again or not self._around.cut_off(self._goals):
             return False
-        self._seen_anew = True
-        if not self._around.forget():
+        self._looked_again = True
+        if not self._around.clear_obstacles():
             return False
         self.wait_until_s = self._now() + self._options.doors.look_s
         return True
 
     def _people_may_go(self) -> bool:
-        """Whether a failure may be due to people who are near or were a moment ago, and patience lasts."""
+        """Whether people who are or were near may block the path only for now."""
         if self._around.persons():
             self._people.note(self._now())
         return self._people.may_go(self._now(), self._options.person_patience_s)
 
     def _robot_may_go(self) -> bool:
-        """Whether a failure may be due to a robot that is about, or was a moment ago, and patience lasts.
-
-        What the costmap remembers of it is forgotten; what still stands there is seen anew.
-        """
+        """Whether another robot may block the path only for now; then the costmap's obstacle layer is cleared."""
         if self._around.robots.others():
             self._robots.note(self._now())
         if not self._robots.may_go(self._now(), self._options.giving_way.blocked_patience_s):
             return False
         self.obstacle_W = self.obstacle_W or (self.goal.x_m, self.goal.y_m)
         self._around.robots.wish(self._context.pose(), self.goal, self._around.footprint)
-        self._around.forget()
+        self._around.clear_obstacles()
         return True
 
 

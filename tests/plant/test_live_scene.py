@@ -5,7 +5,7 @@ import urllib.request
 import numpy as np
 import pytest
 
-from plant import live_scene
+from plant import recording
 from plant.simulation import Simulation
 from plant.worlds.world import load_world
 
@@ -25,7 +25,7 @@ def test_the_scene_is_served_on_this_machine(simulation):
 @pytest.mark.parametrize(("easy", "refreshed"), [(False, 10), (True, 2)])
 def test_it_is_refreshed_a_few_times_a_second_of_the_wall(simulation, monkeypatch, easy, refreshed):
     wall = {"s": 100.0}
-    monkeypatch.setattr(live_scene.time, "perf_counter", lambda: wall["s"])
+    monkeypatch.setattr(recording.time, "perf_counter", lambda: wall["s"])
     scene = simulation.show_live()
     if easy:
         scene.go_easy()
@@ -42,7 +42,7 @@ def test_the_camera_goes_along_with_the_robot_where_that_is_wanted(simulation, m
     # at first the whole world; following: beside the robot's body; no longer: the whole world again
     scene = simulation.show_live()
     cameras = []
-    monkeypatch.setattr(live_scene, "set_camera", lambda _, view: cameras.append(view.p_WTarget))
+    monkeypatch.setattr(recording, "set_camera", lambda _, view: cameras.append(view.p_WTarget))
     for wanted in (False, True, False):
         scene.follow(wanted)
         scene.publish()

@@ -168,9 +168,13 @@ class ClusterWorkers:
         work = partial(_checked, installed_code(), function)
         futures = self._client.map(work, items, pure=False, retries=0)
         item_of = {future.key: item for future, item in zip(futures, items, strict=True)}
+        ended: SimpleQueue[Any] = SimpleQueue()
+        for each in futures:
+            each.add_done_callback(ended.put)
         try:
             with _told_of_loss():
-                for future in self._as_completed(futures):
+                for _ in futures:
+                    future = self._patiently(ended.get)
                     item = item_of[future.key]
                     if future.status == "cancelled":
                         raise InputError("the scheduler has stopped answering", hint=_GO_ON)
@@ -180,23 +184,22 @@ class ClusterWorkers:
                             raise error
                         yield Finished(item, None, f"{MOST_DEATHS} worker processes have died with it")
                     else:
-                        yield Finished(item, future.result())
+                        yield Finished(item, self._patiently(future.result))
                     future.release()
         finally:
             if self._client.status == "running":
                 self._client.cancel(futures, force=True)
 
-    def _as_completed(self, futures: Sequence[Any]) -> Iterator[Any]:
-        """Each future as it ends. Raises InputError: for `GONE_S` no worker is connected."""
-        ended: SimpleQueue[Any] = SimpleQueue()
-        for future in futures:
-            future.add_done_callback(ended.put)
-        left, seen_s = len(futures), time.monotonic()
-        while left:
+    def _patiently(self, get: Callable[..., Any]) -> Any:
+        """What `get` gives, asked again and again. Raises InputError: for `GONE_S` no worker is connected.
+
+        A result is lost with the last worker that holds it, and comes when another has done the work again.
+        """
+        seen_s = time.monotonic()
+        while True:
             try:
-                yield ended.get(timeout=min(_LOOK_S, GONE_S))
-                left, seen_s = left - 1, time.monotonic()
-            except Empty as error:
+                return get(timeout=min(_LOOK_S, GONE_S))
+            except (Empty, TimeoutError) as error:
                 if self.count:
                     seen_s = time.monotonic()
                 elif time.monotonic() - seen_s >= GONE_S:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -16,7 +15,7 @@ from rich.text import Text
 from executive.app.signals import interrupted_by_hang_up
 from executive.app.worlds import knowledge_of, open_world
 from executive.cli.options import takes_request
-from executive.cli.output import BAD_INPUT, console_for
+from executive.cli.output import BAD_INPUT, console_for, print_json
 from executive.language.parser import load_parser
 from executive.language.understand import Part, Status, Understanding
 from executive.mission.request import Request
@@ -94,27 +93,14 @@ def listener_for(
     Raises:
         InputError: the extra `speech` is not installed, the vocabulary cannot be read, or robots cannot be told apart.
     """
-    if robots:
-        refuse_alike(robots)
-        first, *others = robots
-        names = (
-            vocabulary_of_world(knowledge, called=False) if vocabulary is None else read_vocabulary(vocabulary, None)
-        )
-        called_by = (first, tuple(others)) if require_wake else (None, ())
-        words = Vocabulary((*names.names, *robots), *called_by)
-        team = Reader(load_parser(), knowledge, words, tuple(robots), require_wake)
-        return Listener(load_whisper(), load_detector, team, spoken_phrases(words))
-    name = robot_name or knowledge.robot.name
-    called = name if require_wake else None
-    words = (
-        vocabulary_of_world(knowledge, called=require_wake)
-        if vocabulary is None
-        else read_vocabulary(vocabulary, called)
-    )
-    heard = Vocabulary(words.names, called)
-    world = None if open_words else knowledge
-    reader = Reader(load_parser(), world, heard, (name,), require_wake, tuple(knowledge.robot.others))
-    return Listener(load_whisper(), load_detector, reader, spoken_phrases(heard))
+    names = tuple(robots) or (robot_name or knowledge.robot.name,)
+    refuse_alike(robots)
+    plain = vocabulary_of_world(knowledge, called=False) if vocabulary is None else read_vocabulary(vocabulary, None)
+    called = (names[0], names[1:]) if require_wake else (None, ())
+    words = Vocabulary((*plain.names, *(names if require_wake or robots else ())), *called)
+    world, others = None if open_words else knowledge, () if robots else tuple(knowledge.robot.others)
+    reader = Reader(load_parser(), world, words, names, require_wake, others)
+    return Listener(load_whisper(), load_detector, reader, spoken_phrases(words))
 
 
 def called_robots(robots: Sequence[RobotConfig], knowledge: Knowledge) -> tuple[str, ...]:
@@ -122,30 +108,24 @@ def called_robots(robots: Sequence[RobotConfig], knowledge: Knowledge) -> tuple[
     return tuple(each.name for each in robots) or tuple(map(display_name, knowledge.robots or ()))
 
 
-def heard_sentence(wav: Path, listener: Listener) -> str:
-    """What was said in a recording, in words that can be typed instead.
-
-    Raises:
-        InputError: it cannot be read, or nobody is heard to speak.
-    """
-    recording = listener.file(wav)
-    if not recording.heard:
-        raise InputError(recording.reason or "", hint="speak louder, or nearer to the microphone", file=wav)
-    return " ".join(one.meant.text for one in recording.decisive)
-
-
 def hear_request(wav: Path, request: Request, *, console: Console) -> str:
-    """The sentence in a recording, shown on the console; it is for the robots and the world of a request.
+    """The sentence in a recording in words that can be typed instead, shown on the console.
+
+    It is for the robots and the world of a request.
 
     Raises:
-        InputError: the request says something itself, the extra `speech` is not installed, or see `heard_sentence`.
+        InputError: the request says something itself, the extra `speech` is not installed, the recording cannot be
+            read, or nobody is heard to speak.
     """
     if request.file is not None or request.sentence is not None:
         raise InputError("--listen stands alone", hint="leave out --say and the mission file")
     knowledge = knowledge_of(open_world(request.world or DEFAULT_WORLD))
     robots = called_robots(request.robots, knowledge)
     listener = listener_for(knowledge, require_wake=request.require_wake is not False, robots=robots)
-    sentence = heard_sentence(wav, listener)
+    recording = listener.file(wav)
+    if not recording.heard:
+        raise InputError(recording.reason or "", hint="speak louder, or nearer to the microphone", file=wav)
+    sentence = " ".join(one.meant.text for one in recording.decisive)
     console.print(Text(f"heard: {sentence}"))
     return sentence
 
@@ -171,12 +151,8 @@ def _show_heard(heard: HeardUtterance, console: Console, voice: Voice) -> None:
     console.print(Text(f"{heard.start_s:7.1f} s  {heard.text}"))
     console.print(Text(f"           {answer_line(meaning)}", style="green" if meaning.commands else "yellow"))
     if meaning.status is not Status.NOT_ADDRESSED:
-        voice.say(_aloud(meaning))
-
-
-def _aloud(meaning: Understanding) -> str:
-    """The answer without the form of the commands, which nobody wants read out."""
-    return "All right." if meaning.status is Status.OK else answer_line(meaning)
+        # nobody wants the form of the commands read out
+        voice.say("All right." if meaning.status is Status.OK else answer_line(meaning))
 
 
 def _meter(hearing: Hearing) -> Text:
@@ -203,10 +179,11 @@ def _answer(listener: Listener, file: Path, *, jsonl: bool) -> Recording | None:
     except InputError as error:
         typer.echo(f"errand: {error}", err=True)
         if jsonl:
-            _print(_unheard(file, error))
+            nothing = {"transcript": "", "addressed": False, "status": Status.REFUSED.value, "commands": []}
+            print_json({"file": str(file), **nothing, "reason": str(error), "notes": [], "utterances": []})
         return None
     if jsonl:
-        _print(recording.to_json())
+        print_json(recording.to_json())
     else:
         _show_recording(recording)
     return recording
@@ -229,12 +206,3 @@ def _show_recording(recording: Recording) -> None:
 def _who(part: Part) -> str:
     """Which of several robots does a part."""
     return part.robot if isinstance(part.robot, str) else f"{part.robot.value} of the robots"
-
-
-def _unheard(file: Path, error: InputError) -> dict[str, Any]:
-    nothing = {"transcript": "", "addressed": False, "status": Status.REFUSED.value, "commands": []}
-    return {"file": str(file), **nothing, "reason": str(error), "notes": [], "utterances": []}
-
-
-def _print(answer: dict[str, Any]) -> None:
-    print(json.dumps(answer, ensure_ascii=False), flush=True)

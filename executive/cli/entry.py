@@ -231,22 +231,18 @@ def main() -> NoReturn:
 
 
 def command_line() -> None:
-    """Does what the command line asks for. Raises SystemExit in the end."""
-    try:
-        for argument in sys.argv[1:]:
-            _refuse_undecoded(argument)
-    except InputError as error:
-        typer.echo(f"errand: {error}", err=True)
-        sys.exit(2)
+    """Does what the command line asks for. Raises SystemExit in the end.
+
+    Bytes that are no text are refused: no log, store or JSON could hold them.
+    """
+    for argument in sys.argv[1:]:
+        try:
+            argument.encode()
+        except UnicodeEncodeError:
+            refused = InputError(f"'{argument[:60]}' is no UTF-8 text", hint="name it in UTF-8")
+            typer.echo(f"errand: {refused}", err=True)
+            sys.exit(2)
     app()
-
-
-def _refuse_undecoded(argument: str) -> None:
-    """Raise InputError for bytes that are no text: no log, store or JSON could hold them."""
-    try:
-        argument.encode()
-    except UnicodeEncodeError as error:
-        raise InputError(f"'{argument[:60]}' is no UTF-8 text", hint="name it in UTF-8") from error
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from executive.app.worlds import knowledge_of, open_world
 from executive.cli.options import takes_request
 from executive.cli.output import BAD_INPUT, console_for, print_json
 from executive.language.parser import load_parser
-from executive.language.understand import Part, Status, Understanding
+from executive.language.understand import Status, Understanding
 from executive.mission.request import Request
 from executive.speech.activity import load_detector
 from executive.speech.hearing import Reader, refuse_alike, spoken_phrases
@@ -197,12 +197,8 @@ def _show_recording(recording: Recording) -> None:
     if recording.status is not Status.OK:
         typer.echo(f"errand: {recording.file}: {recording.reason}", err=True)
     for part in recording.parts:
+        who = part.robot if isinstance(part.robot, str) else f"{part.robot.value} of the robots"
         for command in part.meaning.commands:
-            typer.echo(f"  {_who(part)}: {command}")
+            typer.echo(f"  {who}: {command}")
     for command in () if recording.parts else recording.commands:
         typer.echo(f"  {command}")
-
-
-def _who(part: Part) -> str:
-    """Which of several robots does a part."""
-    return part.robot if isinstance(part.robot, str) else f"{part.robot.value} of the robots"

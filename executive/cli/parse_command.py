@@ -41,7 +41,10 @@ def parse(
         raise InputError("--svg draws one sentence", hint='try: errand parse "go to the kitchen" --svg arcs.svg')
     knowledge = None if open_words else knowledge_of(open_world(world or DEFAULT_WORLD))
     parser = load_parser()
-    lines = [sentence] if sentence is not None else _lines_of(file)
+    if file is None:
+        lines = [sentence or ""]
+    else:
+        lines = read_text(file, most_bytes=20_000_000, hint="name a text file in UTF-8").splitlines()
     wake = knowledge is not None and knowledge.robot.require_wake
     told = (understand(line, parser=parser, knowledge=knowledge, require_wake=wake) for line in lines)
     if jsonl:
@@ -50,7 +53,11 @@ def parse(
         return
     meanings = list(told)
     if svg is not None:
-        _draw(meanings[0], svg)
+        trace = meanings[0].trace
+        if trace is None or not trace.tokens:
+            raise InputError("there are no words to draw", hint="give a sentence in English words", file=svg)
+        with writing(svg):
+            svg.write_text(arcs_svg(explain(trace).tokens), encoding="utf-8")
     for meaning in meanings:
         _show(meaning, as_json, explained)
     if as_json:
@@ -83,15 +90,3 @@ def _show(meaning: Understanding, as_json: bool, explained: bool) -> None:
 def _echo(lines: Iterable[str], as_json: bool) -> None:
     for line in lines:
         typer.echo(line, err=as_json)
-
-
-def _draw(meaning: Understanding, file: Path) -> None:
-    if meaning.trace is None or not meaning.trace.tokens:
-        raise InputError("there are no words to draw", hint="give a sentence in English words", file=file)
-    with writing(file):
-        file.write_text(arcs_svg(explain(meaning.trace).tokens), encoding="utf-8")
-
-
-def _lines_of(file: Path | None) -> list[str]:
-    assert file is not None
-    return read_text(file, most_bytes=20_000_000, hint="name a text file in UTF-8").splitlines()

@@ -73,7 +73,11 @@ def teleop(
         context = context_for(opened, driven, clock, placed.start)
         stack.callback(driven.return_lease, context.lease)
         hands = Teleop(context)
-        saving = _saving(hands, poses, opened.name)
+
+        def saving(name: str | None) -> str:
+            """Save the pose under a name, or a free one; says so."""
+            return f"saved as {save_pose(poses, name, hands.pose(), world=opened.name)}"
+
         feed, scene = Feed(), simulation.show_live()
         server = stack.enter_context(serve(PageContent(feed, page_actions(hands, saving, scene), scene.url), port))
         console = console_for(False)
@@ -161,10 +165,6 @@ def page_actions(hands: Teleop, save: Callable[[str | None], str], scene: Scene 
             raise RefusedError(str(error)) from error
 
     return {"teleop": ask, "save_pose": save_as, **({} if scene is None else scene_actions(scene))}
-
-
-def _saving(hands: Teleop, folder: Path, world: str) -> Callable[[str | None], str]:
-    return lambda name: f"saved as {save_pose(folder, name, hands.pose(), world=world)}"
 
 
 def _told(hands: Teleop) -> dict[str, Any]:

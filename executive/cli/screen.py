@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,9 +28,8 @@ from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
 from executive.speech.voice import Silence, Voice, queued_voice
 from executive.store.missions import STORE
-from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView, node_view
-from executive.tree.snapshot import NodeState, Snapshot
+from executive.tree.snapshot import NodeState
 from executive.view.styles import Styles, style_of
 from executive.view.text import printable, to_rich
 
@@ -199,7 +198,8 @@ class _Picture(RunVisitor):
         self._drawn_s = now
         trees = [(tree, progress.states[name]) for name, tree in progress.trees.items()]
         pictures = [to_rich(node_view(tree.root, states)) for tree, states in trees]
-        lines = [progress_line(_of_tree(tree, states), progress.now_s) for tree, states in trees]
+        own_states = ([states[path_id] for path_id in tree.path_ids] for tree, states in trees)
+        lines = [progress_line(own, progress.now_s) for own in own_states]
         prompt = [
             Text(line, style=HELP_STYLE if line.startswith(HELP) else PROMPT_STYLE, overflow="fold")
             for line in self._prompt(progress.now_s)
@@ -221,11 +221,6 @@ def fitted(picture: Text, rows: int) -> Text:
     return Text("\n", no_wrap=True, overflow="ellipsis").join(lines[first : first + rows])
 
 
-def _of_tree(tree: CompiledTree, states: Snapshot) -> Snapshot:
-    """The states of one mission's nodes, without those that wait below it."""
-    return {path_id: states[path_id] for path_id in tree.path_ids}
-
-
 def _skill_titles(node: NodeView, above: NodeView | None = None) -> dict[str, str]:
     """What the skills below do, by path id."""
     if node.kind in _TOLD:
@@ -241,9 +236,9 @@ def skill_line(title: str, state: NodeState, took_s: float) -> Text:
     return Text.assemble((style.symbol, style.rich), f" {took_s:6.1f} s  {what}")
 
 
-def progress_line(states: Snapshot, now_s: float) -> Text:
+def progress_line(states: Iterable[NodeState], now_s: float) -> Text:
     """Time, how far the present skill has come where it says so, and what it does."""
-    running = [state for state in states.values() if state.status is Status.RUNNING]
+    running = [state for state in states if state.status is Status.RUNNING]
     state = running[-1] if running else NodeState()
     done = round((state.progress or 0.0) * BAR_CELLS)
     bar = f" [{'█' * done}{'·' * (BAR_CELLS - done)}]" if state.progress is not None else ""

@@ -167,7 +167,8 @@ class _Reader:
         assert entry.file is not None
         found = self._found(entry.file, path, mission_file)
         request = Request(file=found, given=entry.set, answers=entry.answers)
-        return entry.name or _label(entry.file, entry.set), request
+        values = ", ".join(f"{name}={value}" for name, value in entry.set.items())
+        return entry.name or Path(entry.file).stem + (f" ({values})" if values else ""), request
 
     def _world(self, name: str) -> str:
         folder = self.source.path.parent / name
@@ -229,11 +230,6 @@ def _faults(entry: str | FaultsFile) -> tuple[str, Scenario]:
     drawn = (f"{entry.random} random",) if entry.random else ()
     name = entry.name or " and ".join((*entry.faults, *drawn)) or "none"
     return name, Scenario(entry.faults, entry.random)
-
-
-def _label(file: str, given: Mapping[str, Any]) -> str:
-    values = ", ".join(f"{name}={value}" for name, value in given.items())
-    return Path(file).stem + (f" ({values})" if values else "")
 
 
 def _files_of(request: Request) -> Mapping[str, str]:

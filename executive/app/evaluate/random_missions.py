@@ -83,13 +83,12 @@ def random_evaluation(worlds: Sequence[KnownWorld], seeds: Iterable[int], *, nam
     Raises:
         InputError: nothing can be asked for in one of the worlds.
     """
-    chosen = ((worlds[seed % len(worlds)], seed) for seed in seeds)
-    return Evaluation(name, tuple(_run(world, seed) for world, seed in chosen))
-
-
-def _run(world: KnownWorld, seed: int) -> RunSpec:
-    kind, sentence = random_sentence(world, seed)
-    return RunSpec(Request(sentence, world=world.name, seed=seed, time_limit_s=TIME_LIMIT_S), kind)
+    runs = list[RunSpec]()
+    for seed in seeds:
+        world = worlds[seed % len(worlds)]
+        kind, sentence = random_sentence(world, seed)
+        runs.append(RunSpec(Request(sentence, world=world.name, seed=seed, time_limit_s=TIME_LIMIT_S), kind))
+    return Evaluation(name, tuple(runs))
 
 
 def random_sentence(world: KnownWorld, seed: int) -> tuple[str, str]:

@@ -121,14 +121,9 @@ class _Process:
 
 
 def _begin() -> None:
-    """A worker does not hear Ctrl-C at the terminal, and ends with the process that started it."""
+    """A worker does not hear Ctrl-C at the terminal, and ends with its starter, which may be killed itself."""
     os.setpgrp()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _end_with_starter()
-
-
-def _end_with_starter() -> None:
-    """Let this process end when the one that started it is gone: one that is killed cannot end its own."""
     starter = multiprocessing.parent_process()
     if starter is None:
         return

@@ -6,17 +6,19 @@ import json
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import typer
 from rich.console import Console
 from rich.text import Text
 
 from executive.cli.number_options import quantity_option
+from executive.cli.options import takes_request
 from executive.cli.output import console_for, show_table, terminal_answerer, writing
+from executive.mission.request import Request
 from executive.record.history import Entry, History, read_history, timeline
 from executive.record.schemas import ERRORS
 from executive.tree.node_view import NodeView, node_view, to_json
@@ -26,9 +28,6 @@ from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, pr
 from skills.files.errors import InputError
 from skills.files.outside import is_file
 from skills.quantities import Count, Delay, Port, Tries, Wait
-
-if TYPE_CHECKING:
-    from executive.mission.request import Request
 
 RECORDING: Final = "recording.html"
 LOG_SUFFIX: Final = ".mcap"
@@ -139,26 +138,20 @@ class TreeFormat(StrEnum):
     JSON = "json"
 
 
-_FORMS: Final[Mapping[TreeFormat, Callable[[NodeView, bool], str]]] = MappingProxyType(
-    {
-        TreeFormat.TEXT: lambda view, ascii_only: to_text(view, ascii_only=ascii_only) + "\n",
-        TreeFormat.SVG: lambda view, _: to_svg(view),
-        TreeFormat.MERMAID: lambda view, _: to_mermaid(view),
-        TreeFormat.XML: lambda view, _: to_btcpp(view),
-        TreeFormat.JSON: lambda view, _: json.dumps(to_json(view), ensure_ascii=False) + "\n",
-    }
-)
-_MOST: Final[Mapping[TreeFormat, int]] = (
-    MappingProxyType(  # programs, which read the other forms, do not mind a large tree
-        {TreeFormat.TEXT: MANY_NODES, TreeFormat.SVG: DRAWN_NODES, TreeFormat.MERMAID: DRAWN_NODES}
-    )
-)
+_FORMS: Final[Mapping[TreeFormat, Callable[[NodeView], str]]] = {
+    TreeFormat.SVG: to_svg,
+    TreeFormat.MERMAID: to_mermaid,
+    TreeFormat.XML: to_btcpp,
+    TreeFormat.JSON: lambda view: json.dumps(to_json(view), ensure_ascii=False) + "\n",
+}
+_MOST: Final = {TreeFormat.TEXT: MANY_NODES, TreeFormat.SVG: DRAWN_NODES, TreeFormat.MERMAID: DRAWN_NODES}
+"""Programs, which read the other forms, do not mind a large tree."""
 
 
+@takes_request("sentence", "world")
 def tree(
+    request: Request,
     file: Annotated[str | None, typer.Argument(metavar="FILE|SENTENCE|LOG", show_default=False)] = None,
-    say: Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')] = None,
-    world: Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")] = None,
     form: Annotated[TreeFormat, typer.Option("--format", help="How to show it.")] = TreeFormat.TEXT,
     depth: Annotated[int | None, quantity_option(Tries, help="Show only so many levels below the root.")] = None,
     most: Annotated[
@@ -170,10 +163,11 @@ def tree(
     ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,
 ) -> None:
     """Show the tree of a sentence or a mission file before it runs, or of a log as it last was."""
-    whole = _view(file, say, world, at, robot)
+    whole = _view(file, request, at, robot)
     shown = whole if depth is None else fold_below(whole, depth)
     few = most or _MOST.get(form)
-    text = _FORMS[form](shown if few is None else fold_to(shown, few), ascii_only)
+    shown = shown if few is None else fold_to(shown, few)
+    text = _FORMS[form](shown) if form in _FORMS else to_text(shown, ascii_only=ascii_only) + "\n"
     if output is None:
         sys.stdout.write(text)
     else:
@@ -181,7 +175,7 @@ def tree(
             output.write_text(text, encoding="utf-8")
 
 
-def _view(text: str | None, say: str | None, world: str | None, at_s: float | None, robot: str | None) -> NodeView:
+def _view(text: str | None, request: Request, at_s: float | None, robot: str | None) -> NodeView:
     """What ends in .mcap is a log, what ends in .yaml, exists or is shipped a mission file, and all else a sentence."""
     if text is not None and text.endswith(LOG_SUFFIX):
         history = read_history(Path(text))
@@ -194,7 +188,7 @@ def _view(text: str | None, say: str | None, world: str | None, at_s: float | No
         raise InputError(f"{option} is for logs", hint="name a log.mcap that a run has written")
     from executive.app.prepare import prepare
 
-    prepared = prepare(_request(text, say, world), ask=terminal_answerer())
+    prepared = prepare(_request(text, request), ask=terminal_answerer())
     for each in prepared.all:
         for note in each.mission.notes:
             typer.echo(note, err=True)
@@ -202,15 +196,15 @@ def _view(text: str | None, say: str | None, world: str | None, at_s: float | No
     return trees[0] if len(trees) == 1 else NodeView("robots", "together", prepared.mission.name, children=trees)
 
 
-def _request(text: str | None, say: str | None, world: str | None) -> Request:
-    if text is not None and say is not None:
-        raise InputError("a sentence and --say were given", hint="leave one of them out")
+def _request(text: str | None, request: Request) -> Request:
+    """The request for what is to be shown. Raises InputError: nothing is, or two things."""
     from executive.app.mission_files import shipped_missions
-    from executive.mission.request import Request
 
-    if text is not None and (text.endswith((".yaml", ".yml")) or text in shipped_missions() or is_file(Path(text))):
-        return Request(file=Path(text), world=world)
-    sentence = say if text is None else text
-    if sentence is None:
+    if text is None and request.sentence is None:
         raise InputError("a mission file, a sentence or a log is needed", hint='try: errand tree "go to the kitchen"')
-    return Request(sentence, world=world)
+    if text is None:
+        return request
+    if request.sentence is not None:
+        raise InputError("a sentence and --say were given", hint="leave one of them out")
+    is_mission = text.endswith((".yaml", ".yml")) or text in shipped_missions() or is_file(Path(text))
+    return replace(request, file=Path(text)) if is_mission else replace(request, sentence=text)

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, Final, Generic, Protocol, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 from executive.record.announce import versions
 from skills.files.errors import InputError
@@ -52,17 +52,6 @@ class Finished(Generic[Item, Result]):
     lost: str = ""
 
 
-class Workers(Protocol):
-    """Workers that apply a function to items."""
-
-    @property
-    def count(self) -> int:
-        """The number of workers."""
-
-    def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:
-        """Have each item worked on once, and give each as it ends. What the function raises is raised here."""
-
-
 @dataclass(frozen=True)
 class LocalWorkers:
     """So many processes on this machine, which keep what they have imported and loaded from item to item.
@@ -73,7 +62,10 @@ class LocalWorkers:
     count: int
 
     def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:
-        """As `Workers` says; closing the iterator ends the processes."""
+        """Have each item worked on once, and give each as it ends. What the function raises is raised here.
+
+        Closing the iterator ends the processes.
+        """
         waiting = deque((item, 0) for item in items)
         idle = [_Process() for _ in range(min(self.count, len(items)))]
         running: dict[Future[Any], tuple[_Process, Item, int]] = {}
@@ -153,7 +145,7 @@ class ClusterWorkers:
         return len(self._client.scheduler_info(n_workers=-1)["workers"])
 
     def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:
-        """As `Workers` says.
+        """As `LocalWorkers.give_out`.
 
         Raises:
             InputError: the scheduler or all workers are gone, or a worker of another version has come.
@@ -297,6 +289,10 @@ def scheduler_at(address: str) -> Iterator[ClusterWorkers]:
         raise InputError(f"no scheduler answers at {address}", hint=hint) from error
     with client:
         yield ClusterWorkers(client)
+
+
+Workers = LocalWorkers | ClusterWorkers
+"""Workers that apply a function to items: `count` of them."""
 
 
 @dataclass(frozen=True)

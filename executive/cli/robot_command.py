@@ -81,7 +81,7 @@ def teleop(
         feed, scene = Feed(), simulation.show_live()
         server = stack.enter_context(serve(PageContent(feed, page_actions(hands, saving, scene), scene.url), port))
         console = console_for(False)
-        stack.enter_context(keys_pressed(TerminalKeys(hands, saving, console.print)))
+        stack.enter_context(keys_pressed(TerminalKeys(hands, saving, console.print).press))
         console.print(f"The page: {server.url}\n{_HELP}", markup=False)
         feed.tell("teleop_keys", {key: axis for key, (axis, _) in KEYS.items()})
         try:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import Final
 
 from executive.run.control import Control
 from executive.run.control_state import ControlState, Mode, OpenQuestion
@@ -38,13 +38,6 @@ class Typing:
     saying: bool = False
     reply: str = ""
     can_say: bool = False
-
-
-class Pressed(Protocol):
-    """Something that keys mean something to."""
-
-    def press(self, key: str) -> None:
-        """A key is pressed; called from the thread that reads keys."""
 
 
 class Keys:
@@ -81,7 +74,7 @@ class Keys:
         elif key in _SAY_KEYS and self._say is not None:
             self.typing = replace(self.typing, saying=True, text="", reply="")
         else:
-            self._actions.get(key, _nothing)()
+            self._actions.get(key, lambda: None)()
 
     def _write_sentence(self, key: str) -> None:
         text = self.typing.text
@@ -140,10 +133,11 @@ def prompt_lines(state: ControlState, now_s: float, typing: Typing = Typing()) -
 
 
 @contextmanager
-def keys_pressed(keys: Pressed, descriptor: int | None = None) -> Iterator[bool]:
+def keys_pressed(press: Callable[[str], object], descriptor: int | None = None) -> Iterator[bool]:
     """Read keys while the block runs, in a thread that sleeps until one comes; False where there is no terminal.
 
-    The terminal is put back as it was. `descriptor` is standard input unless given.
+    `press` is called with each key in that thread. The terminal is put back as it was. `descriptor` is standard input
+    unless given.
     """
     source = _stdin() if descriptor is None else descriptor
     if source is None or not os.isatty(source):
@@ -151,7 +145,7 @@ def keys_pressed(keys: Pressed, descriptor: int | None = None) -> Iterator[bool]
         return
     before = termios.tcgetattr(source)
     wake, waker = os.pipe()
-    reader = threading.Thread(target=_read, args=(source, wake, keys), name="errand-keys", daemon=True)
+    reader = threading.Thread(target=_read, args=(source, wake, press), name="errand-keys", daemon=True)
     try:
         tty.setcbreak(source, termios.TCSADRAIN)
         reader.start()
@@ -166,7 +160,7 @@ def keys_pressed(keys: Pressed, descriptor: int | None = None) -> Iterator[bool]
             termios.tcsetattr(source, termios.TCSADRAIN, before)
 
 
-def _read(source: int, wake: int, keys: Pressed) -> None:
+def _read(source: int, wake: int, press: Callable[[str], object]) -> None:
     while True:
         ready, _, _ = select.select([source, wake], [], [])
         if wake in ready:
@@ -178,7 +172,7 @@ def _read(source: int, wake: int, keys: Pressed) -> None:
         if not data:
             return
         for key in data.decode(errors="ignore"):
-            keys.press(key)
+            press(key)
 
 
 def _stdin() -> int | None:
@@ -187,10 +181,6 @@ def _stdin() -> int | None:
         return sys.stdin.fileno()
     except (AttributeError, ValueError, OSError):
         return None
-
-
-def _nothing() -> None:
-    """Keys without a meaning."""
 
 
 _NOTHING_TO_SAY: Final = frozenset({Mode.READY, Mode.RUNNING, Mode.ENDED})

@@ -146,7 +146,7 @@ def live_view(
     """
     hands = control or Control(pace=None)
     keys = Keys(hands, say)
-    with keys_pressed(keys) if control is not None else nullcontext(False) as heard:
+    with keys_pressed(keys.press) if control is not None else nullcontext(False) as heard:
         lines = _Lines(console)
         if not console.is_terminal:
             yield lines

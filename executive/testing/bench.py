@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -133,14 +134,10 @@ class SkillBench:
 
     def close(self) -> None:
         """Stops the robot and returns the lease, as the runner does at the end; ignores errors of the robot."""
-        for call in (lambda: self.robot.stop(lease=self._context.lease), self._give_back):
-            try:
-                call()
-            except Exception:
-                continue
-
-    def _give_back(self) -> None:
-        self.robot.return_lease(self._context.lease)
+        with suppress(Exception):
+            self.robot.stop(lease=self._context.lease)
+        with suppress(Exception):
+            self.robot.return_lease(self._context.lease)
 
     def _sense(self, robot: Robot) -> None:
         """Updates the estimators. They keep their estimates if the robot's sensors raise."""

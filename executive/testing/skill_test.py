@@ -23,7 +23,6 @@ from executive.tree.types import describe_type, field_types, required
 from skills.api import Cause, Skill
 from skills.faults.kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.words import parse_fault
-from skills.files.errors import InputError
 from skills.files.schema import validate
 from skills.files.yaml_source import YamlSource, read_yaml
 from skills.quantities import Angle, Coordinate, Delay, Duration, Height, Length, Quantity, Share, Turn
@@ -139,7 +138,7 @@ class SkillTestFile(_Strict):
         description="with each test that expects success and has no faults, also run the suite for every skill",
     )
     tests: Annotated[tuple[SkillTest, ...], Field(min_length=1, description="the tests")]
-    _source: YamlSource | None = PrivateAttr(default=None)
+    _source: YamlSource = PrivateAttr()
 
     @model_validator(mode="after")
     def _names_differ(self) -> SkillTestFile:
@@ -151,19 +150,15 @@ class SkillTestFile(_Strict):
 
     def line(self, index: int) -> int:
         """The line at which a test stands, from 1."""
-        return 1 if self._source is None else self._source.line(("tests", index))
-
-    def error(self, path: tuple[str | int, ...], message: str, hint: str) -> InputError:
-        """An error in what stands at `path`."""
-        return InputError(message, hint=hint) if self._source is None else self._source.error(path, message, hint)
-
-    def ports(self, index: int) -> dict[str, Any]:
-        """The input ports of one test as they stand in the file."""
-        return {**self.with_, **self.tests[index].with_}
+        return self._source.line(("tests", index))
 
     def inputs(self, index: int, skill: type[Skill[Any]]) -> Any:
         """The skill's Inputs for one test; names are those of the room. Raises InputError with file and line."""
-        hints, knowledge, values = field_types(skill.Inputs), room_knowledge(), self.ports(index)
+        hints, knowledge, values = (
+            field_types(skill.Inputs),
+            room_knowledge(),
+            {**self.with_, **self.tests[index].with_},
+        )
         try:
             found = gathered(values, skill.Inputs)
             missing = [name for name in required(skill.Inputs) if name not in found]
@@ -176,7 +171,7 @@ class SkillTestFile(_Strict):
             where = ("tests", index, "with") if own else ("with",)
             port = ".".join(map(str, error.path))
             what = f"{port}: {error.message}" if port else error.message
-            raise self.error((*where, *error.path), what, error.hint) from error
+            raise self._source.error((*where, *error.path), what, error.hint) from error
         return skill.Inputs(**given)
 
 
@@ -191,7 +186,7 @@ def load_skill_tests(
     file = validate(SkillTestFile, source)
     file._source = source
     if file.skill not in skills:
-        raise file.error(("skill",), *missing(file.skill, skills))
+        raise source.error(("skill",), *missing(file.skill, skills))
     for index, test in enumerate(file.tests):
         file.inputs(index, skills[file.skill])
         for number, words in enumerate(test.faults):
@@ -199,7 +194,7 @@ def load_skill_tests(
                 parse_fault(words, kinds)
             except ValueError as error:
                 what, _, hint = str(error).partition("; ")
-                raise file.error(("tests", index, "faults", number), what, hint) from error
+                raise source.error(("tests", index, "faults", number), what, hint) from error
     return file
 
 

@@ -24,9 +24,9 @@ LINES = {
     "executive/store": 1719,
     "executive/conversation": 604,
     "executive/view": 1410,
-    "executive/testing": 821,
-    "executive/app": 7626,
-    "executive/cli": 3912,
+    "executive/testing": 813,
+    "executive/app": 7615,
+    "executive/cli": 3846,
     "skills": 25262,
     "plant": 12010,
 }

@@ -80,7 +80,7 @@ def test_the_runs_of_a_scenario_are_judged_and_kept(tmp_path):
     scenario.write_text("missions: [go to the kitchen]\nseeds: '1'\n", encoding="utf-8")
     (case,) = executive.evaluate(scenario, out=tmp_path / "out", jobs=1)
     assert (case.report.achieved, case.run.request.seed) == (True, 1)
-    assert executive.evaluate(scenario, out=tmp_path / "out", jobs=1)[0].outcome == case.outcome
+    assert executive.evaluate(scenario, out=tmp_path / "out", jobs=1)[0] == case
 
 
 def test_there_is_nothing_else():

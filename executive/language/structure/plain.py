@@ -195,13 +195,10 @@ class PlainReader:
             raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text]) from None
         if any(action.choices for action in reading.trace.actions):
             raise RefusalError(f"I cannot tell which of them is meant in '{text}'", [text])
-        looks = tuple(Look.of(command) for command in reading.commands if command.task is Task.FIND)
-        if not looks or len(looks) != len(reading.commands):
+        if not reading.commands or any(command.task is not Task.FIND for command in reading.commands):
             raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text])
-        known = self.state_if_seen(reading, replace(state, goal=reading.state.goal, at=reading.state.at))
-        fails = replace(known, memory=replace(known.memory, where=None, told=state.memory.told))
-        condition = looks[0] if len(looks) == 1 else AllOf(parts=looks)
-        return Supposed(condition, text, known, fails, reading.trace.notes, items=tuple(items))
+        there = replace(state, goal=reading.state.goal, at=reading.state.at)
+        return replace(self.seen(reading, there, state, text), items=tuple(items))
 
     def _by_name(self, item: Item, state: State) -> Item:
         """The person who was spoken of in place of "he"."""
@@ -237,8 +234,16 @@ class PlainReader:
         spoken_of = words in lexicon().somebody and state.memory.person is not None
         return spoken_of or self.knowledge.person(who) is not None
 
-    def state_if_seen(self, reading: PlainReading, state: State) -> State:
-        """What is known when what was looked for is there."""
+    def seen(self, reading: PlainReading, state: State, before: State, text: str) -> Supposed:
+        """The condition that what was looked for is there; `text` says it."""
+        looks = tuple(Look.of(command) for command in reading.commands if command.task is Task.FIND)
+        known = self._state_if_seen(reading, state)
+        fails = replace(known, memory=replace(known.memory, where=None, told=before.memory.told))
+        condition = looks[0] if len(looks) == 1 else AllOf(parts=looks)
+        return Supposed(condition, text, known, fails, reading.trace.notes)
+
+    def _state_if_seen(self, reading: PlainReading, state: State) -> State:
+        """What is known then."""
         action = reading.trace.resolved[-1]
         memory = reading.trace.memory
         target, where = action.target, action.source

@@ -12,12 +12,15 @@ from executive.language.lexicon import VerbKind
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE
 from executive.language.structure.plain import PlainReader, PlainReading, State, Supposed, contrary
-from executive.language.structure.requests import Done, template
+from executive.language.structure.requests import Done
 from executive.words.command import Command, Task
-from executive.words.condition import AllOf, Condition, Look, Not
-from executive.words.leaf_steps import Speak, steps_of_commands
+from executive.words.condition import Condition, Look, Not
+from executive.words.leaf_steps import steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Loop, Steps
+
+ATTACHED = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)
+"""Clauses with these cues go on from what was looked at or done before."""
 
 
 @dataclass
@@ -58,29 +61,25 @@ class Rounds:
 def end_of(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: bool = False) -> int:
     """Where the clauses end that belong to a condition or to rounds which begin before `at`.
 
-    `branch` says that it is a second branch, behind which "then" goes on with what is done in either case.
+    `branch` says that it is a second branch, behind which "then" goes on with what is done in either case. What is done
+    after the whole ends them; in "first ..., finally ..." it is one of the row.
     """
-    attached = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)
     first = any(re.search(r"\bfirst\b", one.joint, re.IGNORECASE) for one in clauses[at : at + 1])
-    for n in range(at, len(clauses)):
-        one = clauses[n]
+    for n, one in enumerate(clauses[at:], at):
+        after_all = n > at and ((one.outer and not first) or one.anyway)
+        then = n > at and branch and one.then
         if rounds:
-            goes_on = one.kind in attached or (one.kind is Cue.IF and ACTS.pronoun.match(one.text) is not None)
-            if (one.begins and n > at and not goes_on) or (n > at and (_after_all(one, first) or one.anyway)):
+            goes_on = one.kind in ATTACHED or (one.kind is Cue.IF and ACTS.pronoun.match(one.text) is not None)
+            if after_all or (one.begins and n > at and not goes_on):
                 return n
-            continue
-        if one.kind in attached or one.kind in (Cue.IF, Cue.UNLESS, Cue.SOON):
-            return n
-        if n > at and (one.begins or _after_all(one, first) or one.anyway or (branch and one.then)):
-            return n
-        if n == at and one.begins:
+        elif (
+            one.kind in (*ATTACHED, Cue.IF, Cue.UNLESS, Cue.SOON)
+            or one.begins
+            or after_all
+            or (n > at and branch and one.then)
+        ):
             return n
     return len(clauses)
-
-
-def _after_all(clause: Clause, first: bool) -> bool:
-    """Whether a clause is done after the whole; in "first ..., finally ..." it is one of the row."""
-    return clause.outer and not first
 
 
 def same(one: Condition, other: Condition) -> bool:
@@ -102,46 +101,35 @@ def sentence_of(supposed: Supposed) -> str | None:
 
 def state_behind_both(one: State, other: State) -> State:
     """What is known behind two branches."""
-    held = one.held if one.held == other.held else None
-    goal = one.goal if one.goal == other.goal else None
-    at = one.at if one.at == other.at else None
-    return replace(one, held=held, goal=goal, at=at)
+    return replace(
+        one,
+        held=one.held if one.held == other.held else None,
+        goal=one.goal if one.goal == other.goal else None,
+        at=one.at if one.at == other.at else None,
+    )
 
 
 def one_errand(reading: PlainReading) -> bool:
     """Whether the commands are all about one thing, or only go somewhere and back."""
-    things = {
-        str(thing) for command in reading.commands for thing in (command.item, command.object) if thing is not None
-    }
+    things = {str(thing) for command in reading.commands for thing in (command.item, command.object) if thing}
     going = [action for action in reading.trace.resolved if action.kind is VerbKind.GO]
-    bare_goes = [command for command in reading.commands if command.item is None and command.task is None]
-    if not bare_goes:
-        return len(things) == 1
-    back = going[-1].goal == HERE if going else False
-    return not things and len(bare_goes) <= 2 and back
+    bare = sum(command.item is None and command.task is None for command in reading.commands)
+    return len(things) == 1 if not bare else not things and bare <= 2 and bool(going) and going[-1].goal == HERE
 
 
 def looked_at_by(reading: PlainReading, before: State, reader: PlainReader) -> LookedAt | None:
     """What the last command looked at, or takes."""
-    last = reading.commands[-1] if reading.commands else None
-    taken = next((c for c in reversed(reading.commands) if c.task is Task.GRASP), None)
-    memory = reading.state.memory
-    if last is not None and last.task is Task.FIND:
-        looks = [c for c in reading.commands if c.task is Task.FIND]
-        conditions = tuple(map(Look.of, looks))
-        known = reader.state_if_seen(reading, reading.state)
-        fails = replace(known, memory=replace(known.memory, where=None, told=before.memory.told))
-        condition: Condition = conditions[0] if len(conditions) == 1 else AllOf(parts=conditions)
-        return LookedAt(Supposed(condition, "", known, fails), looked=True, steps=len(looks))
+    commands = reading.commands
+    if commands and commands[-1].task is Task.FIND:
+        looks = sum(command.task is Task.FIND for command in commands)
+        return LookedAt(reader.seen(reading, reading.state, before, ""), looked=True, steps=looks)
+    taken = next((command for command in reversed(commands) if command.task is Task.GRASP), None)
     if taken is None:
         return None
-    look = Look.of(
-        Command(goal=taken.goal, task=Task.FIND, object=taken.object, object_count=taken.object_count, verb="find")
-    )
-    fails = replace(
-        reading.state, memory=replace(memory, where=None, told=before.memory.told), held=None, goal=None, at=None
-    )
-    return LookedAt(Supposed(look, "", reading.state, fails), looked=False, steps=len(reading.commands))
+    found = Command(goal=taken.goal, task=Task.FIND, object=taken.object, object_count=taken.object_count, verb="find")
+    memory = replace(reading.state.memory, where=None, told=before.memory.told)
+    fails = replace(reading.state, memory=memory, held=None, goal=None, at=None)
+    return LookedAt(Supposed(Look.of(found), "", reading.state, fails), looked=False, steps=len(commands))
 
 
 def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
@@ -159,28 +147,10 @@ def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
 def checked_statement(text: str) -> str | None:
     """What is checked, as a statement: "is the door open" becomes "the door is open"."""
     match = ACTS.checked.fullmatch(text)
-    if match is None:
-        return None
-    if match["what"] is not None:
-        return match["what"]
-    asked = match["asked"]
-    for form in (
-        r"((?:the|that) (?:.*? )?door(?: .+?)?) (open|closed|shut|locked)",
-        r"((?:the|your) (?:battery|charge).*?) (low|full|charged|below .+|above .+|over .+|under .+|at .+)",
-    ):
-        if (found := re.fullmatch(form, asked, re.IGNORECASE)) is not None:
-            return f"{found[1]} is {found[2]}"
-    found = re.fullmatch(
-        r"(you) ((?:holding|carrying|lost|low on).*)|(it) ((?:after|before|past) .+)", asked, re.IGNORECASE
-    )
-    if found is not None:
-        return f"{found[1] or found[3]} {'are' if found[1] else 'is'} {found[2] or found[4]}"
-    return None
-
-
-def say(text: str) -> Speak:
-    """A step that says a text."""
-    return Speak(speak=template(text))
+    if match is None or match["what"] is not None:
+        return None if match is None else match["what"]
+    found = next((found for form in ACTS.each("asked") if (found := form.fullmatch(match["asked"]))), None)
+    return None if found is None else f"{found[1]} {'are' if found[1].lower() == 'you' else 'is'} {found[2]}"
 
 
 def unclear(found: Behind) -> RefusalError:
@@ -189,9 +159,9 @@ def unclear(found: Behind) -> RefusalError:
     return RefusalError(f"it is not clear to what '{said}' belongs; say it first", [said])
 
 
-def was_not(clauses: Sequence[Clause], at: int) -> bool:
-    """Whether "if not" stood before."""
-    return any(one.kind is Cue.NOT for one in clauses[:at])
+def nothing_said(cue: str, text: str = "") -> RefusalError:
+    """The refusal of a condition behind which it is not said what is to be done."""
+    return RefusalError(f"what am I to do {f'{cue.lower()} {text}'.strip()}?", [f"{cue} {text}".strip()])
 
 
 class Base:
@@ -201,17 +171,18 @@ class Base:
     taken for what; `special` says that it is more than a list of commands, also where it has no block.
     """
 
-    told: str | None = None
-    verb: str | None = None
-
-    def __init__(self, reader: PlainReader) -> None:
-        self.reader = reader
+    def __init__(self, reader: PlainReader, told: str | None = None, verb: str | None = None) -> None:
+        self.reader, self.told, self.verb = reader, told, verb
         self.notes: list[str] = []
         self.special = False
 
     def sequence(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
         """The steps of clauses, one after the other."""
         raise NotImplementedError
+
+    def nested(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
+        """The same of clauses within others."""
+        return self.sequence([replace(clauses[0], joint=""), *clauses[1:]], state)
 
     def flush(self, row: Row) -> None:
         """Understand the clauses that are still to be understood."""
@@ -238,8 +209,7 @@ class Base:
 
     def put(self, row: Row, block: Step, state: State) -> None:
         """Put a block; `state` is what is known behind it."""
-        row.steps.append(block)
-        row.state, row.asked = state, None
+        self.put_done(row, ((block,), state, ()))
 
     def put_done(self, row: Row, done: Done) -> None:
         """Put steps with what is known behind them, and notes."""
@@ -247,11 +217,6 @@ class Base:
         row.steps += steps
         row.asked = None
         self.notes += notes
-
-    def settle(self, row: Row) -> None:
-        """A new sentence begins: what was said before stands for itself, where it is a request."""
-        self.flush(row)
-        row.begun = len(row.steps)
 
 
 def seconds_of_cue(cue: str) -> float:

@@ -9,7 +9,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cue_behind, cut, split
+from executive.language.clauses import ACTS, Behind, Clause, Cue, cue_behind, cut, split
 from executive.language.items import Adverb, Chunk, verb
 from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
@@ -35,7 +35,15 @@ from executive.language.structure.requests import (
     wait_in,
     without_article,
 )
-from executive.language.structure.row import LookedAt, Row, checked_statement, end_of, sentence_of
+from executive.language.structure.row import (
+    ATTACHED,
+    LookedAt,
+    Row,
+    checked_statement,
+    end_of,
+    nothing_said,
+    sentence_of,
+)
 from executive.words.command import Task
 from executive.words.condition import Look
 from executive.words.leaf_steps import Awaited, Check, Do, Speak, Wait, steps_of_commands
@@ -53,9 +61,8 @@ class Builder(Branches):
         while at < len(clauses):
             last = row.steps[-1] if row.steps and not row.plain else None
             if isinstance(last, Repeat) and last.loop.is_endless:
-                raise RefusalError(
-                    "nothing can come after what is repeated without end; say how often", [clauses[at].text]
-                )
+                what = "nothing can come after what is repeated without end; say how often"
+                raise RefusalError(what, [clauses[at].text])
             at = self._next(row, clauses, at)
         self.flush(row)
         return tuple(row.steps), row.state
@@ -67,25 +74,24 @@ class Builder(Branches):
             return self.always(row, clauses, at)
         if clause.kind in (Cue.IF, Cue.UNLESS):
             return self.decided(row, clauses, at)
-        if clause.kind in (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED):
+        if clause.kind in ATTACHED:
             return self.attached(row, clauses, at)
-        if clause.kind is Cue.SOON:
-            return self.soon(row, clauses, at)
         if clause.kind is not None:
-            return self.repeated(row, clauses, at)
-        return self.one_clause(row, clauses, at)
-
-    def one_clause(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
-        """Take the clause at `at`, which begins with what is to be done; the index of the one behind."""
-        clause = clauses[at]
-        if clause.begins and not _tells_only(row.plain):
-            self.settle(row)
+            return (self.soon if clause.kind is Cue.SOON else self.repeated)(row, clauses, at)
+        told = bool(row.plain) and all(ACTS.told_first.match(one.text) for one in row.plain)
+        if clause.begins and not told:  # unless it goes on with "there is a hammer on the bench. bring it"
+            self.flush(row)
+            row.begun = len(row.steps)
         if self.verb is not None and at == 0 and ACTS.no_verb.match(clause.text):
             clause = replace(clause, lead=self.reader.items_of(self.verb))
             clauses = [clause, *clauses[1:]]
+        return self._act(row, clause, clauses, at)
+
+    def _act(self, row: Row, clause: Clause, clauses: Sequence[Clause], at: int) -> int:
+        """Take the clause at `at`, which begins with what is to be done; the index of the one behind."""
         text = clause.text
         self.verb = match[0] if (match := ACTS.giving.match(text)) is not None else self.verb
-        if _is_reported(text) and self._reported(row):
+        if ACTS.answered.fullmatch(text) is not None and self._answered(row):
             return at + 1
         if ACTS.idle.fullmatch(text) is not None:
             self.flush(row)
@@ -103,23 +109,24 @@ class Builder(Branches):
         row.plain.append(clause)
         return at + 1
 
-    def _reported(self, row: Row) -> bool:
+    def _answered(self, row: Row) -> bool:
         """Whether what was looked at before is answered anyway."""
         self.flush(row)
         last = row.steps[-1] if row.steps else None
-        looked = last is not None and (
-            isinstance(last, Check) or (bool(last.commands) and last.commands[-1].task is Task.FIND)
-        )
+        found = last is not None and bool(last.commands) and last.commands[-1].task is Task.FIND
+        looked = isinstance(last, Check) or found
         self.special = self.special or looked
         return looked
 
+    def _known(self, row: Row) -> State:
+        """What is known behind the clauses that are still to be understood."""
+        return self.read_together(row.plain, row.state).state if row.plain else row.state
+
     def _waits(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
         text = clauses[at].text
-        if not re.match(r"(?:wait|stay|remain|pause|hold|stand|linger|go|charge|recharge|dock)\b", text, re.IGNORECASE):
+        if not ACTS.waits.match(text) or (row.plain and not ACTS.waits_for.search(text)):
             return None
-        if row.plain and not re.search(r"\b(?:until|till|for|while|as long as|to)\b", text, re.IGNORECASE):
-            return None
-        state = self.known(row)
+        state = self._known(row)
         done = charging_in(text, state) or wait_in(text, state, self.reader)
         if done is None:
             return None
@@ -127,23 +134,18 @@ class Builder(Branches):
         self.put_done(row, done)
         return at + 1
 
-    def known(self, row: Row) -> State:
-        """What is known behind the clauses that are still to be understood."""
-        if not row.plain:
-            return row.state
-        return self.read_together(row.plain, row.state).state
-
     def _says(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
         clause = clauses[at]
         if (match := ACTS.tells_when.fullmatch(clause.text)) is not None:
-            return self._tells_when(row, match, at)
-        if not ACTS.speaks.match(clause.text) or _asks_back(clause.text, self.reader):
+            self._tells_when(row, match)
+            return at + 1
+        if not ACTS.speaks.match(clause.text) or ACTS.asks_back.match(clause.text):
             return None
         if (everywhere_said := ACTS.says_everywhere.fullmatch(clause.text)) is not None:
             self._in_each(row, replace(clause, joint="", text=everywhere_said[1]))
             return at + 1
         found = cue_behind(clause.text)
-        if found is not None and not _spoken_of(found, clause.text):
+        if found is not None and not _spoken_of(found):
             self.modified(row, clause, found)
             return at + 1
         said = speech_in(clause.text, self.reader)
@@ -157,7 +159,7 @@ class Builder(Branches):
         self.put(row, Speak(speak=template(text)), row.state)
         return at + 1
 
-    def _tells_when(self, row: Row, match: re.Match[str], at: int) -> int:
+    def _tells_when(self, row: Row, match: re.Match[str]) -> None:
         """ "Tell me when Robin comes" waits for that, and then tells it."""
         self.flush(row)
         supposed = suppose(match["what"], row.state, self.reader)
@@ -168,34 +170,29 @@ class Builder(Branches):
         said = speech_to(match["who"], told, self.reader.knowledge)
         self._to(row, said.to)
         self.put(row, Speak(speak=template(said.text or told)), row.state)
-        return at + 1
 
-    def _to(self, row: Row, listener: Listener | None) -> None:
+    def _to(self, row: Row, to: Listener | None) -> None:
         """Go to whom something is said."""
-        if listener is None or not (listener.who or listener.where):
+        if to is None or not (to.who or to.where):
             return
-        if listener.speaker:
-            reading = self.reader.commands_of_items((verb("come"), Adverb(here=True)), row.state)
-        else:
-            who = behind_preposition(self.reader.items_of(listener.who), "to") if listener.who else ()
-            where = self.reader.items_of(listener.where) if listener.where else ()
-            reading = self.reader.commands_of_items(
-                (verb("go"), *who, *behind_preposition(where, "in" if who else "to")), row.state
-            )
+        who = behind_preposition(self.reader.items_of(to.who), "to") if to.who and not to.speaker else ()
+        where = behind_preposition(self.reader.items_of(to.where), "in" if who else "to") if to.where else ()
+        going = (verb("come"), Adverb(here=True)) if to.speaker else (verb("go"), *who, *where)
+        reading = self.reader.commands_of_items(going, row.state)
         if reading.commands[-1].goal != row.state.goal or reading.commands[-1].goal_at is not None:
             self.add(row, reading)
 
     def _asks(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
-        asked = question_in(_of_whom(clauses[at].text, row.state), self.reader.knowledge)
+        person, text = row.state.memory.person, clauses[at].text
+        if person is not None:
+            text = re.sub(r"^(ask) (?:him|her)\b", rf"\1 {person.name}", text, flags=re.IGNORECASE)
+        asked = question_in(text, self.reader.knowledge)
         if asked is None:
             return None
         self.flush(row)
         self._to(row, asked.of)
-        choices: dict[str, Steps]
-        if asked.yes_or_no:
-            choices, end = self._agreed(asked, row.state, clauses, at + 1)
-        else:
-            choices, end = self._chosen(asked, row.state, clauses, at + 1)
+        answers = self._agreed if asked.yes_or_no else self._chosen
+        choices, end = answers(asked, row.state, clauses, at + 1)
         self.put(row, Ask(ask=template(asked.text), choices=choices), replace(row.state, goal=None, at=None))
         return end
 
@@ -203,33 +200,31 @@ class Builder(Branches):
         """What is done where the answer is yes, and where it is no."""
         found: dict[str, Steps] = {"yes": (), "no": ()}
         while at < len(clauses):
-            clause = clauses[at]
-            match = ACTS.answers.match(clause.text) if clause.kind is Cue.IF else None
+            clause, rest = clauses[at], clauses[at].text
+            match = ACTS.answers.match(rest) if clause.kind is Cue.IF else None
             answer = "yes" if clause.kind is Cue.SO else "no" if clause.kind in (Cue.NOT, Cue.OTHERWISE) else None
-            rest = clause.text
             if match is not None:
                 answer = "no" if match["no"] else "yes"
-                rest = clause.text[match.end() :].strip(" ,")
+                rest = rest[match.end() :].strip(" ,")
             if answer is None or found[answer]:
                 break
             end = end_of(clauses, at + 1, branch=True)
             body = [*cut(rest), *clauses[at + 1 : end]]
             if not body:
-                raise RefusalError(f"what am I to do {clause.cue} {clause.text}?", [clause.cue])
-            found[answer], _ = self.sequence([replace(body[0], joint=""), *body[1:]], self._choosing(asked, 0, state))
+                raise nothing_said(clause.cue, clause.text)
+            found[answer], _ = self.nested(body, self._choosing(asked, 0, state))
             at = end
-        if at < len(clauses) and not found["yes"] and _brings(clauses[at]):
+        if at < len(clauses) and not found["yes"] and ACTS.brings.match(clauses[at].text):
             raise RefusalError("say 'if yes' before what is to be done then", [clauses[at].text])
         return found, at
 
     def _chosen(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
         """What is done for each of the choices: it is brought, where that was said."""
         names = [without_article(choice) for choice in asked.choices]
-        if at >= len(clauses) or clauses[at].kind is not None or not _brings(clauses[at]):
+        if at >= len(clauses) or clauses[at].kind is not None or not ACTS.brings.match(clauses[at].text):
             return dict.fromkeys(names, ()), at
-        brings = replace(clauses[at], joint="")
-        found = [self.sequence([brings], self._choosing(asked, n, state))[0] for n in range(len(names))]
-        return dict(zip(names, found, strict=True)), at + 1
+        chosen = (self._choosing(asked, n, state) for n in range(len(names)))
+        return {name: self.nested([clauses[at]], each)[0] for name, each in zip(names, chosen, strict=True)}, at + 1
 
     def _choosing(self, asked: Asked, number: int, state: State) -> State:
         """What is known behind the answer: "it" is what was chosen, and is given to who was asked."""
@@ -243,15 +238,14 @@ class Builder(Branches):
         text = checked_statement(clauses[at].text)
         if text is None:
             return None
-        state = self.known(row)
-        found = cue_behind(text)
+        state = self._known(row)
         try:
             self.reader.commands_of(clauses[at].text, state)
         except RefusalError as refusal:
             plain = refusal
         else:
             return None
-        if found is not None:
+        if cue_behind(text) is not None:
             return None
         try:
             supposed = suppose(text, state, self.reader)
@@ -259,34 +253,34 @@ class Builder(Branches):
             said = refusal.question is not None or refusal.kind is RefusalKind.NO_SUCH_DOOR
             raise (refusal if said else plain) from None
         self.flush(row)
-        self.notes += supposed.notes
-        look = supposed.condition.command if isinstance(supposed.condition, Look) else None
-        row.steps.append(Check(condition=supposed.condition) if look is None else Do.of(look))
-        row.state, row.asked = supposed.holds, LookedAt(supposed, looked=True)
+        found = supposed.condition
+        step = Do.of(found.command) if isinstance(found, Look) else Check(condition=found)
+        self.put_done(row, ((step,), supposed.holds, supposed.notes))
+        row.asked = LookedAt(supposed, looked=True)
         return at + 1
 
     def _everyone(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
         text = clauses[at].text
         if ACTS.gives.match(text) is None or ACTS.everyone.search(text) is None:
             return None
-        done = for_everyone(text, self.known(row), self.reader)
+        done = for_everyone(text, self._known(row), self.reader)
         if done is None:
             return None
         self.flush(row)
-        row.steps += done[0]
-        row.state, row.asked, self.special = done[1], None, True
+        self.put_done(row, (*done, ()))
+        self.special = True
         return at + 1
 
     def _rooms(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
         text = clauses[at].text
         if not ACTS.every_room.search(text):
             return None
-        reading, end = search_everywhere(text, self.known(row), self.reader), at + 1
+        reading, end = search_everywhere(text, self._known(row), self.reader), at + 1
         follow = clauses[at + 1].text if at + 1 < len(clauses) and clauses[at + 1].kind is None else ""
         if reading is None and ACTS.goes_everywhere.fullmatch(text) is not None:
             if (match := ACTS.what_there.fullmatch(follow)) is not None:
                 what = next(filter(None, match.groups()))
-                reading, end = search_for(what, self.known(row), self.reader), at + 2
+                reading, end = search_for(what, self._known(row), self.reader), at + 2
             elif ACTS.speaks.match(follow) and cue_behind(follow) is None:
                 self._in_each(row, replace(clauses[at + 1], joint=""))
                 return at + 2
@@ -303,47 +297,13 @@ class Builder(Branches):
         for room in self.reader.knowledge.places:
             there = Chunk(phrase_of_name(room, NounKind.PLACE), "to", PrepositionRole.GOAL)
             reading = self.reader.commands_of_items((verb("go"), there), replace(row.state, goal=None))
-            said, row.state = self.sequence([says], reading.state)
-            row.steps += [*steps_of_commands(reading.commands), *said]
-        row.asked = None
+            said, state = self.sequence([says], reading.state)
+            self.put_done(row, ((*steps_of_commands(reading.commands), *said), state, ()))
 
 
-def _tells_only(plain: Sequence[Clause]) -> bool:
-    """Whether it is a statement before a request: "there is a hammer on the bench. bring it"."""
-    return bool(plain) and all(re.match(r"(?:there|the|my|i|it|he|she)\b", one.text, re.IGNORECASE) for one in plain)
-
-
-def _is_reported(text: str) -> bool:
-    more = (
-        r"|tell me how many(?: (?:there are|of them|you (?:see|find)))*"
-        r"|tell me where (?:it|he|she|they) (?:is|are)|tell me (?:if|whether) (?:it|he|she) is"
-    )
-    return re.fullmatch(CLAUSES.reported.pattern + more, text, re.IGNORECASE) is not None
-
-
-def _asks_back(text: str, reader: PlainReader) -> bool:
-    """Whether it asks the robot for something: "tell me where the hammer is", "let me know whether ..."."""
-    return (
-        re.match(
-            r"(?:tell|let) (?:me|us) (?:know )?(?:where|if|whether|what|how|who|which|when)\b", text, re.IGNORECASE
-        )
-        is not None
-    )
-
-
-def _spoken_of(found: Behind, text: str) -> bool:
+def _spoken_of(found: Behind) -> bool:
     """Whether what would stand behind a clause is a part of what is said."""
     return found.kind in (Cue.TIMES, Cue.EVERY) and bool(found.text) and not re.match(r"for|until|every", found.text)
-
-
-def _of_whom(text: str, state: State) -> str:
-    """The clause with the name of who is asked, where that is "him"."""
-    person = state.memory.person
-    return text if person is None else re.sub(r"^(ask) (?:him|her)\b", rf"\1 {person.name}", text, flags=re.IGNORECASE)
-
-
-def _brings(clause: Clause) -> bool:
-    return re.match(r"(?:bring|get|fetch|give|take|hand|serve)\b", clause.text, re.IGNORECASE) is not None
 
 
 MOST_NESTED: Final = 2

@@ -23,6 +23,9 @@ from executive.words.knowledge import Knowledge
 from executive.words.robots import display_name, robot_called
 from skills.files.errors import listing
 
+_IT: Final = r"\b(?:it|them)\b"
+_FROM_THERE: Final = r"\s+from there\b"
+
 
 def understand_for_robots(
     sentence: str,
@@ -52,21 +55,20 @@ def understand_for_robots(
             memory=memory,
             correct=correct,
         )
-        return replace(
-            alone, parts=(Part(robots[0], alone, speaker_by=robots[0]),) if alone.status is Status.OK else ()
-        )
+        part = Part(robots[0], alone, speaker_by=robots[0])
+        return replace(alone, parts=(part,)) if alone.status is Status.OK else alone
     assert knowledge is not None
-    stranger = re.match(rf"\W*{_GREETING}\b[\s,]+(?P<name>[A-Z][\w'-]*)\s*,", text)
     said = correct_spelling(text, knowledge, parser) if correct else Corrected(text)
+    forms = addressees(names).forms
+    stranger = forms.stranger.match(text)
     addressed = True
     try:
         cut = split(said.text, names)
         addressed = cut.listener is not None
-        everybody = stranger is not None and addressees(names).forms.called.fullmatch(stranger["name"]) is not None
-        if cut.listener is None and stranger is not None and not everybody:
+        if not addressed and stranger is not None and forms.called.fullmatch(stranger["name"]) is None:
             what = f"there is no robot called {stranger['name']}; there are {listing(names)}"
             return Understanding(sentence, Status.NOT_ADDRESSED, reason=what, unknown_words=(stranger["name"],))
-        if require_wake and cut.listener is None:
+        if require_wake and not addressed:
             called = listing((f'"Hey {name}"' for name in names), last="or")
             reason = f"no robot's name was said; begin with {called}"
             return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
@@ -107,36 +109,35 @@ class _Reader:
             if one.meaning.refused_as is RefusalKind.NOTHING_TO_DO and number < len(parts) - 1:
                 told = (replace(clauses[0], part=part), *clauses[1:])
                 continue
-            if (refused := self._refused(sentence, one)) is not None:
-                return refused
+            self._refuse_as_person(one.part.text)
+            if one.meaning.status is not Status.OK:
+                return replace(one.meaning, text=sentence)
             told, memory = (), one.meaning.memory
             read.append(one)
         if not read:
-            names = listing(map(display_name, self.robots))
-            return Understanding(sentence, Status.REFUSED, reason=f"nothing was said that {names} could do")
+            raise RefusalError(f"nothing was said that {self._named(self.robots)} could do")
         notes = tuple(dict.fromkeys(note for one in read for note in one.meaning.notes))
         return Understanding(sentence, Status.OK, notes=notes, memory=memory, parts=tuple(self._parts(read, cut)))
 
-    def _meaning(self, text: str, clauses: Sequence[Clause], memory: Memory | None) -> Understanding:
-        return meaning(Trace(text, memory or Memory()), self.steps, clauses)
-
     def _read(self, part: Saying, clauses: Sequence[Clause], before: Sequence[_Read], memory: Memory | None) -> _Read:
         """The meaning of a part, and what it waits for. Raises RefusalError."""
-        if part.otherwise and before and before[-1].part.who != part.who:
-            raise RefusalError("what one robot finds cannot decide what another does; say it as two requests")
         changes_hands = bool(before) and before[-1].part.who != part.who
-        memory = memory_to_hand_on(before[-1].meaning) if changes_hands else memory
+        if part.otherwise and changes_hands:
+            raise RefusalError("what one robot finds cannot decide what another does; say it as two requests")
+        memory = _memory_to_hand_on(before[-1].meaning) if changes_hands else memory
         if changes_hands and re.search(_IT, part.text):
             part = replace(part, text=re.sub(_FROM_THERE, "", part.text))
             clauses = [replace(clause, text=re.sub(_FROM_THERE, "", clause.text)) for clause in clauses]
-        meant = self._meaning(part.text, clauses, memory)
+        meant = meaning(Trace(part.text, memory or Memory()), self.steps, clauses)
         after = set(self._said_before(part, before))
         for number, other in enumerate(before):
             if other.part.who == part.who:
                 continue
-            if (place := moved(other.meaning, meant)) is not None and memory is not None:
-                meant = self._meaning(part.text, clauses, with_place(memory, place))
-            if takes_what_was_put(other.meaning, meant):
+            if (place := _moved(other.meaning, meant)) is not None and memory is not None:
+                known = replace(memory, told=(*memory.told, *((thing, place) for thing in memory.things)))
+                meant = meaning(Trace(part.text, known), self.steps, clauses)
+            put = {(str(command.item), command.goal) for command in other.meaning.commands if command.item is not None}
+            if any((str(one.object), one.goal) in put for one in meant.commands if one.task is Task.GRASP):
                 after.add(number)
         if changes_hands:
             self._check_in_hand(before[-1].meaning, meant, part.who)
@@ -145,13 +146,16 @@ class _Reader:
 
     def _said_before(self, part: Saying, before: Sequence[_Read]) -> Iterator[int]:
         """The pieces that are said to come before one."""
-        if part.then:
-            yield from (n for n in _side_by_side(before) if before[n].part.who != part.who)
+        for number in range(len(before) - 1, -1, -1) if part.then else ():
+            if before[number].part.who != part.who:
+                yield number
+            if before[number].after or before[number].part.then:
+                break
         if part.behind is None or part.behind == part.who:
             return
         found = [n for n, other in enumerate(before) if _share(other.part.who, part.behind)]
         if not found:
-            who = listing(map(display_name, part.behind if isinstance(part.behind, tuple) else self.robots))
+            who = self._named(part.behind if isinstance(part.behind, tuple) else self.robots)
             raise RefusalError(f"nothing was said that {who} is to do before", [who])
         yield found[-1]
 
@@ -163,75 +167,54 @@ class _Reader:
         if meant.status is not Status.OK or not again or not carried:
             return
         last = carried[-1]
-        goal = last.goal
-        if last.task is not None and last.item is None and last.task.value != "grasp":
+        if last.task not in (None, Task.GRASP) and last.item is None:
             return
-        gone = last.item is None or goal is None or self.knowledge.place(goal) is None
-        if gone:
+        if last.item is None or last.goal is None or self.knowledge.place(last.goal) is None:
             thing = last.item or last.object
-            raise RefusalError(
-                f"the {thing} is then not where {self._named(who)} can take it; say on which table it is put before",
-                [str(thing)],
-            )
+            what = f"the {thing} is then not where {self._named(who)} can take it; say on which table it is put before"
+            raise RefusalError(what, [str(thing)])
 
     def _check_one_thing(self, part: Saying, meant: Understanding) -> None:
         """Refuse to send several robots for the one thing."""
         several = part.who is Whom.ALL or (isinstance(part.who, tuple) and len(part.who) > 1)
-        if not several or meant.trace is None:
+        if not several or meant.trace is None or all(command.task is not Task.GRASP for command in meant.commands):
             return
-        grasps = {str(command.object) for command in meant.commands if command.task and command.task.value == "grasp"}
         targets = (one.target for one in meant.trace.resolved)
         definite = [target for target in targets if target is not None and not target.indefinite and not target.plural]
-        if grasps and definite:
+        if definite:
             what = f"{self._named(part.who)} cannot all take the one {definite[0].text}; say which of them"
             raise RefusalError(what, [definite[0].text])
 
-    def _refused(self, sentence: str, one: _Read) -> Understanding | None:
-        """The answer where a piece is not understood, or speaks of a robot as of a person."""
-        meant = one.meaning
-        named = [name for name in self.robots if re.search(rf"\b{re.escape(name)}\b", one.part.text, re.IGNORECASE)]
+    def _refuse_as_person(self, text: str) -> None:
+        """Raise RefusalError where a piece speaks of a robot as of a person, and does not only quote or tell of it."""
+        named = [name for name in self.robots if re.search(rf"\b{re.escape(name)}\b", text, re.IGNORECASE)]
         named = [name for name in named if self.knowledge.person(name) is None]
-        if named and not addressees(self.robots).narrates(one.part.text) and not _quotes(one.part.text):
+        quotes = re.match(r"(?:say|announce|shout)\b(?!.* to \w+\W*$)", text, re.IGNORECASE)
+        if named and not quotes and not addressees(self.robots).narrates(text):
             name = display_name(named[0])
             reason = (
                 f"{name} is a robot, and not somebody to go to or to hand things to; "
                 f"say what {name} is to do, or put things on a table and let {name} bring them from there"
             )
-            return Understanding(sentence, Status.REFUSED, reason=reason, unknown_words=(name,))
-        if meant.status is Status.OK:
-            return None
-        return replace(meant, text=sentence)
+            raise RefusalError(reason, [name])
 
     def _parts(self, read: Sequence[_Read], cut: Split) -> Iterator[Part]:
         """A part for each robot of each part."""
-        listener = cut.listener
-        by = robot_called(listener[0], self.robots) if isinstance(listener, tuple) else None
+        by = robot_called(cut.listener[0], self.robots) if isinstance(cut.listener, tuple) else None
         numbers: list[tuple[int, ...]] = []
         count = 0
         for one in read:
-            who = self._who(one.part.who)
+            who: tuple[str | Whom, ...] = (one.part.who or Whom.ANY,) if not isinstance(one.part.who, tuple) else ()
+            if isinstance(one.part.who, tuple):
+                who = tuple(robot_called(name, self.robots) or name for name in one.part.who)
             after = tuple(sorted({at for number in one.after for at in numbers[number]}))
             numbers.append(tuple(range(count, count + len(who))))
             count += len(who)
             yield from (Part(robot, one.meaning, after, by) for robot in who)
 
-    def _who(self, who: Who | None) -> tuple[str | Whom, ...]:
-        """The robots as they are called in the run."""
-        if not isinstance(who, tuple):
-            return (who or Whom.ANY,)
-        return tuple(robot_called(name, self.robots) or name for name in who)
-
     def _named(self, who: Who | None) -> str:
         names = who if isinstance(who, tuple) else self.robots
         return listing(map(display_name, names), last="and" if who is not None else "or")
-
-
-def _side_by_side(before: Sequence[_Read]) -> Iterator[int]:
-    """The last piece, and those right before it that it does not wait for."""
-    for number in range(len(before) - 1, -1, -1):
-        yield number
-        if before[number].after or before[number].part.then:
-            return
 
 
 def _share(one: Who | None, other: Who) -> bool:
@@ -241,39 +224,21 @@ def _share(one: Who | None, other: Who) -> bool:
     return one is not None
 
 
-def memory_to_hand_on(meant: Understanding) -> Memory | None:
+def _memory_to_hand_on(meant: Understanding) -> Memory | None:
     """What was spoken of, for another robot: things are where they were put, or looked for."""
     memory, place = meant.memory, _where(meant)
     return memory if memory is None or place is None else replace(memory, where=place, place=place)
 
 
-def with_place(memory: Memory, place: Location) -> Memory:
-    """The memory of things that are at `place`, whatever was said of them last."""
-    return replace(memory, told=(*memory.told, *((thing, place) for thing in memory.things)))
-
-
-def moved(before: Understanding, meant: Understanding) -> Location | None:
+def _moved(before: Understanding, meant: Understanding) -> Location | None:
     """Where a thing was put that `meant` names once more, without saying where it is ("the beer")."""
     if meant.trace is None or before.trace is None or meant.status is not Status.OK or before.memory is None:
         return None
-    named = (one for one in meant.trace.resolved if one.target is not None and one.source is None and not one.again)
-    same = any(
-        one.target is not None and not one.target.indefinite and one.target.text == thing.text
-        for one in named
-        for thing in before.memory.things
-    )
-    return _where(before) if same and _puts(before) else None
-
-
-def takes_what_was_put(before: Understanding, meant: Understanding) -> bool:
-    """Whether a thing is taken from where it was put before."""
-    put = {(str(command.item), command.goal) for command in before.commands if command.item is not None}
-    taken = {(str(command.object), command.goal) for command in meant.commands if command.task is Task.GRASP}
-    return bool(put & taken)
-
-
-def _puts(meant: Understanding) -> bool:
-    return any(command.item is not None for command in meant.commands)
+    named = (one.target for one in meant.trace.resolved if one.source is None and not one.again)
+    texts = {target.text for target in named if target is not None and not target.indefinite}
+    same = any(thing.text in texts for thing in before.memory.things)
+    puts = any(command.item is not None for command in before.commands)
+    return _where(before) if same and puts else None
 
 
 def _where(meant: Understanding) -> Location | None:
@@ -281,19 +246,7 @@ def _where(meant: Understanding) -> Location | None:
     memory = meant.memory
     if memory is None or meant.trace is None:
         return None
-    for action in reversed(meant.trace.resolved):
-        if action.target in memory.things:
-            place = action.goal or action.source
-            return None if place is None or place.phrase is None or place.living else place
-    place = memory.place
-    return None if meant.trace.resolved or place is None or place.phrase is None or place.living else place
-
-
-def _quotes(text: str) -> bool:
-    """Whether a text has the robot say something of another, and not to it."""
-    return re.match(r"(?:say|announce|shout)\b(?!.* to \w+\W*$)", text, re.IGNORECASE) is not None
-
-
-_GREETING: Final = r"(?i:hey|hi|ok|okay|hello)"
-_IT: Final = r"\b(?:it|them)\b"
-_FROM_THERE: Final = r"\s+from there\b"
+    actions = meant.trace.resolved
+    found = next((one for one in reversed(actions) if one.target in memory.things), None)
+    place = found.goal or found.source if found is not None else memory.place if not actions else None
+    return None if place is None or place.phrase is None or place.living else place

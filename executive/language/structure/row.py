@@ -72,12 +72,7 @@ def end_of(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: 
             goes_on = one.kind in ATTACHED or (one.kind is Cue.IF and ACTS.pronoun.match(one.text) is not None)
             if after_all or (one.begins and n > at and not goes_on):
                 return n
-        elif (
-            one.kind in (*ATTACHED, Cue.IF, Cue.UNLESS, Cue.SOON)
-            or one.begins
-            or after_all
-            or (n > at and branch and one.then)
-        ):
+        elif one.kind in (*ATTACHED, Cue.IF, Cue.UNLESS, Cue.SOON) or one.begins or after_all or then:
             return n
     return len(clauses)
 

@@ -18,7 +18,6 @@ from skills.files.errors import listing
 _NUMBERS: Final = {"two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "both": 2}
 _YOU: Final = frozenset({"you", "yourself"})
 _SOMEBODY: Final = frozenset({"he", "she", "it", "they", "that", "this", "you"})
-_WAITS: Final = frozenset({"after", "wait"})
 _LEADS: Final[Mapping[str, str]] = {"check": "check ", "send": "go "}
 _REFUSED: Final[Mapping[str, str]] = {
     "not": "say what a robot is to do, and not what it is not to do",
@@ -77,6 +76,11 @@ class Addressees:
     names: tuple[str, ...]
 
     @cached_property
+    def begins(self) -> tuple[tuple[str, re.Pattern[str]], ...]:
+        """What begins another robot's part, in the order of trying."""
+        return self.forms.mapping("begins")
+
+    @cached_property
     def forms(self) -> Patterns:
         """How they are called and told what to do."""
         words = {"one": rf"(?:{any_of(self.names)})(?![\w'-])", "verbs": rf"(?:{any_of(_verbs())})(?![\w'])"}
@@ -132,19 +136,16 @@ class Addressees:
         """Who a sentence is said to, and the rest of it. Raises RefusalError: see `meant`."""
         if (match := self.forms.first.match(text)) is not None:
             return self.meant(_who(match)), text[match.end() :]
-        if (match := self.forms.last.search(text)) is not None and not _lists(text[: match.start()]):
-            return self.meant(_who(match)), text[: match.start()]
+        if (match := self.forms.last.search(text)) is not None:
+            before = text[: match.start()]
+            if not (before[:1].islower() and re.search(r"\b[A-Z]\w*$", before)):  # a beer for Robin, Alice and Bob
+                return self.meant(_who(match)), before
         address = addressed_to(text, self.names)
         if address.name is not None:
             return (address.name,), address.text
         if (match := self.forms.called_back.search(text)) is not None:
             return self.meant(_who(match)), f"{text[: match.start()]}{match['mark']}{text[match.end() :]}"
         return None, text
-
-    @cached_property
-    def begins(self) -> tuple[tuple[str, re.Pattern[str]], ...]:
-        """What begins another robot's part, in the order of trying."""
-        return self.forms.mapping("begins")
 
     def imperative(self, text: str) -> str:
         """What somebody does as what is to be done: "goes to the hall and brings" -> "go to the hall and bring"."""
@@ -219,7 +220,7 @@ class _Parting:
         joint_at = self.calls.forms.joint.search(before)
         at = len(before) if joint_at is None else joint_at.start()
         said, joint = before[:at], before[at:]
-        if found.kind in _WAITS:
+        if found.kind in ("after", "wait"):
             self._add(said)
             now = self.found[-1].who
             who = now if found.kind == "wait" or self.address is None else self.address
@@ -289,8 +290,3 @@ def _who(match: re.Match[str]) -> str:
 
 def _says(saying: Saying) -> bool:
     return re.search(r"\w", saying.text) is not None
-
-
-def _lists(before: str) -> bool:
-    """Whether names at the end go on with a list: "a beer for Robin, Alice and Bob"."""
-    return re.search(r"\b[A-Z]\w*$", before) is not None and before[:1].islower()

@@ -123,13 +123,15 @@ def cut(text: str) -> tuple[Clause, ...]:
 def _cuts(text: str) -> Iterator[tuple[int, int]]:
     """Where what joins two clauses begins and ends."""
     first = _joint().match(text)
-    yield (0, first.end() if first is not None else 0)
-    for match in _joint().finditer(text, first.end() if first is not None else 0):
+    begin = 0 if first is None else first.end()
+    yield 0, begin
+    for match in _joint().finditer(text, begin):
         joined = match[0].strip() != "" or (_ELSE.match(text, match.end()) and not _SOME.search(text[: match.start()]))
         sentence = re.search(r"[.!?;](?:\s|$)", match[0]) is not None
         if match[0].strip().lower() in ("and", "please") and _ONE_VERB.search(text[: match.start()]):
             continue
-        if joined and (sentence or _opens(text[match.end() :])):
+        word = re.match(r"[\w']+", rest := text[match.end() :])
+        if joined and (sentence or (word and (word[0].lower() in _verbs() or _kind(rest) is not None))):
             yield match.span()
 
 
@@ -141,12 +143,6 @@ def _clause(text: str, joint: tuple[int, int], end: int) -> Clause:
         return clause
     rest = clause.text[len(kind[1]) :].strip(" ,;:")
     return replace(clause, kind=kind[0], cue=kind[1], text=re.sub(r"^then\s+", "", rest, flags=re.IGNORECASE))
-
-
-def _opens(text: str) -> bool:
-    """Whether a clause begins with these words."""
-    word = re.match(r"[\w']+", text)
-    return word is not None and (word[0].lower() in _verbs() or _kind(text) is not None)
 
 
 def _kind(text: str) -> tuple[Cue, str] | None:
@@ -161,7 +157,11 @@ def _kind(text: str) -> tuple[Cue, str] | None:
 
 def cue_behind(text: str) -> Behind | None:
     """The first thing that stands behind what is to be done in a clause, so that it decides or repeats that."""
-    found = [(match.start(), Cue(kind), match) for kind, each in _behind() for match in each.finditer(text, 1)]
+    found = [
+        (match.start(), Cue(kind), match)
+        for kind, each in CLAUSES.mapping("behind")
+        for match in each.finditer(text, 1)
+    ]
     found = [one for one in found if one[1] is not Cue.IF or not CLAUSES.asks_before.search(text[: one[0]])]
     if not found:
         return None
@@ -196,11 +196,6 @@ def _verbs() -> frozenset[str]:
 def _kinds() -> tuple[tuple[Cue, re.Pattern[str]], ...]:
     table = read_table("structures.yaml")["kinds"]
     return tuple((kind, CLAUSES.compiled(rf"{text}(?![\w'])")) for kind in Cue for text in table[kind.value])
-
-
-@cache
-def _behind() -> tuple[tuple[str, re.Pattern[str]], ...]:
-    return CLAUSES.mapping("behind")
 
 
 _WHOLE: Final = frozenset({Cue.FAILED, Cue.SO, Cue.NOT})

@@ -9,7 +9,6 @@ from typing import Any
 from executive.language.actions import Action
 from executive.language.command_frames import spoken_command
 from executive.language.items import Predicate, spoken_words
-from executive.language.roles import Location
 from executive.language.steps import Trace
 from executive.language.tokens import Token
 from executive.words.yaml_steps import steps_to_yaml
@@ -27,6 +26,13 @@ class TokenRow:
     relation: str
     head: int | None
     kind: str | None
+
+    @classmethod
+    def of(cls, token: Token) -> TokenRow:
+        """The row of a word."""
+        kind = token.kind.value if token.kind is not None and token.pos in ("NOUN", "PROPN") else None
+        head = None if token.head == token.index else token.head
+        return cls(token.index, token.text, token.lemma, token.pos, token.tag, token.relation, head, kind)
 
 
 @dataclass(frozen=True)
@@ -48,6 +54,32 @@ class ActionRow:
     goal: str | None
     recipient: str | None
     not_understood: tuple[str, ...]
+
+    @classmethod
+    def of(cls, action: Action) -> ActionRow:
+        """The row of an action."""
+        source, goal = (
+            None if place is None else f"{place.preposition} {place.text}".strip()
+            for place in (action.source, action.goal)
+        )
+        to_somebody = action.goal is not None and (action.goal.person or action.goal.phrase is None)
+        asks_for = None if action.kind is None else action.kind.value
+        objects = tuple(ThingRow(phrase.text, phrase.count) for phrase in action.objects)
+        to = (None, goal) if to_somebody else (goal, None)
+        return cls(action.verb, asks_for, objects, source, *to, action.unknown)
+
+    @property
+    def lines(self) -> Iterator[str]:
+        """The action to read."""
+        yield f"{self.verb or '(no verb)'}: {self.asks_for or 'tells only'}"
+        found = {
+            "objects": ", ".join(f"{thing.name} x {thing.count or 'some'}" for thing in self.objects),
+            "source": self.source,
+            "goal": self.goal,
+            "recipient": self.recipient,
+            "not understood": ", ".join(self.not_understood),
+        }
+        yield from (f"  {name}: {value}" for name, value in found.items() if value)
 
 
 @dataclass(frozen=True)
@@ -79,13 +111,17 @@ class Explanation:
 
 def explain(trace: Trace) -> Explanation:
     """What the steps of a sentence made of it."""
+    subject = None
+    if trace.actions:  # the robot that is spoken to acts, in all that asks it for something
+        said = (t.text for t in trace.tokens if t.relation == "nsubj" and t.pos in ("PRON", "PROPN"))
+        subject = "you (the robot)" if any(action.kind for action in trace.actions) else next(said, None)
     return Explanation(
         text=trace.text,
         plain=trace.opened,
-        subject=_subject(trace),
-        tokens=tuple(map(_token_row, trace.tokens)),
+        subject=subject,
+        tokens=tuple(map(TokenRow.of, trace.tokens)),
         parts=trace.parts or tuple(map(_part, trace.clauses)),
-        actions=tuple(map(_action_row, trace.actions)),
+        actions=tuple(map(ActionRow.of, trace.actions)),
         stands_for=trace.meanings,
         frames=tuple(str(spoken_command(frame)) for frame in trace.frames),
         commands=tuple(map(str, trace.commands)),
@@ -96,49 +132,11 @@ def explain(trace: Trace) -> Explanation:
     )
 
 
-def _subject(trace: Trace) -> str | None:
-    """Who acts: the robot that is spoken to, in all that asks it for something; None before that is known."""
-    if not trace.actions:
-        return None
-    said = (t.text for t in trace.tokens if t.relation == "nsubj" and t.pos in ("PRON", "PROPN"))
-    return "you (the robot)" if any(action.kind for action in trace.actions) else next(said, None)
-
-
-def _token_row(token: Token) -> TokenRow:
-    root = token.head == token.index
-    kind = token.kind.value if token.kind is not None and token.pos in ("NOUN", "PROPN") else None
-    return TokenRow(
-        token.index, token.text, token.lemma, token.pos, token.tag, token.relation, None if root else token.head, kind
-    )
-
-
 def _part(clause: Predicate) -> str:
     """The words of a clause, its verb in front."""
     verb = [] if clause.verb is None else [spoken_words([clause.verb])]
     subject = [clause.subject.phrase.spoken] if clause.subject is not None else []
-    return " | ".join([*verb, *subject, *_pieces(clause)])
-
-
-def _pieces(clause: Predicate) -> Iterator[str]:
-    yield from filter(None, (spoken_words([item]) for item in clause.items))
-
-
-def _action_row(action: Action) -> ActionRow:
-    goal = action.goal
-    to_somebody = goal is not None and (goal.person or goal.phrase is None)
-    return ActionRow(
-        verb=action.verb,
-        asks_for=None if action.kind is None else action.kind.value,
-        objects=tuple(ThingRow(phrase.text, phrase.count) for phrase in action.objects),
-        source=_place(action.source),
-        goal=None if to_somebody else _place(goal),
-        recipient=_place(goal) if to_somebody else None,
-        not_understood=action.unknown,
-    )
-
-
-def _place(place: Location | None) -> str | None:
-    return None if place is None else f"{place.preposition} {place.text}".strip()
+    return " | ".join([*verb, *subject, *filter(None, (spoken_words([item]) for item in clause.items))])
 
 
 def tree_lines(tokens: Sequence[TokenRow]) -> Iterator[str]:
@@ -158,52 +156,35 @@ def _branches(head: TokenRow, tokens: Sequence[TokenRow], indent: str) -> Iterat
 
 def explanation_lines(explained: Explanation) -> Iterator[str]:
     """All steps as lines, a heading before each; steps that were not reached are left out."""
-    yield from _section("heard", [explained.text])
-    yield from _section("in plain words", [explained.plain] if explained.plain else [])
-    yield from _section("words", _table(explained.tokens))
-    yield from _section("dependencies", list(tree_lines(explained.tokens)))
-    yield from _section("subject", [explained.subject] if explained.subject else [])
-    yield from _section("parts", explained.parts)
-    yield from _section("actions", [line for action in explained.actions for line in _action_lines(action)])
-    yield from _section("stands for", [f"{word} = {meant}" for word, meant in explained.stands_for])
-    yield from _section("command frames", explained.frames)
-    yield from _section("notes", explained.notes)
-    yield from _section("commands", explained.commands)
-    yield from _section("mission", explained.mission)
-    if explained.refused_at is not None:
-        yield from _section(f"refused at {explained.refused_at!r}", [explained.reason or ""])
-
-
-def _section(title: str, lines: Sequence[str]) -> Iterator[str]:
-    if lines:
-        yield f"{title}:"
-        yield from (f"  {line}" for line in lines)
+    refused = "" if explained.refused_at is None else f"refused at {explained.refused_at!r}"
+    sections: dict[str, Sequence[str]] = {
+        "heard": [explained.text],
+        "in plain words": [explained.plain] if explained.plain else [],
+        "words": _table(explained.tokens),
+        "dependencies": list(tree_lines(explained.tokens)),
+        "subject": [explained.subject] if explained.subject else [],
+        "parts": explained.parts,
+        "actions": [line for action in explained.actions for line in action.lines],
+        "stands for": [f"{word} = {meant}" for word, meant in explained.stands_for],
+        "command frames": explained.frames,
+        "notes": explained.notes,
+        "commands": explained.commands,
+        "mission": explained.mission,
+        refused: [explained.reason or ""] if refused else [],
+    }
+    for title, lines in sections.items():
+        yield from (f"{title}:", *(f"  {line}" for line in lines)) if lines else ()
 
 
 def _table(tokens: Sequence[TokenRow]) -> list[str]:
     """The words in columns."""
-    rows = [_cells(token, tokens) for token in tokens]
+    rows = []
+    for token in tokens:
+        head = next((other.text for other in tokens if other.index == token.head), "")
+        arc = f"{token.relation} <- {head}" if head else token.relation
+        rows.append((str(token.index), token.text, token.lemma, token.pos, token.tag, arc, token.kind or ""))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-
-
-def _cells(token: TokenRow, tokens: Sequence[TokenRow]) -> tuple[str, ...]:
-    head = next((other.text for other in tokens if other.index == token.head), "")
-    arc = f"{token.relation} <- {head}" if head else token.relation
-    return (str(token.index), token.text, token.lemma, token.pos, token.tag, arc, token.kind or "")
-
-
-def _action_lines(action: ActionRow) -> Iterator[str]:
-    yield f"{action.verb or '(no verb)'}: {action.asks_for or 'tells only'}"
-    things = ", ".join(f"{thing.name} x {thing.count or 'some'}" for thing in action.objects)
-    found = {
-        "objects": things,
-        "source": action.source,
-        "goal": action.goal,
-        "recipient": action.recipient,
-        "not understood": ", ".join(action.not_understood),
-    }
-    yield from (f"  {name}: {value}" for name, value in found.items() if value)
 
 
 def arcs_svg(tokens: Sequence[TokenRow]) -> str:

@@ -101,6 +101,7 @@ class Patterns:
 
     def __init__(self, table: str, section: str | None = None, words: Mapping[str, str] | None = None) -> None:
         self._table, self._section, self._words = table, section, dict(words or {})
+        self._mappings: dict[str, tuple[tuple[str, re.Pattern[str]], ...]] = {}
 
     def __getattr__(self, name: str) -> re.Pattern[str]:
         if name.startswith("__"):
@@ -115,11 +116,15 @@ class Patterns:
 
     def each(self, name: str) -> tuple[re.Pattern[str], ...]:
         """The expressions of a list."""
-        return tuple(self.compiled(text) for text in self._entry(name))
+        return tuple(form for _, form in self.mapping(name))
 
     def mapping(self, name: str) -> tuple[tuple[str, re.Pattern[str]], ...]:
-        """The expressions of a mapping, each with its name."""
-        return tuple((key, self.compiled(text)) for key, text in self._entry(name).items())
+        """The expressions of a mapping, each with its name; those of a list have numbers."""
+        if name not in self._mappings:
+            entry = self._entry(name)
+            rows = entry.items() if isinstance(entry, dict) else enumerate(entry)
+            self._mappings[name] = tuple((str(key), self.compiled(text)) for key, text in rows)
+        return self._mappings[name]
 
     def text(self, name: str) -> str:
         """An expression as it is written, those that it names filled in."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Final
@@ -145,63 +145,47 @@ def sound_distance(first: str, second: str) -> float:
 @lru_cache(maxsize=4096)
 def sounds_of(words: str) -> str:
     """The sounds of one or several words, a character each; what is no Latin letter makes none."""
-    return "".join(_word_sounds(word) for word in _plain(words[:_MAX_LETTERS]).split())
+    letters = unicodedata.normalize("NFKD", words[:_MAX_LETTERS].lower())  # accents are taken off
+    plain = re.sub(r"[^a-z ]", "", re.sub(r"[-_\s]", " ", letters))
+    return "".join(map(_word_sounds, plain.split()))
 
 
 def _word_sounds(word: str) -> str:
     sounds, at = "", 0
     while at < len(word):
-        letters, sound = _rule_at(word, at)
-        sounds, at = sounds + sound, at + letters
+        matches = ((before, letters.match(word, at), sound) for before, letters, sound in _rules(word[at]))
+        fitting = ((found.end(), sound) for before, found, sound in matches if found and before.search(word[:at]))
+        end, sound = next(fitting, (at, ""))
+        sounds, at = sounds + sound, max(end, at + 1)
     return re.sub(r"(.)\1+", r"\1", sounds)
 
 
-def _plain(words: str) -> str:
-    """Lower-case letters and spaces, accents taken off."""
-    letters = unicodedata.normalize("NFKD", words.lower())
-    return re.sub(r"[^a-z ]", "", re.sub(r"[-_\s]", " ", letters))
-
-
-@dataclass(frozen=True)
-class _Rule:
-    left: re.Pattern[str]
-    letters: re.Pattern[str]
-    sounds: str
+@cache
+def _rules(letter: str) -> Sequence[tuple[re.Pattern[str], re.Pattern[str], str]]:
+    """The rules that begin with a letter: what stands before, the letters, and their sounds."""
+    return tuple(
+        (re.compile(rf"(?:{left})$"), re.compile(rf"(?:{letters})(?={right})"), sounds)
+        for left, letters, right, sounds in read_table("letter_sounds.yaml")[letter]
+    )
 
 
 @cache
-def _rules() -> Mapping[str, Sequence[_Rule]]:
-    """The rules by their first letter."""
-    return {letter: tuple(_rule(*row) for row in rows) for letter, rows in read_table("letter_sounds.yaml").items()}
-
-
-def _rule(left: str, letters: str, right: str, sounds: str) -> _Rule:
-    return _Rule(re.compile(rf"(?:{left})$"), re.compile(rf"(?:{letters})(?={right})"), sounds)
-
-
-def _rule_at(word: str, at: int) -> tuple[int, str]:
-    """How many letters the rule that fits takes, and their sounds."""
-    for rule in _rules()[word[at]]:
-        found = rule.letters.match(word, at)
-        if found and rule.left.search(word[:at]):
-            return max(found.end() - at, 1), rule.sounds
-    return 1, ""
-
-
 def _drop_cost(sound: str) -> float:
-    """What it costs to leave a sound out, from 0 to 1."""
-    return _sounds().weak.get(sound, _VOWEL_DROP if sound in _sounds().vowels else _CONSONANT_DROP)
+    """What it costs to leave a sound out, from 0 to 1; some are lost easily."""
+    usual = _VOWEL_DROP if sound in _vowels() else _CONSONANT_DROP
+    return float(read_table("sounds.yaml")["weak"].get(sound, usual))
 
 
+@cache
 def _change_cost(a: str, b: str) -> float:
     """What it costs to say one sound for another, from 0 to 1."""
     if a == b:
         return 0.0
-    vowels = _sounds().vowels
+    vowels, alike = _vowels(), read_table("sounds.yaml")["alike"].items()
     if a in vowels and b in vowels:
         (x, y), (other_x, other_y) = vowels[a], vowels[b]
         return min(0.15 + 0.6 * float(((x - other_x) ** 2 + (y - other_y) ** 2) ** 0.5), 0.8)
-    return _sounds().alike.get(frozenset((a, b)), 1.0)
+    return next((float(cost) for cost, pairs in alike for pair in pairs if {*pair} == {a, b}), 1.0)
 
 
 _MAX_LETTERS: Final = 200
@@ -209,23 +193,10 @@ _VOWEL_DROP: Final = 0.5
 _CONSONANT_DROP: Final = 0.8
 
 
-@dataclass(frozen=True)
-class _Sounds:
-    """What sounds cost: `weak` are lost easily; `vowels` are spoken so far back and so high, from 0 to 1; `alike` are
-    the costs of pairs of consonants that are taken for each other."""
-
-    weak: Mapping[str, float]
-    vowels: Mapping[str, tuple[float, float]]
-    alike: Mapping[frozenset[str], float]
-
-
 @cache
-def _sounds() -> _Sounds:
-    table = read_table("sounds.yaml")
-    weak = {sound: float(cost) for sound, cost in table["weak"].items()}
-    vowels = {sound: (float(back), float(high)) for sound, (back, high) in table["vowels"].items()}
-    alike = {frozenset(pair): float(cost) for cost, pairs in table["alike"].items() for pair in pairs}
-    return _Sounds(weak, vowels, alike)
+def _vowels() -> Mapping[str, tuple[float, float]]:
+    """How far back and how high each vowel is spoken, from 0 to 1."""
+    return {sound: (float(back), float(high)) for sound, (back, high) in read_table("sounds.yaml")["vowels"].items()}
 
 
 @dataclass(frozen=True)
@@ -249,7 +220,9 @@ def synonyms_of(word: str, known: Mapping[str, str]) -> tuple[str, ...]:
     wanted = word.lower()
     rings, kinds = _synonyms()
     ring = (known[other] for ring in rings if wanted in ring for other in ring if other in known)
-    kind = (known[other] for member in kinds.get(wanted, ()) for other in _with_ring(member) if other in known)
+    members = kinds.get(wanted, ())
+    with_rings = ((member, *(other for ring in rings if member in ring for other in ring)) for member in members)
+    kind = (known[other] for each in with_rings for other in each if other in known)
     return tuple(dict.fromkeys(ring)) or tuple(dict.fromkeys(kind))
 
 
@@ -274,7 +247,8 @@ def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -
     A word is misspelled when it is no English word; the name must be within one slip, or two for long names. Names
     that are written together or apart ("night stand", "nightstand") are the same.
     """
-    known = _known(knowledge)
+    own = [*knowledge.thing_names(), *knowledge.place_names(), *knowledge.people]
+    known = _known(knowledge.spellings(own))
     words = list(_WORD.finditer(text))[:_MOST_WORDS]
     pieces, notes, end, at = [], [], 0, 0
     while at < len(words):
@@ -282,14 +256,11 @@ def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -
         if name is not None:
             spoken = text[words[at].start() : words[at + count - 1].end()]
             pieces += [text[end : words[at].start()], name]
-            notes += [] if _despaced(spoken) in (_despaced(name), _despaced(f"{name}s")) else [_note(spoken, name)]
+            same = _despaced(spoken) in (_despaced(name), _despaced(f"{name}s"))
+            notes += [] if same else [f"I take '{spoken}' to be {name}"]
             end = words[at + count - 1].end()
         at += count
     return Corrected("".join([*pieces, text[end:]]), tuple(notes))
-
-
-def _note(spoken: str, name: str) -> str:
-    return f"I take '{spoken}' to be {name}"
 
 
 @dataclass(frozen=True)
@@ -326,7 +297,9 @@ def _corrected_at(
 def _only_near(row: Sequence[str], known: _Known, facts: DependencyParser) -> str | None:
     """The one known name that misspelled words can mean; None where they are English or could be several."""
     strange = [word for word in row if word not in known.words]
-    if not strange or any(_may_be_right(word, facts) for word in strange):
+    if not strange or any(not _FEWEST_LETTERS <= len(word) <= _MOST_LETTERS for word in strange):
+        return None
+    if any(facts.is_word(word) or facts.is_word(_singular(word)) for word in strange):
         return None
     spoken = " ".join(row)
     names = [name for name in known.names if name.count(" ") == len(row) - 1]
@@ -334,11 +307,6 @@ def _only_near(row: Sequence[str], known: _Known, facts: DependencyParser) -> st
     near = sorted((distance, form) for form in forms if (distance := _slips(spoken, form)) <= _slips_allowed(form))
     unsure = len(near) > 1 and near[1][0] == near[0][0]
     return None if unsure or not near else known.spelled.get(near[0][1], near[0][1])
-
-
-def _may_be_right(word: str, facts: DependencyParser) -> bool:
-    """Whether a word that is no known name is one that was meant."""
-    return not _FEWEST_LETTERS <= len(word) <= _MOST_LETTERS or facts.is_word(word) or facts.is_word(_singular(word))
 
 
 def _slips(word: str, name: str) -> int:
@@ -358,13 +326,8 @@ def _slip(word: str, name: str, sound: float) -> float:
     return sound if sound <= ALIKE_SOUND else 1.0
 
 
-def _known(knowledge: Knowledge) -> _Known:
-    own = [*knowledge.thing_names(), *knowledge.place_names(), *knowledge.people]
-    return _known_of(knowledge.spellings(own))
-
-
 @lru_cache(maxsize=16)
-def _known_of(spelled: tuple[str, ...]) -> _Known:
+def _known(spelled: tuple[str, ...]) -> _Known:
     """The names of a world with their aliases, and the general synonyms of those."""
     written = {name.lower(): name for name in spelled}
     names = tuple(dict.fromkeys([*written, *(word for name in written for word in words_for(name))]))
@@ -378,11 +341,6 @@ def _singular(word: str) -> str:
 
 def _despaced(name: str) -> str:
     return re.sub(r"[\s'-]", "", name.lower())
-
-
-def _with_ring(word: str) -> Iterator[str]:
-    yield word
-    yield from (other for ring in _synonyms()[0] if word in ring for other in ring)
 
 
 @cache

@@ -134,24 +134,19 @@ PLACE: Final = "kitchen"
 PERSON: Final = "John"
 
 
-@dataclass(frozen=True)
-class NameTable:
-    """The pattern that finds any known name, and for each name in lower case the word that stands in for it."""
-
-    pattern: re.Pattern[str]
-    stand_ins: Mapping[str, str]
+NameTable = tuple[re.Pattern[str], Mapping[str, str]]
+"""The pattern that finds any known name, and for each name in lower case the word that stands in for it."""
 
 
 def name_table(knowledge: Knowledge) -> NameTable:
-    """The names of a world, longest first."""
+    """The names of a world."""
     things = [*(n for name, facts in knowledge.things.items() for n in (name, *facts.aliases)), *knowledge.categories()]
     places = [n for g in (knowledge.places, knowledge.surfaces) for name, f in g.items() for n in (name, *f.aliases)]
     people = [n for name, facts in knowledge.people.items() for n in (name, *facts.aliases)]
     stand_ins = {name.lower(): THING for name in things}
     stand_ins |= {name.lower(): PLACE for name in places}
     stand_ins |= {name.lower(): PERSON for name in people}
-    pattern = re.compile(rf"\b({any_of(stand_ins) or '(?!)'})(e?s)?\b", re.IGNORECASE)
-    return NameTable(pattern, stand_ins)
+    return re.compile(rf"\b({any_of(stand_ins) or '(?!)'})(e?s)?\b", re.IGNORECASE), stand_ins
 
 
 def parse_with_names(
@@ -160,24 +155,22 @@ def parse_with_names(
     """Parse `text` with each known name as one token, whose text and lemma are the name as spoken and in singular."""
     if table is None:
         return parse(text)
+    pattern, stand_ins = table
     names: dict[int, re.Match[str]] = {}
     pieces: list[str] = []
     end = 0
-    for match in table.pattern.finditer(text):
+    for match in pattern.finditer(text):
         pieces.append(text[end : match.start()])
         names[sum(map(len, pieces))] = match
-        plural = "s" if match.group(2) and table.stand_ins[match.group(1).lower()] != PERSON else ""
-        pieces.append(table.stand_ins[match.group(1).lower()] + plural)
+        stand_in = stand_ins[match[1].lower()]
+        pieces.append(f"{stand_in}s" if match[2] and stand_in != PERSON else stand_in)
         end = match.end()
-    tokens = parse("".join([*pieces, text[end:]]))
-    return tuple(_named(token, names.get(token.start), token.text) for token in tokens)
-
-
-def _named(token: Token, match: re.Match[str] | None, stand_in: str) -> Token:
-    if match is None:
-        return token
-    entity = "PERSON" if stand_in == PERSON else ""
-    return replace(token, text=match.group(0), lemma=match.group(1).lower(), entity=entity, known=True)
+    tokens = list(parse("".join([*pieces, text[end:]])))
+    for n, token in enumerate(tokens):
+        if (found := names.get(token.start)) is not None:
+            entity = "PERSON" if token.text == PERSON else ""
+            tokens[n] = replace(token, text=found[0], lemma=found[1].lower(), entity=entity, known=True)
+    return tuple(tokens)
 
 
 @dataclass(frozen=True)

@@ -63,10 +63,15 @@ class ActionRow:
             for place in (action.source, action.goal)
         )
         to_somebody = action.goal is not None and (action.goal.person or action.goal.phrase is None)
-        asks_for = None if action.kind is None else action.kind.value
-        objects = tuple(ThingRow(phrase.text, phrase.count) for phrase in action.objects)
-        to = (None, goal) if to_somebody else (goal, None)
-        return cls(action.verb, asks_for, objects, source, *to, action.unknown)
+        return cls(
+            verb=action.verb,
+            asks_for=None if action.kind is None else action.kind.value,
+            objects=tuple(ThingRow(phrase.text, phrase.count) for phrase in action.objects),
+            source=source,
+            goal=None if to_somebody else goal,
+            recipient=goal if to_somebody else None,
+            not_understood=action.unknown,
+        )
 
     @property
     def lines(self) -> Iterator[str]:

@@ -60,19 +60,13 @@ def follow_up_of(text: str) -> FollowUp | None:
     plain = " ".join(text.replace("’", "'").split()).strip(" .!,")
     if _FORMS.again.fullmatch(plain):
         return FollowUp(FollowUpKind.AGAIN)
-    for pattern, kind in _kinds():
-        match = pattern.fullmatch(plain)
-        if match:
-            found = {key: (value or "").strip(" ,.!?") for key, value in match.groupdict().items()}
-            preposition, said = _split(found["said"])
-            return FollowUp(kind, said, preposition, _split(found.get("old", ""))[1])
+    for kind in (FollowUpKind.CORRECTION, FollowUpKind.ADDITION):
+        for form in _FORMS.each(kind.value):
+            if (match := form.fullmatch(plain)) is not None:
+                found = {key: (value or "").strip(" ,.!?") for key, value in match.groupdict().items()}
+                preposition, said = _split(found["said"])
+                return FollowUp(kind, said, preposition, _split(found.get("old", ""))[1])
     return None
-
-
-@cache
-def _kinds() -> tuple[tuple[re.Pattern[str], FollowUpKind], ...]:
-    kinds = (FollowUpKind.CORRECTION, FollowUpKind.ADDITION)
-    return tuple((form, kind) for kind in kinds for form in _FORMS.each(kind.value))
 
 
 def amended(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> tuple[Command, ...]:
@@ -84,7 +78,7 @@ def amended(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) ->
     if by.thing is not None:
         return tuple(_with_thing(command, by, knowledge) for command in commands)
     if by.goal is None:
-        return tuple(_with_count(command, by.count) for command in commands)
+        return tuple(_counted(command, by.count) for command in commands)
     at = _place_of(commands, by)
     return tuple(
         replace(command, goal=by.goal, goal_at=by.goal_at) if number == at else command
@@ -115,24 +109,22 @@ def _with_thing(command: Command, by: Amendment, knowledge: Knowledge) -> Comman
     if old is None or (by.old is not None and old.name != by.old and by.old not in knowledge.classes(old.name)):
         return command
     usual = command.task in (Task.GRASP, Task.FIND) and command.goal == knowledge.default_place(command.task, old.name)
-    counts = {} if by.count is None else {"item_count": by.count, "object_count": by.count}
-    return replace(
+    named = replace(
         command,
         item=None if command.item is None else by.thing,
         object=None if command.object is None else by.thing,
         goal=knowledge.default_place(command.task, by.thing.name) if usual else command.goal,
-        item_count=counts.get("item_count", command.item_count) if command.item is not None else 1,
-        object_count=counts.get("object_count", command.object_count) if command.object is not None else 1,
     )
+    return _counted(named, by.count)
 
 
-def _with_count(command: Command, count: int | None) -> Command:
-    if count is None:
-        return command
+def _counted(command: Command, count: int | None) -> Command:
+    """The command with so many of its thing, where that was said."""
+    item_count, object_count = (command.item_count, command.object_count) if count is None else (count, count)
     return replace(
         command,
-        item_count=1 if command.item is None else count,
-        object_count=1 if command.object is None else count,
+        item_count=1 if command.item is None else item_count,
+        object_count=1 if command.object is None else object_count,
     )
 
 
@@ -172,13 +164,8 @@ class Remark(enum.Enum):
 
 def remark_of(text: str) -> Remark | None:
     """The remark that a whole sentence is; None when it is something else, such as a request."""
-    words = _plain(text[:_MOST_LETTERS])
+    words = " ".join(re.sub(r"[^\w\s']", " ", text[:_MOST_LETTERS].lower().replace("’", "'")).split())
     return _remarks().get(words) or _remarks().get(_POLITE.sub("", words).strip())
-
-
-def _plain(text: str) -> str:
-    """Lower case, without punctuation."""
-    return " ".join(re.sub(r"[^\w\s']", " ", text.lower().replace("’", "'")).split())
 
 
 @cache

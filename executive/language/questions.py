@@ -87,11 +87,13 @@ def left_open(reason: str, heard: str | None) -> ClarifyingQuestion:
 
 def chosen(question: ClarifyingQuestion, answer: str) -> str | None:
     """The candidate that an answer means: by its number, its name, a word of it, or nearly so; None when unclear."""
-    said = _bare(answer)
-    order = {word: candidate for number, candidate in enumerate(question.candidates) for word in _order(number)}
-    if said in order:
-        return order[said]
-    if len(question.candidates) == 1 and _agrees(answer):
+    words = _FILLERS.sub("", answer.lower()).strip(" ,.!?")
+    said = re.sub(r"\s+(?:one|please)$", "", _LEADING.sub("", words)).strip(" ,.!?")
+    for number, candidate in enumerate(question.candidates, 1):
+        if said in (str(number), *_ORDINALS[number - 1 : number]):
+            return candidate
+    agreed = set(re.findall(r"\w+", answer.lower()))
+    if len(question.candidates) == 1 and agreed & _YES and agreed <= _YES | {"please"}:
         return question.candidates[0]
     exact = [c for c in question.candidates if c.lower() == said]
     parts = [c for c in question.candidates if said and set(said.split()) <= set(c.lower().split())]
@@ -111,31 +113,11 @@ def with_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> str
     full = _whereto(value) if place_word else value
     if not place_word:
         full = _definite(value) if question.heard.lower() in _PRONOUNS else _LEADING.sub("", value)
-    spans = [m.span() for m in re.finditer(rf"\b{re.escape(question.heard)}\b", sentence, re.IGNORECASE)]
-    start, end = next((span for span in spans if not _inside_candidate(sentence, span, question)), (None, None))
-    return f"{sentence[:start]}{full}{sentence[end:]}" if start is not None and end is not None else sentence
-
-
-def _inside_candidate(sentence: str, span: tuple[int, int], question: ClarifyingQuestion) -> bool:
-    """Whether what was heard stands there as a part of a candidate's whole name."""
-    upto = sentence[: span[1]].lower()
-    heard = (question.heard or "").lower()
-    longer = (c.lower() for c in question.candidates if len(c) > len(heard))
-    return any(upto.endswith(candidate) for candidate in longer)
-
-
-def _bare(answer: str) -> str:
-    words = _FILLERS.sub("", answer.lower()).strip(" ,.!?")
-    return re.sub(r"\s+(?:one|please)$", "", _LEADING.sub("", words)).strip(" ,.!?")
-
-
-def _agrees(answer: str) -> bool:
-    words = set(re.findall(r"\w+", answer.lower()))
-    return bool(words & _YES) and words <= _YES | {"please"}
-
-
-def _order(number: int) -> tuple[str, ...]:
-    return (str(number + 1), _ORDINALS[number]) if number < len(_ORDINALS) else (str(number + 1),)
+    longer = tuple(c.lower() for c in question.candidates if len(c) > len(question.heard))
+    for match in re.finditer(rf"\b{re.escape(question.heard)}\b", sentence, re.IGNORECASE):
+        if not sentence[: match.end()].lower().endswith(longer):  # it is no part of a candidate's whole name
+            return f"{sentence[: match.start()]}{full}{sentence[match.end() :]}"
+    return sentence
 
 
 def _nearly(question: ClarifyingQuestion, said: str) -> list[str]:

@@ -208,18 +208,15 @@ class PlainReader:
         he = isinstance(item, Chunk) and item.role is None and item.phrase.head.word in ("he", "she")
         return replace(item, phrase=person.phrase) if isinstance(item, Chunk) and he else item
 
-    def room_of(self, place: Location, state: State) -> str:
-        """The room of a place that was read."""
-        assert place.phrase is not None
-        return self._room(
-            self.commands_of_items((verb("go"), Chunk(place.phrase, "to", PrepositionRole.GOAL)), state), place.text
-        )
-
-    def room(self, text: str, state: State) -> str:
-        """The room of a place as it is spoken."""
-        return self._room(self.go_to(text, state), text)
-
-    def _room(self, reading: PlainReading, text: str) -> str:
+    def room(self, place: Location | str, state: State) -> str:
+        """The room of a place, or of one as it is spoken."""
+        text = place if isinstance(place, str) else place.text
+        if isinstance(place, str):
+            reading = self.go_to(place, state)
+        else:
+            assert place.phrase is not None
+            to = Chunk(place.phrase, "to", PrepositionRole.GOAL)
+            reading = self.commands_of_items((verb("go"), to), state)
         first, *more = reading.commands
         goal = first.goal
         if more or first.item or first.task or goal is None or self.knowledge.place(goal) is None:

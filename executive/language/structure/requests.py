@@ -283,7 +283,7 @@ def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, S
     who = to.phrase.spoken
     if to.within is None:
         raise RefusalError(f"I bring things to one person at a time, not to {who}; name one, or a room", [who])
-    room, knowledge = reader.room_of(to.within, state), reader.knowledge
+    room, knowledge = reader.room(to.within, state), reader.knowledge
     people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
     if not people:
         raise RefusalError(f"I know nobody in the {room} to bring anything to: {who}", [who])

@@ -190,7 +190,7 @@ class _Grounder:
             raise RefusalError(f"I go to one place at a time, not to {said!r}", [said])
         known = _spellings(self.knowledge, self.knowledge.place_names())
         room = self._room(location)
-        candidates = self._any_place(location.phrase) or self._places(location.phrase, room, known)
+        candidates = self._places(location.phrase, room, known)
         fitting = (name for name in candidates if room in (None, name, self.knowledge.room(name)))
         inside = [name for name in fitting if not self._left_over(location.phrase, name)]
         if not inside:
@@ -213,6 +213,10 @@ class _Grounder:
 
     def _places(self, phrase: Phrase, room: str | None, known: Mapping[str, str]) -> Sequence[str]:
         """The places of that very name, or else of that noun; with a room said, also by their other names."""
+        groups = {"room": tuple(self.knowledge.places), "surface": tuple(self.knowledge.surfaces)}
+        named = len(phrase.content) > 1 or self.knowledge.place(phrase.text) is not None
+        if not named and groups.get(phrase.head.lemma):  # any place: "the room", "a surface"
+            return groups[phrase.head.lemma]
         bare = Phrase(phrase.tokens)
         forms = (phrase.text, bare.text, bare.singular)
         exact = next(filter(None, map(self.knowledge.place, forms)), None)
@@ -220,22 +224,17 @@ class _Grounder:
             return [exact]
         synonyms = [name for form in forms for name in synonyms_of(form, known)]
         if synonyms:
-            return [self._noted(bare.text, name) for name in dict.fromkeys(synonyms)]
+            self._note(bare.text, *(names := tuple(dict.fromkeys(synonyms))))
+            return names
         nouns = _forms(phrase.head)
         own = [name for name in self.knowledge.place_names() if _last(name) in nouns]
         other = [name for spelling, name in known.items() if _last(spelling) in nouns]
         called = [name for spelling, name in known.items() if any(_last(word) in nouns for word in words_for(spelling))]
         return list(dict.fromkeys([*own, *other, *called] if room is not None else own or other))
 
-    def _any_place(self, phrase: Phrase) -> Sequence[str]:
-        """What a word for any place may mean ("the room", "a surface"); nothing for the name of a certain one."""
-        groups = {"room": tuple(self.knowledge.places), "surface": tuple(self.knowledge.surfaces)}
-        named = len(phrase.content) > 1 or self.knowledge.place(phrase.text) is not None
-        return () if named else groups.get(phrase.head.lemma, ())
-
     def _left_over(self, phrase: Phrase, name: str) -> bool:
         """Whether something was said of a place that neither its names nor its room's account for ("kitchen 3")."""
-        extra: tuple[str, ...] = () if phrase.extra[:1] == ("of",) else phrase.extra
+        extra = () if phrase.extra[:1] == ("of",) else phrase.extra
         said = {word for part in (*(t.word for t in phrase.content[:-1]), *extra) for word in part.lower().split()}
         spellings = self.knowledge.spellings([name, self.knowledge.room(name)])
         known = (other for spelling in spellings for other in (spelling, *words_for(spelling)))
@@ -255,12 +254,12 @@ class _Grounder:
         """The only candidate; several make a question."""
         if len(candidates) > 1:
             raise _asking(which(slot, heard, tuple(candidates)))
-        return candidates[0] if slot is Slot.PLACE else self._noted(heard, candidates[0])
+        if slot is not Slot.PLACE:
+            self._note(heard, candidates[0])
+        return candidates[0]
 
-    def _noted(self, heard: str, name: str) -> str:
-        if heard.lower() != name.lower():
-            self.notes.append(f"I take '{heard}' to be {name}")
-        return name
+    def _note(self, heard: str, *names: str) -> None:
+        self.notes += [f"I take '{heard}' to be {name}" for name in names if heard.lower() != name.lower()]
 
     def _unknown(self, slot: Slot, forms: Sequence[str], known: Mapping[str, str]) -> RefusalError:
         """A question where something known looks, sounds or means alike; else a refusal."""
@@ -279,8 +278,7 @@ def _count(phrase: Phrase | None, thing: Thing | None) -> int:
 
 
 def _asking(question: ClarifyingQuestion) -> RefusalError:
-    heard = () if question.heard is None else (question.heard,)
-    return RefusalError(question.text, heard, question=question)
+    return RefusalError(question.text, (question.heard,) if question.heard else (), question=question)
 
 
 def _readings(phrase: Phrase) -> Iterator[tuple[tuple[str, ...], str]]:

@@ -78,38 +78,30 @@ class Whether:
 
 
 @dataclass(frozen=True)
-class Separator:
+class _Word:
+    word: str
+
+
+class Separator(_Word):
     """A comma, "and", "or", "then"."""
 
-    word: str
 
-
-@dataclass(frozen=True)
-class Unknown:
+class Unknown(_Word):
     """A word that nothing accounts for."""
 
-    word: str
 
-
-@dataclass(frozen=True)
-class Outside:
+class Outside(_Word):
     """A verb that the robot does not know; what follows belongs to it."""
 
-    word: str
 
-
-@dataclass(frozen=True)
-class Negation:
+class Negation(_Word):
     """ "Not" and its kin: the speaker leaves out what follows."""
 
-    word: str
-
 
 @dataclass(frozen=True)
-class Correction:
+class Correction(_Word):
     """ "No", "I mean": what follows takes the place of what was said; a `soft` one may also mean nothing."""
 
-    word: str
     soft: bool
 
 

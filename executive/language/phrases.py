@@ -209,7 +209,10 @@ class Phrase:
     def _numerals(self) -> Iterator[tuple[Token, ...]]:
         """The numbers that count, each in its words side by side; that of a measure does not ("ten inch nails")."""
         left = tuple(t for n, t in enumerate(self.tokens[:-1]) if not self._measures(n))
-        for numeral, run in groupby(self.tokens if self.counts else left, key=_is_numeral):
+        for numeral, run in groupby(
+            self.tokens if self.counts else left,
+            key=lambda t: _number(t) is not None or t.tag == "CD" or _DIGITS.fullmatch(t.text) is not None,
+        ):
             if numeral:
                 yield tuple(run)
 
@@ -244,10 +247,6 @@ def _is_determiner(token: Token) -> bool:
     said_number = _number(token) is not None or token.word in lexicon().vague_numbers
     said_number = said_number or token.word in _POINTING
     return said_number or token.pos == "DET" or token.tag in ("PRP$", "DT", "PDT", "POS", "WP$") or token.text == "-"
-
-
-def _is_numeral(token: Token) -> bool:
-    return _number(token) is not None or token.tag == "CD" or _DIGITS.fullmatch(token.text) is not None
 
 
 def _value(numeral: Sequence[Token]) -> int | None:

@@ -104,14 +104,11 @@ def _read(
     heard = [*heard]
     for transcript in transcripts:
         text, behind = smoothed(transcript.text), max(best - transcript.likelihood, 0.0)
-        if behind > _OTHER_READING or any(_same(text, other.text) for other in heard):
+        same = [text.rstrip(" .?!").lower() == other.text.rstrip(" .?!").lower() for other in heard]
+        if behind > _OTHER_READING or any(same):
             continue
         heard.append(Candidate(text, behind / _PER_SOUND, read(text)))
     return heard
-
-
-def _same(first: str, second: str) -> bool:
-    return first.rstrip(" .?!").lower() == second.rstrip(" .?!").lower()
 
 
 def smoothed(text: str) -> str:
@@ -191,20 +188,12 @@ def _replaced(
     """The sentences with a known phrase of like sound in the place of those words."""
     tail = re.sub(r".*[\w']", "", words[end - 1])
     for alike in alikes.of(" ".join(map(_bare, words[start:end]))):
-        if _stands(words[:start], alike):
-            yield alike, (*_before(words[:start], alike), *f"{alike.phrase}{tail}".split(), *words[end:])
-
-
-def _before(words: tuple[str, ...], alike: Alike) -> tuple[str, ...]:
-    """The words before a phrase; no comma parts a preposition from them."""
-    joins = bool(words) and alike.phrase.split()[0] in _PREPOSITIONS
-    return (*words[:-1], words[-1].rstrip(",")) if joins else words
-
-
-def _stands(before: Sequence[str], alike: Alike) -> bool:
-    """Whether the phrase may stand behind these words: behind an article, a number or an adjective only a name may."""
-    last = before[-1].lower() if before else ""
-    return alike.name or not (last in _BEFORE_NAMES or is_attribute(last))
+        before = words[:start]
+        last = before[-1].lower() if before else ""
+        if alike.name or not (last in _BEFORE_NAMES or is_attribute(last)):  # only a name stands behind these
+            if before and alike.phrase.split()[0] in _PREPOSITIONS:  # no comma parts it from what stands before
+                before = (*before[:-1], before[-1].rstrip(","))
+            yield alike, (*before, *f"{alike.phrase}{tail}".split(), *words[end:])
 
 
 def _blamed(words: Sequence[str], suspects: Sequence[str]) -> set[int]:

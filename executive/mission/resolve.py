@@ -16,20 +16,8 @@ from executive.mission.certainty import refuse_certain, refuse_certain_compariso
 from executive.mission.load import load_mission, locate
 from executive.mission.parameters import round_source
 from executive.mission.world_names import in_world_names, unknown_names
-from executive.words.command import START, Command, Task, command_of_parts
-from executive.words.condition import (
-    RANGES,
-    AllOf,
-    AnyOf,
-    ButtonPressed,
-    Condition,
-    DoorOpen,
-    Look,
-    LookFor,
-    Not,
-    Question,
-    ValueIs,
-)
+from executive.words.command import START, Command, Task
+from executive.words.condition import CONDITIONS, RANGES, Condition, DoorOpen, Look, LookFor, Question, ValueIs
 from executive.words.expression import Expression, ExpressionError, Value, literal
 from executive.words.forms import Strict
 from executive.words.knowledge import ANYBODY, Knowledge
@@ -163,7 +151,7 @@ class _Resolver:
             case Say():
                 return self._said(step)
             case Do():
-                return step.with_command(self._command(step.error, _texts(step)))
+                return step.with_command(self._command(step.error, step))
             case ForEach():
                 return _group(step, self._rounds(scope, step), f"for each {step.loop.name}")
             case Set():
@@ -182,6 +170,8 @@ class _Resolver:
 
     def _part(self, scope: _Scope, error: _Error, value: Any, path: KeyPath) -> Any:
         """A value that stands at a path below a step or the file, with the steps and conditions in it resolved."""
+        if isinstance(value, CONDITIONS):
+            return self._condition(scope, error, value, path)
         match value:
             case (Step(), *_):
                 return self._steps(scope, value)
@@ -189,58 +179,50 @@ class _Resolver:
                 return tuple(self._part(scope, error, each, (*path, n)) for n, each in enumerate(value))
             case dict():
                 return {key: self._part(scope, error, each, (*path, key)) for key, each in value.items()}
-            case ValueIs() | Question() | Look() | LookFor() | DoorOpen() | ButtonPressed() | AllOf() | AnyOf() | Not():
-                return self._condition(error, value, path)
             case Strict():
                 return value.model_copy(update=self._parts(scope, error, value, path))
         return value
 
-    def _condition(self, error: _Error, condition: Condition, path: KeyPath) -> Condition:
+    def _condition(self, scope: _Scope, error: _Error, condition: Condition, path: KeyPath) -> Condition:
         """A condition in the world's own names.
 
         Raises:
             InputError: an unknown name, no question, or a condition that cannot hold or cannot fail.
         """
-        resolved = self._named(error, condition, path)
+        resolved = self._named(scope, error, condition, path)
         try:
             refuse_certain(resolved, RANGES)
         except ExpressionError as fault:
             raise error(path, fault.message, fault.hint) from fault
         return resolved
 
-    def _named(self, error: _Error, condition: Condition, path: KeyPath) -> Condition:
+    def _named(self, scope: _Scope, error: _Error, condition: Condition, path: KeyPath) -> Condition:
         match condition:
             case ValueIs():
                 _refuse_decided(error, condition.text, path)
-            case AllOf(parts=parts) | AnyOf(parts=parts):
-                key = "all" if isinstance(condition, AllOf) else "any"
-                named = tuple(self._condition(error, each, (*path, key, n)) for n, each in enumerate(parts))
-                return condition.model_copy(update={"parts": named})
-            case Not(part=part):
-                return Not(part=self._condition(error, part, (*path, "not")))
             case Question(look=question):
                 commands = self._meaning(error, (*path, "look"), question).commands
                 if len(commands) != 1 or commands[0].task is not Task.FIND:
                     hint = "ask one thing, as in 'is there a hammer in the workshop'"
                     raise error((*path, "look"), f"'{question}' is not one question that a look answers", hint)
                 return Look.of(commands[0], condition.max_age_s)
-            case Look(object=found, at=at) | LookFor(person=found, at=at):
-                if isinstance(condition, LookFor):
-                    found = self._person(error, found, (*path, "person"))
-                check = {"do": Task.FIND.value, "object": found, "to": at}
-                return Look.of(self._command(error, check, path), condition.max_age_s)
+            case Look():
+                return Look.of(self._command(error, condition, path), condition.max_age_s)
+            case LookFor(person=person):
+                look = Look(object=self._person(error, person, (*path, "person")), at=condition.at)
+                return Look.of(self._command(error, look, path), condition.max_age_s)
             case DoorOpen():
                 return condition.model_copy(update={"door": self._door(error, condition.door, (*path, "door"))})
-        return condition
+        return condition.model_copy(update=self._parts(scope, error, condition, path))
 
-    def _command(self, error: _Error, parts: dict[str, str | None], path: KeyPath = ()) -> Command:
-        """The command of its parts in the world's own names.
+    def _command(self, error: _Error, of: Do | Look, path: KeyPath = ()) -> Command:
+        """The command of a step or of a look in the world's own names.
 
         Raises:
             InputError: a part that is no name, or names that the world does not have.
         """
         try:
-            command = command_of_parts(parts)
+            command = of.command
         except ValueError as fault:
             raise error(path, str(fault), "write names in plain words") from fault
         problems = Problems()
@@ -402,11 +384,6 @@ def _refuse_decided(error: _Error, expression: str | Expression, path: KeyPath) 
         refuse_certain_comparisons(read, RANGES)
     except ExpressionError as fault:
         raise error(path, fault.message, fault.hint) from fault
-
-
-def _texts(step: Do) -> dict[str, str | None]:
-    do = None if step.do is None else step.do.value
-    return {"take": step.take, "to": step.to, "do": do, "object": step.object}
 
 
 def _room(place: str, knowledge: Knowledge) -> str | None:

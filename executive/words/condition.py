@@ -191,6 +191,10 @@ _KEYS: Final[Mapping[str, type[Strict]]] = MappingProxyType(
 )
 
 
+CONDITIONS: Final[tuple[type[Any], ...]] = tuple(_KEYS.values())
+"""The models of all conditions."""
+
+
 def _refused(told: Sequence[str]) -> str:
     said = f"it has {listing(told)}" if told else "it is empty"
     return f"a condition is an expression or one of {listing([*_KEYS][1:])}; {said}"
@@ -202,7 +206,7 @@ _FORMS: Final = Forms(_KEYS, _refused)
 if TYPE_CHECKING:
     Condition = ValueIs | Question | Look | LookFor | DoorOpen | ButtonPressed | AllOf | AnyOf | Not
 else:
-    _AnyCondition = Union[tuple(_KEYS.values())]  # noqa: UP007
+    _AnyCondition = Union[CONDITIONS]  # noqa: UP007
 
 
 def _bracketed(part: Condition) -> str:

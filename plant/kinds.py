@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
 
 from skills.files.errors import InputError
@@ -15,7 +17,7 @@ from skills.files.plugins import PluginDefect, distribution_of, installed_plugin
 from skills.robot import Capabilities, Pose2D, Robot
 
 if TYPE_CHECKING:
-    from pydrake.geometry import CollisionFilterManager, GeometrySet, SceneGraph
+    from pydrake.geometry import CollisionFilterManager, GeometryId, GeometrySet, SceneGraph
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
     from pydrake.systems.framework import Context
@@ -26,31 +28,65 @@ if TYPE_CHECKING:
 GROUP = "errand.robots"
 
 
-class RobotBody(Protocol):
+class RobotBody(ABC):
     """One robot's bodies and joints in a plant.
 
     `body` has the protocol's body frame B, `hand` its hand frame H.
     """
 
-    plant: MultibodyPlant
-    name: str
-    kind: RobotKind
-    instance: ModelInstanceIndex
-    body: RigidBody
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        name: str,
+        kind: RobotKind,
+        urdf: str,
+        gains: Mapping[str, tuple[float, float]],
+        packages: Mapping[str, Path] = MappingProxyType({}),
+    ) -> None:
+        """Add the robot to `plant` (before Finalize), with the gains (p, d) of its joints' servos.
+
+        `packages` are the folders of meshes that the URDF names.
+        """
+        from pydrake.multibody.parsing import Parser
+        from pydrake.multibody.tree import PdControllerGains
+
+        self.plant, self.name, self.kind = plant, name, kind
+        parser = Parser(plant)
+        parser.SetAutoRenaming(True)
+        for package, folder in packages.items():
+            parser.package_map().Add(package, folder)
+        (self.instance,) = parser.AddModelsFromString(urdf, "urdf")
+        plant.RenameModelInstance(self.instance, name)
+        self.body: RigidBody = plant.GetBodyByName("body", self.instance)
+        for joint, (p, d) in gains.items():
+            plant.GetJointActuatorByName(joint, self.instance).set_controller_gains(PdControllerGains(p=p, d=d))
 
     @property
     def hand(self) -> RigidBody:
-        """The body of the hand frame."""
+        """The last link of the arm."""
+        return self.plant.GetBodyByName(self.kind.gripper_links[0], self.instance)
 
     def instances(self) -> tuple[ModelInstanceIndex, ...]:
         """The model instances that make up this robot."""
+        return (self.instance,)
 
     def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
         """Let links of this robot pass each other, and what never touches the floor pass it."""
+        from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 
+        filters.Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(self.geometries())))
+
+    def geometries(self, prefix: str = "") -> list[GeometryId]:
+        """Collision geometries of the links whose names begin with `prefix`."""
+        bodies = [self.plant.get_body(index) for index in self.plant.GetBodyIndices(self.instance)]
+        named = (body for body in bodies if body.name().startswith(prefix))
+        return [each for body in named for each in self.plant.GetCollisionGeometriesForBody(body)]
+
+    @abstractmethod
     def place(self, context: Context, pose: Pose2D) -> None:
         """Set the robot standing at a pose (world frame) with its arm stowed."""
 
+    @abstractmethod
     def opening(self, context: Context) -> float:
         """How far the gripper is open, in the unit of `set_gripper`."""
 

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, CollisionFilterManager, GeometryId, GeometrySet
-from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RigidBody
+from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import Context
 
 from plant.control.servos import ActuatedJoints
 from plant.fetch.wheels import WheelLimits
-from plant.kinds import RobotKind
+from plant.kinds import RobotBody, RobotKind
 from plant.models.fetch.description import (
     BASE_LINK,
-    BODY_LINK,
     FINGERS,
-    HAND_LINK,
     HEAD_JOINTS,
     LIFT_JOINT,
     WHEELS,
@@ -42,27 +38,15 @@ _GAINS = {
 }
 
 
-class FetchModel:
-    """Fetch's bodies and joints in a plant. Its fingers are geared together."""
+class FetchModel(RobotBody):
+    """Fetch's bodies and joints in a plant. It stands on its wheels and casters; its fingers are geared together."""
 
     def __init__(self, plant: MultibodyPlant, name: str, *, kind: RobotKind, limits: WheelLimits) -> None:
         """Add the robot to `plant` (before Finalize)."""
-        self.plant, self.name, self.kind, self.limits = plant, name, kind, limits
-        parser = Parser(plant)
-        parser.SetAutoRenaming(True)
-        (self.instance,) = parser.AddModelsFromString(fetch_urdf(), "urdf")
-        plant.RenameModelInstance(self.instance, name)
-        self.base = plant.GetBodyByName(BASE_LINK, self.instance)
-        self.body = plant.GetBodyByName(BODY_LINK, self.instance)
-        for joint, (p, d) in _GAINS.items():
-            plant.GetJointActuatorByName(joint, self.instance).set_controller_gains(PdControllerGains(p=p, d=d))
+        super().__init__(plant, name, kind, fetch_urdf(), _GAINS)
+        self.limits, self.base = limits, plant.GetBodyByName(BASE_LINK, self.instance)
         left, right = (plant.GetJointByName(finger, self.instance) for finger in FINGERS)
         plant.AddCouplerConstraint(left, right, 1.0)
-
-    @property
-    def hand(self) -> RigidBody:
-        """The last link of the arm, with the gripper's palm."""
-        return self.plant.GetBodyByName(HAND_LINK, self.instance)
 
     def opening(self, context: Context) -> float:
         """How far the fingers are apart (m)."""
@@ -72,18 +56,6 @@ class FetchModel:
     def index(self) -> JointIndex:
         """Where the joints stand in the plant's state and in the instance's actuation; after Finalize."""
         return JointIndex(self.plant, self.instance)
-
-    def instances(self) -> tuple[ModelInstanceIndex, ...]:
-        """The model instances that make up this robot."""
-        return (self.instance,)
-
-    def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
-        """Let links of this robot pass each other. Wheels and casters stand on the floor."""
-        filters.Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(self._geometries())))
-
-    def _geometries(self) -> list[GeometryId]:
-        bodies = [self.plant.get_body(index) for index in self.plant.GetBodyIndices(self.instance)]
-        return [each for body in bodies for each in self.plant.GetCollisionGeometriesForBody(body)]
 
     def place(self, context: Context, pose: Pose2D) -> None:
         """Set the robot on its wheels at a pose, the torso as for travelling and the arm stowed."""

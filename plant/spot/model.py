@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, CollisionFilterManager, GeometryId, GeometrySet
-from pydrake.multibody.parsing import Parser
+from pydrake.geometry import CollisionFilterDeclaration, CollisionFilterManager, GeometrySet
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RevoluteJoint, RigidBody
+from pydrake.multibody.tree import ModelInstanceIndex, RevoluteJoint
 from pydrake.systems.framework import Context
 
 from plant.control.servos import ActuatedJoints
-from plant.kinds import RobotKind
+from plant.kinds import RobotBody, RobotKind
 from plant.locomotion.floating_base import FloatingBase, FloatingBaseLimits
 from plant.models.cache import kept_folder, user_cache
 from plant.models.spot.description import (
@@ -89,7 +87,7 @@ _ARM_GAINS = {
 }
 
 
-class SpotModel:
+class SpotModel(RobotBody):
     """Spot's bodies, joints and floating base in a plant."""
 
     def __init__(
@@ -103,31 +101,15 @@ class SpotModel:
         limits: FloatingBaseLimits | None = None,
     ) -> None:
         """Add the robot to `plant` (before Finalize); a robot that is not carried keeps its free base."""
-        self.plant, self.name, self.kind = plant, name, kind
-        parser = Parser(plant)
-        parser.SetAutoRenaming(True)
         meshes = visuals_folder() if visuals else None
-        if meshes is not None:
-            parser.package_map().Add(VISUALS_PACKAGE, meshes)
-        (self.instance,) = parser.AddModelsFromString(spot_urdf(visuals=meshes is not None), "urdf")
-        plant.RenameModelInstance(self.instance, name)
-        self.body = plant.GetBodyByName("body", self.instance)
+        legs = {joint: _LEG_GAINS for leg in LEGS for joint in leg_joint_names(leg)}
+        packages = {} if meshes is None else {VISUALS_PACKAGE: meshes}
+        super().__init__(plant, name, kind, spot_urdf(visuals=meshes is not None), {**legs, **_ARM_GAINS}, packages)
         self.floating_base = FloatingBase(plant, name, self.body, limits) if carried else None
-        for joint, (p, d) in self._gains().items():
-            plant.GetJointActuatorByName(joint, self.instance).set_controller_gains(PdControllerGains(p=p, d=d))
-
-    @property
-    def hand(self) -> RigidBody:
-        """The last link of the arm."""
-        return self.plant.GetBodyByName(self.kind.gripper_links[0], self.instance)
 
     def opening(self, context: Context) -> float:
         """The gripper's angle (rad), 0 closed."""
         return -float(self._joint(GRIPPER_JOINT).get_angle(context))
-
-    def _gains(self) -> Mapping[str, tuple[float, float]]:
-        legs = {joint: _LEG_GAINS for leg in LEGS for joint in leg_joint_names(leg)}
-        return {**legs, **_ARM_GAINS}
 
     def index(self) -> JointIndex:
         """Where the joints stand in the plant's state and in the instance's actuation; after Finalize."""
@@ -135,23 +117,14 @@ class SpotModel:
 
     def instances(self) -> tuple[ModelInstanceIndex, ...]:
         """The model instances that make up this robot."""
-        return (self.instance,) if self.floating_base is None else (self.instance, self.floating_base.instance)
+        return super().instances() if self.floating_base is None else (self.instance, self.floating_base.instance)
 
     def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
         """Let links of this robot pass each other, and its legs the floor while it is carried."""
-        filters.Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(self.geometries())))
+        super().filter_collisions(filters, floor)
         if self.floating_base is not None:
             legs = [geometry for leg in LEGS for geometry in self.geometries(leg)]
             filters.Apply(CollisionFilterDeclaration().ExcludeBetween(GeometrySet(legs), floor))
-
-    def geometries(self, prefix: str = "") -> list[GeometryId]:
-        """Collision geometries of the links whose names begin with `prefix`."""
-        found: list[GeometryId] = []
-        for index in self.plant.GetBodyIndices(self.instance):
-            body = self.plant.get_body(index)
-            if body.name().startswith(prefix):
-                found.extend(self.plant.GetCollisionGeometriesForBody(body))
-        return found
 
     def place(self, context: Context, pose: Pose2D) -> None:
         """Set the robot standing at a pose with its arm stowed."""

@@ -14,10 +14,10 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2976,
+    "executive/words": 2980,
     "executive/language": 7880,
     "executive/speech": 1606,
-    "executive/mission": 1607,
+    "executive/mission": 1584,
     "executive/tree": 7455,
     "executive/run": 3158,
     "executive/record": 964,
@@ -28,7 +28,7 @@ LINES = {
     "executive/app": 7615,
     "executive/cli": 3846,
     "skills": 25262,
-    "plant": 12010,
+    "plant": 11959,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 497, 88, 27
 """All modules; those that one other imports; file names that stand more than once."""

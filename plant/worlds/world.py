@@ -1,7 +1,4 @@
-"""Loads a world: a folder with directives, knowledge, maps, and the rules by which the seed sets things in it.
-
-Only what a plant needs is read of `knowledge.yaml`: the start pose, rooms and surfaces.
-"""
+"""Loads a world: a folder with directives, knowledge, maps, and the rules by which the seed sets things in it."""
 
 from __future__ import annotations
 
@@ -14,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from executive.words.knowledge import Knowledge, Pose
 from executive.words.mission import Route, Stop
 from plant.models.catalogue import ImportedObject, load_catalogue, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
@@ -143,34 +141,6 @@ NO_SEED_RULES: Final = SeedRules(
     rules=Rules(from_edge_m=(0.0, 0.0), clear_m=0.0, rim_m=0.0, drop_m=0.0), fronts={}, objects=()
 )
 """Nothing loose, and nobody."""
-
-
-class _Pose(BaseModel):
-    x: quantities.Coordinate
-    y: quantities.Coordinate
-    yaw: quantities.Angle
-
-    def pose(self) -> Pose2D:
-        return Pose2D(self.x, self.y, self.yaw)
-
-
-class _Place(BaseModel):
-    polygon: Polygon
-    pose: _Pose | None = None
-
-
-class _Top(BaseModel):
-    place: str
-    height: quantities.TopHeight
-    polygon: Polygon
-    viewpoints: tuple[_Pose, ...] = ()
-
-
-class _Knowledge(BaseModel):
-    start: _Pose
-    dock: _Pose | None = None
-    places: dict[str, _Place] = Field(default_factory=dict)
-    surfaces: dict[str, _Top] = Field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -339,12 +309,13 @@ def load_world(name_or_path: str | Path) -> World:
     """
     folder = _find_folder(name_or_path)
     check_directives(folder / DIRECTIVES, folder)
-    knowledge = validate(_Knowledge, _read(folder / "knowledge.yaml"))
+    knowledge = validate(Knowledge, _read(folder / "knowledge.yaml"))
     objects = folder / "objects.yaml"
     source = _read(objects) if objects.exists() or objects.is_symlink() else None
     rules = NO_SEED_RULES if source is None else validate(SeedRules, source)
     surfaces = {name: SurfaceTop(name, top.polygon, top.height) for name, top in knowledge.surfaces.items()}
-    standing = _standing(knowledge)
+    poses = {name: knowledge.place_pose(name) for name in knowledge.place_names()}
+    standing = {name: (pose.x, pose.y) for name, pose in poses.items()}
     try:
         _check_surfaces(rules, surfaces)
         _check_people(rules, standing)
@@ -357,8 +328,8 @@ def load_world(name_or_path: str | Path) -> World:
     return World(
         name=folder.name,
         folder=folder,
-        start=knowledge.start.pose(),
-        dock=None if knowledge.dock is None else knowledge.dock.pose(),
+        start=_pose(knowledge.start),
+        dock=None if knowledge.dock is None else _pose(knowledge.dock),
         rooms={name: place.polygon for name, place in knowledge.places.items()},
         surfaces=surfaces,
         surface_places={name: top.place for name, top in knowledge.surfaces.items()},
@@ -384,11 +355,8 @@ def _with_imports(known: Mapping[str, Import], folders: Iterable[Path]) -> Mappi
     return found
 
 
-def _standing(knowledge: _Knowledge) -> dict[str, Point]:
-    """Where somebody stands at each room and surface of which that is told."""
-    poses = {name: place.pose for name, place in knowledge.places.items()}
-    poses |= {name: top.viewpoints[0] for name, top in knowledge.surfaces.items() if top.viewpoints}
-    return {name: (pose.x, pose.y) for name, pose in poses.items() if pose is not None}
+def _pose(pose: Pose) -> Pose2D:
+    return Pose2D(pose.x, pose.y, pose.yaw)
 
 
 def _find_folder(name_or_path: str | Path) -> Path:

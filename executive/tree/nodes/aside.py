@@ -24,29 +24,23 @@ Circle = tuple[Coordinate, Coordinate, Length]
 SETTLE_S: Final = 0.5
 
 
-_WRITTEN: Final[Mapping[str, Any]] = {
-    "obstacle": ObjectObservation,
-    "surface": Surface,
-    "clear": tuple[Circle, ...],
-    "pose": Pose2D,
-}
-"""What is noted of an object that is in the way."""
-
-
 class InTheWay(ExplainedLeaf):
     """Says what stands in the way of an object, and notes where to put it. SUCCESS at once.
 
     Reads from the blackboard: the objects that are in the way (`blocking_key`), of which the first is meant, and the
-    wanted one (`wanted_key`). Writes: that first one ("obstacle"), the surface on which it stands ("surface"),
-    the robot's pose ("pose"), and the circles of `clear_m` about the wanted object and the way from the robot to it
-    ("clear"), where it would be in the way again. FAILURE with PRECONDITION: nobody knows what it stands on.
+    wanted one (`wanted_key`). Writes: that first one (`obstacle_key`), the surface on which it stands (`surface_key`),
+    the robot's pose (`pose_key`), and the circles of `clear_m` about the wanted object and the way from the robot to it
+    (`clear_key`), where it would be in the way again. FAILURE with PRECONDITION: nobody knows what it stands on.
     """
 
     kind = "in the way"
     thing: str
     blocking_key: str
     wanted_key: str
-    keys: Mapping[str, str]
+    obstacle_key: str
+    surface_key: str
+    clear_key: str
+    pose_key: str
     surfaces: Sequence[Surface]
     context: RunContext
     clear_m: float = 0.25
@@ -54,7 +48,8 @@ class InTheWay(ExplainedLeaf):
     @staticmethod
     def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
         """The keys of the object, its surface, the pose and the circles."""
-        return {options["keys"][name]: kind for name, kind in _WRITTEN.items()}
+        types = {"obstacle_key": ObjectObservation, "surface_key": Surface, "pose_key": Pose2D}
+        return {options[name]: kind for name, kind in types.items()} | {options["clear_key"]: tuple[Circle, ...]}
 
     def update(self) -> Status:
         """Write where it is, and where it must not be put."""
@@ -66,10 +61,10 @@ class InTheWay(ExplainedLeaf):
         surface = next((each for each in (*self.surfaces, floor) if each.name == obstacle.surface), None)
         if surface is None:
             return self.fail(Failed(Cause.PRECONDITION, f"it is not known what the {obstacle.thing} stands on"))
-        board.put(self.keys["obstacle"], obstacle)
-        board.put(self.keys["surface"], surface)
-        board.put(self.keys["pose"], self.context.pose())
-        board.put(self.keys["clear"], _way_circles(wanted, self.context.pose(), self.clear_m))
+        board.put(self.obstacle_key, obstacle)
+        board.put(self.surface_key, surface)
+        board.put(self.pose_key, self.context.pose())
+        board.put(self.clear_key, _way_circles(wanted, self.context.pose(), self.clear_m))
         return self.say(f"the {obstacle.thing} is in the way of the {self.thing}; it is moved aside")
 
 
@@ -106,8 +101,7 @@ def move_aside_plan(
     `tuck` draws the arm in between. What finds no room there is set down again anywhere on its surface, so that the
     gripper is free. In the end the robot goes back to where it stood, since from there a grasp was found without it.
     """
-    keys = {name: below.key(name) for name in _WRITTEN}
-    obstacle, surface, clear, pose = keys.values()
+    obstacle, surface, clear, pose = map(below.key, ("obstacle", "surface", "clear", "pose"))
     what = below.node(
         "in the way",
         f"what is in the way of the {thing}?",
@@ -115,7 +109,10 @@ def move_aside_plan(
         thing=str(thing),
         blocking_key=blocking,
         wanted_key=wanted,
-        keys=keys,
+        obstacle_key=obstacle,
+        surface_key=surface,
+        clear_key=clear,
+        pose_key=pose,
         surfaces=tuple(map(below.surface, below.knowledge.surfaces)),
     )
     before = below.skill(

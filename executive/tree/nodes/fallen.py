@@ -44,30 +44,24 @@ ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
 """Where else the floor is looked at from: forward and left of where the object was lost (m)."""
 
 
-_WRITTEN: Final[Mapping[str, Any]] = {
-    "pose": Pose2D,
-    "spot": tuple[Coordinate, Coordinate, Height],
-    "floor": tuple[Surface, ...],
-    "around": tuple[Surface, ...],
-    "set-down": Surface,
-}
-"""What is noted of an object that fell."""
-
-
 class Fallen(ExplainedLeaf):
     """Notes where the robot has lost what it carried, and says what happened. SUCCESS after `settle_s`.
 
-    Writes to the blackboard, under its `keys`: the robot's pose ("pose"); the point of the floor `ahead_m` before the
-    body, where it fell ("spot"); the square of floor about it, `half_m` to each side ("floor"); that square with those
-    of `surfaces` that lie within `within_m` of the robot, onto which it may have fallen as well ("around"). What the
+    Writes to the blackboard: the robot's pose (`pose_key`); the point of the floor `ahead_m` before the body, where it
+    fell (`spot_key`); the square of floor about it, `half_m` to each side (`floor_key`); that square with those of
+    `surfaces` that lie within `within_m` of the robot, onto which it may have fallen as well (`around_key`). What the
     gripper still holds by then has slipped, and is not yet lost: a smaller square of free floor says where to
-    set it down ("set-down"), and all else is written anew for there: it is picked up from where it is set down.
+    set it down (`set_down_key`), and all else is written anew for there: it is picked up from where it is set down.
     """
 
     kind = "fallen"
     thing: str
     to: str
-    keys: Mapping[str, str]
+    pose_key: str
+    spot_key: str
+    floor_key: str
+    around_key: str
+    set_down_key: str
     surfaces: Sequence[Surface]
     context: RunContext
     within_m: float = 2.0
@@ -80,7 +74,9 @@ class Fallen(ExplainedLeaf):
     @staticmethod
     def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
         """The keys of the pose, of the point and of the pieces of floor."""
-        return {options["keys"][name]: kind for name, kind in _WRITTEN.items()}
+        surfaces = {options[key]: tuple[Surface, ...] for key in ("floor_key", "around_key")}
+        spot = tuple[Coordinate, Coordinate, Height]
+        return {options["pose_key"]: Pose2D, options["spot_key"]: spot, options["set_down_key"]: Surface, **surfaces}
 
     def initialise(self) -> None:
         """Write where it is looked for: where the robot stands just now."""
@@ -96,9 +92,7 @@ class Fallen(ExplainedLeaf):
         if self.context.clock.now() < self._end_s:
             return self.say(f"feels whether the {self.thing} is still held", Status.RUNNING)
         towards = self._towards_free_floor()
-        self.context.board.put(
-            self.keys["set-down"], floor_square(towards, self.set_down_ahead_m, self.set_down_half_m)
-        )
+        self.context.board.put(self.set_down_key, floor_square(towards, self.set_down_ahead_m, self.set_down_half_m))
         slipped = self.context.robot.gripper().holding
         if slipped:
             self._write(towards, self.set_down_ahead_m)
@@ -110,10 +104,10 @@ class Fallen(ExplainedLeaf):
         """Write where the object lies: so far (m) before the body at a pose."""
         board, spot = self.context.board, compose(pose, Pose2D(ahead_m, 0.0, 0.0))
         floor = floor_square(pose, ahead_m, self.half_m)
-        board.put(self.keys["pose"], pose)
-        board.put(self.keys["spot"], (spot.x_m, spot.y_m, 0.0))
-        board.put(self.keys["floor"], (floor,))
-        board.put(self.keys["around"], (floor, *self._near))
+        board.put(self.pose_key, pose)
+        board.put(self.spot_key, (spot.x_m, spot.y_m, 0.0))
+        board.put(self.floor_key, (floor,))
+        board.put(self.around_key, (floor, *self._near))
 
     def _towards_free_floor(self) -> Pose2D:
         """The robot's pose, turned to floor on which nothing stands, as little as may be.
@@ -186,24 +180,28 @@ def unless_fallen(
 
 
 def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
-    keys, detection = {name: builder.key(name) for name in _WRITTEN}, builder.key("detection")
+    keys = {name: builder.key(name) for name in ("pose", "spot", "floor", "around", "set-down", "detection")}
     fell = builder.node(
         "fallen",
         f"where is the {item}?",
         part="fell",
         thing=str(item),
         to=to,
-        keys=keys,
+        pose_key=keys["pose"],
+        spot_key=keys["spot"],
+        floor_key=keys["floor"],
+        around_key=keys["around"],
+        set_down_key=keys["set-down"],
         surfaces=tuple(map(builder.surface, builder.knowledge.surfaces)),
         within_m=LOST_WITHIN_M,
         ahead_m=AHEAD_M,
         half_m=HALF_M,
     )
-    look = _look_plan(builder, item, keys, detection)
+    look = _look_plan(builder, item, keys)
     take = builder.at("take").sequence(
         f"take {item} from where it lies",
         _stand_back_plan(builder.at("back")),
-        pick_up_plan(builder, item, look, detection, FromBoard(keys["around"])),
+        pick_up_plan(builder, item, look, keys["detection"], FromBoard(keys["around"])),
     )
     return builder.sequence(
         f"pick {item} up again",
@@ -228,9 +226,9 @@ def _stand_back_plan(builder: PlanBuilder) -> NodeSpec:
     return builder.node("selector", "stand back", builder.skill("back_off", ports), stay)
 
 
-def _look_plan(builder: PlanBuilder, item: Thing, keys: Mapping[str, str], detection: str) -> NodeSpec:
+def _look_plan(builder: PlanBuilder, item: Thing, keys: dict[str, str]) -> NodeSpec:
     """Look from here where it fell and about there, then at the surfaces near, then at the floor from either side."""
-    floor = FromBoard(keys["floor"])
+    floor, detection = FromBoard(keys["floor"]), keys["detection"]
     aside = [
         below.sequence(
             f"look at the {FLOOR} from aside",

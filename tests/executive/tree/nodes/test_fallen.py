@@ -18,10 +18,10 @@ FAR = Surface("shelf", ((4.0, 0.0), (5.0, 0.0), (5.0, 1.0)), 0.8)
 
 @pytest.fixture
 def leaf(context):
-    keys = {name: f"alice/{name}" for name in ("pose", "spot", "floor", "around", "set-down")}
+    keys = {f"{name}_key": f"alice/{name}" for name in ("pose", "spot", "floor", "around", "set_down")}
     return Fallen(
         path_id="alice/fell", name="fell", thing="hammer", to="to the kitchen", surfaces=(NEAR, FAR), context=context,
-        keys=keys,
+        **keys,
     )  # fmt: skip
 
 
@@ -61,7 +61,7 @@ def test_it_is_set_down_before_where_the_robot_has_come_to_rest(leaf, clock, rob
     leaf.tick_once()
     robot.standing = Pose2D(0.5, 0.0, 0.0)
     ended(leaf, clock)
-    xs, _ = zip(*context.board.get("alice/set-down").polygon_W, strict=True)
+    xs, _ = zip(*context.board.get("alice/set_down").polygon_W, strict=True)
     assert (min(xs), max(xs)) == pytest.approx((1.35, 1.95))
 
 
@@ -101,6 +101,6 @@ def test_it_is_set_down_where_nothing_stands_as_straight_ahead_as_may_be(
     blocks = [Block(x - 0.4, y - 0.4, x + 0.4, y + 0.4, z1=1.0) for x, y in obstacles]
     leaf.context = replace(context, costmap=BlockCostmap(blocks))
     ended(leaf, clock)
-    middle = [sum(axis) / 4 for axis in zip(*context.board.get("alice/set-down").polygon_W, strict=True)]
+    middle = [sum(axis) / 4 for axis in zip(*context.board.get("alice/set_down").polygon_W, strict=True)]
     turn = math.radians(turn_deg)
     assert middle == pytest.approx([1.15 * math.cos(turn), 1.15 * math.sin(turn)])

@@ -19,7 +19,7 @@ from py_trees.common import Status
 
 from executive.run.mission_history import history_keys
 from executive.store.memory import Memory, Recollection, StepRecord
-from executive.tree.behaviour import Explained, ExplainedDecorator
+from executive.tree.behaviour import Explained
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import RunContext
 from executive.tree.kinds import Changes, build, writes
@@ -230,18 +230,15 @@ class _Unguarded:
     """
 
     def __init__(self, node: Guard) -> None:
-        self._node: Guard = node
-        self._pass_on: Callable[[], Iterator[Behaviour]] | None = None
-        self._guarded = node.tick
-        vars(node)["tick"] = self._tick
+        self._node, self._begun = node, False
+        vars(node)["_held_back"] = self._held_back
 
-    def _tick(self) -> Iterator[Behaviour]:
-        if self._pass_on is not None:
-            yield from self._pass_on()
-            return
-        yield from ExplainedDecorator.tick(self._node)
-        if self._node.status is not Status.RUNNING:
-            self._pass_on = self._guarded
+    def _held_back(self) -> Status | None:
+        if self._begun and self._node.status is not Status.RUNNING:
+            del vars(self._node)["_held_back"]
+            return self._node._held_back()
+        self._begun = True
+        return None
 
 
 def _applies_as_before(node: Any, applied: bool) -> None:

@@ -74,6 +74,11 @@ class ExplainedNode(_TakesKeywords, Explained):
         self.cause, self.message = failure.cause, failure.message
         return Status.FAILURE
 
+    def say(self, message: str, status: Status = Status.SUCCESS) -> Status:
+        """The status with a sentence and no cause."""
+        self.cause, self.message = None, message
+        return status
+
 
 class ExplainedLeaf(ExplainedNode, Behaviour):
     """One without children."""
@@ -91,11 +96,6 @@ class ExplainedLeaf(ExplainedNode, Behaviour):
         self.status = status
         yield self
 
-    def say(self, message: str, status: Status = Status.SUCCESS) -> Status:
-        """The status with a sentence and no cause."""
-        self.cause, self.message = None, message
-        return status
-
 
 class ExplainedDecorator(ExplainedNode, Decorator):
     """A decorator that takes its child's explanation unless it has its own."""
@@ -106,15 +106,21 @@ class ExplainedDecorator(ExplainedNode, Decorator):
         Decorator.__init__(self, self.name, self.child)
 
     def tick(self) -> Iterator[Behaviour]:
-        """Tick the child, then judge. As the library's, which also writes debug texts and checks the status' type."""
+        """Tick the child unless something holds it back, then judge. As the library's, which also checks types."""
         if self.status != Status.RUNNING:
             self.initialise()
-        yield from self.decorated.tick()
-        status = self.update()
+        status = self._held_back()
+        if status is None:
+            yield from self.decorated.tick()
+            status = self.update()
         if status != Status.RUNNING:
             self.stop(status)
         self.status = status
         yield self
+
+    def _held_back(self) -> Status | None:
+        """The status in a tick in which the child is left alone; None where it is ticked."""
+        return None
 
     def stop(self, new_status: Status) -> None:
         """Interrupted while running: stop the child and say so. Reset: reset the child too."""

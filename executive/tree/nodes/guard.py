@@ -9,11 +9,10 @@ from __future__ import annotations
 import copy
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.tree.behaviour import ExplainedDecorator, suspend
@@ -328,21 +327,17 @@ class Guard(ExplainedDecorator):
         super().__post_init__()
         self.condition = self.condition.for_run(self.context)
 
-    def tick(self) -> Iterator[Behaviour]:
-        """Look at the condition, then tick the child."""
-        if self.status != Status.RUNNING:
-            self.condition.begin(self.context)
+    def initialise(self) -> None:
+        """Forget for how long something was so."""
+        self.condition.begin(self.context)
+
+    def _held_back(self) -> Status | None:
         self._looked = True
         verdict = self.condition.violated(self.context)
-        if verdict is None:
-            yield from super().tick()
-            return
         if isinstance(verdict, Waiting):
             suspend(self.decorated)
-            self.status, self.cause, self.message = Status.RUNNING, None, verdict.message
-        else:
-            self.stop(self.fail(verdict))
-        yield self
+            return self.say(verdict.message, Status.RUNNING)
+        return None if verdict is None else self.fail(verdict)
 
     def update(self) -> Status:
         """As the child, unless the condition contradicts its success."""

@@ -112,13 +112,10 @@ class Interrupt(ExplainedDecorator):
         self.count += 1
         self.condition.called()
 
-    def tick(self) -> Iterator[Behaviour]:
-        """As the child, unless this is once too often."""
-        if self.status == Status.RUNNING or self.count < self.uses:
-            yield from super().tick()
-            return
-        self.stop(self.fail(Failed(Cause.EXECUTION, f"{self._why}, again after {self.count} times {self.name}")))
-        yield self
+    def _held_back(self) -> Status | None:
+        if self.count <= self.uses:
+            return None
+        return self.fail(Failed(Cause.EXECUTION, f"{self._why}, again after {self.uses} times {self.name}"))
 
     def update(self) -> Status:
         """As the child, with the reason in front."""

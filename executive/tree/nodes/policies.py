@@ -139,14 +139,6 @@ class AskOperator(Skip):
     context: RunContext
     _asked: Asked | None = field(default=None, init=False)
 
-    def tick(self) -> Iterator[Behaviour]:
-        """Tick the child, or wait for the answer."""
-        if self._asked is None:
-            yield from super().tick()
-            return
-        self._wait(self._asked)
-        yield self
-
     def update(self) -> Status:
         """As the child, until it fails: then the question is put."""
         status = self.pass_on()
@@ -156,8 +148,7 @@ class AskOperator(Skip):
         text = f"{self.text} ({self.message})" if self.text else f"{self.message}. What now?"
         question = Question(self.path_id, text, self.options, self.default, self.limit_s)
         self._asked = self.context.ask(question)
-        self.cause, self.message = None, f"asks the operator: {text}"
-        return Status.RUNNING
+        return self.say(f"asks the operator: {text}", Status.RUNNING)
 
     def stop(self, new_status: Status) -> None:
         """Take an open question back when the tree is stopped."""
@@ -166,18 +157,17 @@ class AskOperator(Skip):
             self._asked = None
         super().stop(new_status)
 
-    def _wait(self, asked: Asked) -> None:
+    def _held_back(self) -> Status | None:
         """Act on the answer once it is there."""
-        if not asked.done():
-            return
-        answer, self._asked = asked.result(), None
+        if self._asked is None or not self._asked.done():
+            return None if self._asked is None else Status.RUNNING
+        answer, self._asked, failure = self._asked.result(), None, self._failure
         if answer == RETRY:
-            self.message = f"tries again, as the operator said, since {self._failure.message}"
-        elif answer == SKIP:
-            self.message = self._failure.message
-            super().stop(self.skip())
-        else:
-            super().stop(self.fail(self._failure))
+            return self.say(f"tries again, as the operator said, since {failure.message}", Status.RUNNING)
+        if answer != SKIP:
+            return self.fail(failure)
+        self.message = failure.message
+        return self.skip()
 
 
 class GoBack(MemoryComposite):

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Final
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.tree.assembly import Assembler, StepPlans
@@ -55,12 +53,8 @@ class WaitFor(ExplainedDecorator):
         if isinstance(self.decorated, Decide):
             self.decorated.view.forget_presses()
 
-    def tick(self) -> Iterator[Behaviour]:
-        """Ask, when it is time."""
-        if self.status == Status.RUNNING and self.clock.now() < self._due_s - 1e-9:
-            yield self
-            return
-        yield from super().tick()
+    def _held_back(self) -> Status | None:
+        return Status.RUNNING if self.clock.now() < self._due_s - 1e-9 else None
 
     def update(self) -> Status:
         """Whether it holds."""

@@ -9,9 +9,8 @@ what changed the world. Counts of attempts begin again.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
@@ -19,34 +18,34 @@ from py_trees.common import Status
 
 from executive.run.mission_history import history_keys
 from executive.store.memory import Memory, Recollection, StepRecord
-from executive.tree.behaviour import Explained
+from executive.tree.behaviour import Conditional, ExplainedDecorator, ExplainedNode, MemoryComposite
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import RunContext
-from executive.tree.kinds import Changes, build, writes
+from executive.tree.kinds import KINDS, build, writes
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.guard import Guard
-from executive.tree.nodes.search import Answer
-from executive.tree.nodes.skill import Remembered
+from executive.tree.nodes.skill import Remembered, SkillLeaf
 from skills.api import Cause, Failed, Running, Skill, SkillContext, Step
 
 BEFORE: Final = "before the restart"
-_CONDITIONAL: Final = frozenset({"only if known", "only if holding"})
-_FORGETTING: Final = frozenset({"recover", "for each found"})
 _DECLARED: Final = tuple(name for name, hint in Skill.__annotations__.items() if str(hint).startswith("ClassVar"))
 
 
 @dataclass(frozen=True)
 class ResumedTree(CompiledTree):
-    """A tree that begins with a blackboard as it was left, and some of whose nodes are changed once they are built."""
+    """A tree that begins with a blackboard as it was left, and whose nodes are taken up once they are built."""
 
     board: Mapping[str, Any] = field(default_factory=dict)
-    changes: Changes = field(default_factory=dict)
+    take_up: Callable[[ExplainedNode], object] = field(default=lambda node: None)
 
     def build(self, context: RunContext) -> Behaviour:
         """The py_trees tree, its blackboard filled."""
         for key, value in self.board.items():
             context.board.put(key, value)
-        return build(self.root, context, self.changes)
+        root = build(self.root, context)
+        for node in root.iterate():
+            if isinstance(node, ExplainedNode):
+                self.take_up(node)
+        return root
 
 
 def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recollection]:
@@ -55,7 +54,9 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     What the mission is interrupted for is not taken up, but called for again where need be. A decision stays as it
     was made, without the looks that it took.
     """
-    over = frozenset(below for node in tree.mission.walk() if _is_over(node, memory) for below in _paths_below(node))
+    afresh = {below.path_id for node in tree.mission.walk() if KINDS[node.kind].afresh for below in node.walk()}
+    settled = {node.path_id for node in tree.mission.walk() if _is_settled(node, memory)}
+    over = afresh | {p for n in tree.mission.walk() if n.path_id in settled for c in n.children for p in _paths(c)}
     skills = {node.path_id: node for node in tree.mission.walk() if node.kind == "skill" and node.path_id not in over}
     failed = {path for path, step in memory.steps.items() if step.status is Status.FAILURE}
     kept = [
@@ -64,19 +65,16 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
         if path in failed or all(key in memory.board for key in leaf.options["outputs"].values())
     ]
     recollection = Recollection(tree.path_ids, memory.steps).only(kept)
-    parents = {child.path_id: node for node in tree.root.walk() for child in node.children}
-    change = _Change(memory, recollection, parents)
-    root = change.all_of(tree.mission)
-    if tree.root is not tree.mission:
-        root = dataclasses.replace(tree.root, children=(*tree.root.children[:-1], root))
-    own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(CompiledTree)}
+    specs = {node.path_id: node for node in tree.mission.walk() if node.path_id not in afresh}
+    root = _with_resumed_skills(tree.root, specs.keys(), memory, recollection)
     keys = history_keys(tree.robot_name, tree.mission_name)
+    succeeded = {path for path, step in memory.steps.items() if step.status is Status.SUCCESS}
     again = {
-        keys.answered_before: _answered(tree, memory) - over,
-        keys.ended_before: _ended(tree, memory) - over,
+        keys.answered_before: frozenset(succeeded & specs.keys()) - over,
+        keys.ended_before: frozenset(path for path, step in memory.steps.items() if step.ended) - over,
     }
-    board = {**memory.board, **again}
-    return ResumedTree(**{**own, "root": root}, board=board, changes=change.made), recollection
+    past = _Past(memory, specs)
+    return _as_resumed(tree, past.take_up, {**memory.board, **again}, root=root), recollection
 
 
 def ended_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recollection] | None:
@@ -88,125 +86,100 @@ def ended_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recolle
     ended = memory.steps.get(tree.root.path_id)
     if ended is None or not ended.ended or ended.cause is Cause.ERROR:
         return None
-    changes: dict[str, Callable[[Any], object]] = {
-        path: partial(_say_as_before, step=step, board=memory.board)
-        for path, step in memory.steps.items()
-        if step.ended
-    }
-    changes[tree.root.path_id] = lambda node: _AsBefore(node, ended)
+
+    def take_up(node: ExplainedNode) -> None:
+        """Let a node say what it said; the root in its first tick."""
+        step = memory.steps.get(node.path_id)
+        if node.path_id == tree.root.path_id:
+            _AsBefore(node, ended)
+        elif step is not None and step.ended:
+            node.say_again(step.status, step.cause, step.message)
+
     recollection = Recollection(tree.path_ids, {})
     recollection.told.append(f"{tree.root.path_id}: {ended.status.value.lower()} {BEFORE}: {ended.message}")
+    return _as_resumed(tree, take_up, memory.board), recollection
+
+
+def _as_resumed(
+    tree: CompiledTree, take_up: Callable[[ExplainedNode], object], board: Mapping[str, Any], **changed: Any
+) -> ResumedTree:
     own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(CompiledTree)}
-    return ResumedTree(**own, board=memory.board, changes=changes), recollection
+    return ResumedTree(**{**own, **changed}, board=board, take_up=take_up)
 
 
-def _say_as_before(node: Behaviour, *, step: StepRecord, board: Mapping[str, Any]) -> None:
-    """Let a node say what it said before the restart."""
-    node.status = step.status
-    if isinstance(node, Explained):
-        node.cause, node.message = step.cause, step.message
-    if isinstance(node, Answer):
-        node.answer = board.get(node.key)
+def _paths(node: NodeSpec) -> Iterator[str]:
+    return (below.path_id for below in node.walk())
 
 
-def _answered(tree: CompiledTree, memory: Memory) -> frozenset[str]:
-    """The nodes that have given their answer and, since what they rest on is told once more, give it again."""
-    answers = {node.path_id for node in tree.mission.walk() if node.kind in ("answer", "check")}
-    return frozenset(path for path in answers if path in memory.steps and memory.steps[path].status is Status.SUCCESS)
+def _is_settled(node: NodeSpec, memory: Memory) -> bool:
+    step = memory.steps.get(node.path_id)
+    return KINDS[node.kind].settled and step is not None and step.status is Status.SUCCESS
 
 
-def _ended(tree: CompiledTree, memory: Memory) -> frozenset[str]:
-    """The nodes that have ended and, since what they rest on is told once more, end again."""
-    interrupts = [node for node in tree.mission.walk() if node.kind == "interrupt"]
-    called = {below.path_id for node in interrupts for below in node.walk()}
-    return frozenset(path for path, step in memory.steps.items() if step.ended) - called
+def _with_resumed_skills(
+    spec: NodeSpec, taken_up: Container[str], memory: Memory, recollection: Recollection
+) -> NodeSpec:
+    """The spec with skills that give their results from before, or do their work."""
+    if spec.kind != "skill" or spec.path_id not in taken_up:
+        children = (_with_resumed_skills(child, taken_up, memory, recollection) for child in spec.children)
+        return dataclasses.replace(spec, children=tuple(children))
+    skill, outputs = spec.options["skill"], spec.options["outputs"]
+    ports = {port: memory.board[key] for port, key in outputs.items() if key in memory.board}
+    resumed = resumed_skill(skill, spec.path_id, ports, recollection)
+    resumed.outputs = {port: kind for port, kind in skill.outputs.items() if port in outputs}
+    return spec.with_options(skill=resumed)
 
 
 @dataclass(frozen=True)
-class _Change:
-    """Turns the specs of a tree into those of one that goes on; `made` is what is to be done to the built nodes."""
+class _Past:
+    """How the nodes of a mission ended before the restart; `specs` are those that are taken up."""
 
     memory: Memory
-    recollection: Recollection
-    parents: Mapping[str, NodeSpec]
-    made: dict[str, Callable[[Any], object]] = field(default_factory=dict)
+    specs: Mapping[str, NodeSpec]
 
-    def all_of(self, spec: NodeSpec) -> NodeSpec:
-        """The spec and all below, children first."""
-        if spec.kind == "interrupt":
-            return spec
-        return self._one(dataclasses.replace(spec, children=tuple(map(self.all_of, spec.children))))
+    def take_up(self, node: ExplainedNode) -> None:
+        """Let a node come to where it was, whatever its kind: skills do so by themselves.
 
-    def _one(self, spec: NodeSpec) -> NodeSpec:
-        path, step = spec.path_id, self.memory.steps.get(spec.path_id)
-        if spec.kind == "skill":
-            return self._skill(spec)
-        if spec.kind in _CONDITIONAL and self._was_reached(path):
-            self.made[path] = lambda node: _applies_as_before(node, self._begun(path))
-        elif spec.kind == "repeat" and step is not None and step.status is not Status.INVALID:
-            self.made[path] = _in_its_round
-        elif spec.kind in _FORGETTING and step is not None and step.status in (Status.RUNNING, Status.SUCCESS):
-            return _with_options(spec, forgets=())
-        elif step is None or not step.ended:
-            return spec
-        elif spec.kind == "guard":
-            over = step.status is Status.SUCCESS or self._failed(spec.children[0].path_id)
-            self.made[path] = _Unguarded if over else lambda node: _AsBefore(node, step)
-        elif spec.kind == "ask" and step.status is Status.SUCCESS and self._failed(spec.children[0].path_id):
-            return dataclasses.replace(spec, kind="skip", options={"step": spec.options["step"]})
-        elif (not spec.children or _is_over(spec, self.memory)) and all(k in self.memory.board for k in writes(spec)):
-            self.made[path] = lambda node: _AsBefore(node, step)
-        return spec
+        A branch that was passed over is passed over once more. A composite that was under way forgets nothing. A
+        decorator asks its child once more, whatever would hold that back, since what was guarded need not be so any
+        more; one that failed by itself, and a leaf, say what they said.
+        """
+        spec, step = self.specs.get(node.path_id), self.memory.steps.get(node.path_id)
+        if spec is None or isinstance(node, SkillLeaf):
+            return
+        if isinstance(node, Conditional) and self._was_reached(node):
+            _applies_as_before(node, self._status(node) is not Status.INVALID)
+        elif step is None or step.status is Status.INVALID:
+            return
+        elif isinstance(node, MemoryComposite) and not _is_settled(spec, self.memory):
+            node.taken_up = step.status is not Status.FAILURE
+        elif step.ended and isinstance(node, ExplainedDecorator):
+            if step.status is Status.SUCCESS or self._status(node.decorated) is Status.FAILURE:
+                node.before = step.status
+                _NotHeldBack(node)
+            else:
+                _AsBefore(node, step)
+        elif step.ended and all(key in self.memory.board for key in writes(spec)):
+            _AsBefore(node, step)
 
-    def _skill(self, spec: NodeSpec) -> NodeSpec:
-        """A leaf whose skill gives its result from before, or does its work."""
-        skill, outputs = spec.options["skill"], spec.options["outputs"]
-        ports = {port: self.memory.board[key] for port, key in outputs.items() if key in self.memory.board}
-        resumed = resumed_skill(skill, spec.path_id, ports, self.recollection)
-        resumed.outputs = {port: kind for port, kind in skill.outputs.items() if port in outputs}
-        return _with_options(spec, skill=resumed)
+    def _status(self, node: Any) -> Status:
+        step = self.memory.steps.get(node.path_id) if isinstance(node, ExplainedNode) else None
+        return Status.INVALID if step is None else step.status
 
-    def _failed(self, path_id: str) -> bool:
-        step = self.memory.steps.get(path_id)
-        return step is not None and step.status is Status.FAILURE
-
-    def _was_reached(self, path_id: str) -> bool:
-        """Whether a branch of a selector was taken or passed over, as a later one shows that was begun."""
-        parent = self.parents[path_id]
-        if parent.kind != "selector":
+    def _was_reached(self, node: Any) -> bool:
+        """Whether a branch was taken or passed over, as a later one shows that was begun."""
+        parent = node.parent
+        if parent is None:
             return False
-        ways = [child.path_id for child in parent.children]
-        step = self.memory.steps.get(parent.path_id)
-        return (step is not None and step.ended) or any(map(self._begun, ways[ways.index(path_id) :]))
-
-    def _begun(self, path_id: str) -> bool:
-        step = self.memory.steps.get(path_id)
-        return step is not None and step.status is not Status.INVALID
-
-
-def _is_over(node: NodeSpec, memory: Memory) -> bool:
-    """Whether what is below a node is not taken up: an interrupt, or a decision that was made."""
-    step = memory.steps.get(node.path_id)
-    return node.kind == "interrupt" or (node.kind == "decide" and step is not None and step.status is Status.SUCCESS)
-
-
-def _paths_below(node: NodeSpec) -> Iterator[str]:
-    return (below.path_id for child in node.children for below in child.walk())
-
-
-def _in_its_round(node: Any) -> None:
-    """Let rounds go on with the one that was under way."""
-    node.taken_up = True
-
-
-def _with_options(spec: NodeSpec, **options: Any) -> NodeSpec:
-    return dataclasses.replace(spec, options={**spec.options, **options})
+        later = parent.children[parent.children.index(node) :]
+        ended = self._status(parent) in (Status.SUCCESS, Status.FAILURE)
+        return ended or any(self._status(each) is not Status.INVALID for each in later)
 
 
 class _AsBefore:
-    """Stands before a node: at its first tick it has the status that it had before the restart, and does nothing."""
+    """Stands before a node: at its first tick it says what it said before the restart, and does nothing."""
 
-    def __init__(self, node: Behaviour, step: StepRecord) -> None:
+    def __init__(self, node: Any, step: StepRecord) -> None:
         self._node = node
         self._step: StepRecord | None = step
         self._pass_on: Callable[[], Iterator[Behaviour]] = node.tick
@@ -217,19 +190,14 @@ class _AsBefore:
         if step is None:
             yield from self._pass_on()
             return
-        node.status = step.status
-        if isinstance(node, Explained):
-            node.cause, node.message = step.cause, _before(step.message)
+        node.say_again(step.status, step.cause, _before(step.message))
         yield node
 
 
-class _Unguarded:
-    """Stands before a guard that came to its end before the restart: what it guarded need not be so any more.
+class _NotHeldBack:
+    """Lets the first run of a decorator go on whatever would hold its child back."""
 
-    The first time the nodes below are ticked without it, so that they give their results once more.
-    """
-
-    def __init__(self, node: Guard) -> None:
+    def __init__(self, node: ExplainedDecorator) -> None:
         self._node, self._begun = node, False
         vars(node)["_held_back"] = self._held_back
 
@@ -242,7 +210,7 @@ class _Unguarded:
 
 
 def _applies_as_before(node: Any, applied: bool) -> None:
-    """Let a branch of a selector say at first what it said before the restart: the blackboard knows more by now."""
+    """Let a branch say at first what it said before the restart: the blackboard knows more by now."""
     answers = [applied]
     asked: Callable[[], bool] = node.applies
     vars(node)["applies"] = lambda: answers.pop() if answers else asked()

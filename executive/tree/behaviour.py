@@ -59,6 +59,10 @@ class ExplainedNode(_TakesKeywords, Explained):
     """An explained node of ours; `kind` is what its specs call it."""
 
     kind: ClassVar[str] = ""
+    settled: ClassVar[bool] = False
+    """Whether its success stands after a restart, and nothing below is done once more."""
+    afresh: ClassVar[bool] = False
+    """Whether nothing of it is taken up after a restart: it is called for again where need be."""
     path_id: str
     name: str
     cause: Cause | None = field(default=None, init=False)
@@ -68,6 +72,10 @@ class ExplainedNode(_TakesKeywords, Explained):
     def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
         """Of the options, the blackboard keys that such a node writes, and the type of each value."""
         return {}
+
+    def say_again(self, status: Status, cause: Cause | None, message: str) -> None:
+        """Say what it said before a restart."""
+        self.status, self.cause, self.message = status, cause, message
 
     def fail(self, failure: Failed) -> Status:
         """FAILURE for a reason of one's own."""
@@ -101,6 +109,8 @@ class ExplainedDecorator(ExplainedNode, Decorator):
     """A decorator that takes its child's explanation unless it has its own."""
 
     child: Behaviour
+    before: Status | None = field(default=None, init=False)
+    """How it ended before a restart, where its child gives its result of then once more."""
 
     def __post_init__(self) -> None:
         Decorator.__init__(self, self.name, self.child)
@@ -191,9 +201,14 @@ class MemoryComposite(ExplainedNode, Composite):
         return self._index + 1 if goes_on else None
 
     def _restart(self) -> None:
-        self._index = 0
+        taken_up, self.taken_up, self._index = self.taken_up, False, 0
         self.clear_explanation()
         self._reset_children()
+        if not taken_up:
+            self._forget()
+
+    def _forget(self) -> None:
+        """Leave nothing on the blackboard of the time before it began."""
 
     def _reset_children(self) -> None:
         for child in self.children:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from importlib import import_module
 from pkgutil import iter_modules
-from types import MappingProxyType
 from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
@@ -17,10 +16,7 @@ from executive.tree.behaviour import ExplainedNode
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 
-__all__ = ["KINDS", "PLANS", "Changes", "build", "writes"]
-
-Changes = Mapping[str, Callable[[Any], object]]
-"""By path id, what is done to a node once it is built."""
+__all__ = ["KINDS", "PLANS", "build", "writes"]
 
 _PAGES: Final = tuple(import_module(f"{nodes.__name__}.{page.name}") for page in iter_modules(nodes.__path__))
 KINDS: Final[Mapping[str, type[ExplainedNode]]] = {
@@ -30,18 +26,15 @@ KINDS: Final[Mapping[str, type[ExplainedNode]]] = {
     if isinstance(node, type) and issubclass(node, ExplainedNode) and "kind" in vars(node)
 }
 PLANS: Final[StepPlans] = {model: plan for page in _PAGES for model, plan in getattr(page, "PLANS", {}).items()}
-_NO_CHANGES: Final[Changes] = MappingProxyType({})
 
 
-def build(spec: NodeSpec, context: RunContext, changes: Changes = _NO_CHANGES) -> Behaviour:
+def build(spec: NodeSpec, context: RunContext) -> Behaviour:
     """The py_trees node of a spec for one run, with all nodes below it."""
-    children = [build(child, context, changes) for child in spec.children]
+    children = [build(child, context) for child in spec.children]
     lent = {**vars(context), "context": context, "children": children, "child": next(iter(children), None)}
     make: Any = KINDS[spec.kind]
     taken = {each.name: lent[each.name] for each in fields(make) if each.init and each.name in lent}
     node: Behaviour = make(**{**taken, **spec.options, "path_id": spec.path_id, "name": spec.name})
-    if spec.path_id in changes:
-        changes[spec.path_id](node)
     return node
 
 

@@ -79,6 +79,8 @@ class ForEachFound(MemoryComposite):
     def _restart(self) -> None:
         super()._restart()
         self._failures, self._why = 0, "before the restart"
+
+    def _forget(self) -> None:
         self.board.forget(self.forgets)
 
     def _take_over(self, child: Behaviour) -> None:

@@ -222,6 +222,7 @@ class Decide(MemoryComposite):
     """
 
     kind = "decide"
+    settled = True
     least = 0
     decision: Decision
     words: str

@@ -74,6 +74,7 @@ class Interrupt(ExplainedDecorator):
     """
 
     kind = "interrupt"
+    afresh = True
     condition: Condition
     urgent: Condition | None = None
     spares: frozenset[str]

@@ -144,6 +144,9 @@ class AskOperator(Skip):
         status = self.pass_on()
         if status != Status.FAILURE or self.cause is None or self.cause in FINAL_CAUSES:
             return status
+        before, self.before = self.before, None
+        if before is Status.SUCCESS:
+            return self.skip()
         self._failure = Failed(self.cause, self.message)
         text = f"{self.text} ({self.message})" if self.text else f"{self.message}. What now?"
         question = Question(self.path_id, text, self.options, self.default, self.limit_s)

@@ -107,6 +107,8 @@ class Recover(MemoryComposite):
     def _restart(self) -> None:
         super()._restart()
         self.attempt, self._uses, self._due, self._farthest = 1, [0] * len(self.recoveries), [], None
+
+    def _forget(self) -> None:
         self.board.forget(self.forgets)
 
     def _following(self, child: Behaviour) -> int | None:

@@ -64,13 +64,11 @@ class Repeat(MemoryComposite):
         yield self
 
     def _restart(self) -> None:
-        taken_up, self.taken_up = self.taken_up and self.count in self.board, False
-        if taken_up:
-            self._index = 0
-            self.clear_explanation()
+        goes_on = self.taken_up and self.count in self.board
+        super()._restart()
+        if goes_on:
             self._enter_round()
             return
-        super()._restart()
         self.board.put(self.count, 0)
         self._phase, self._due_s = "start", self.clock.now()
         if len(self.children) == 2 and isinstance(self.children[0], Decide):

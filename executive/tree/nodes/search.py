@@ -69,6 +69,11 @@ class Answer(ExplainedDecorator):
         count = options.get("count_key")
         return {options["key"]: bool, **({count: float} if count else {})}
 
+    def say_again(self, status: Status, cause: Cause | None, message: str) -> None:
+        """Give the answer of before, too."""
+        super().say_again(status, cause, message)
+        self.answer = self.board.get(self.key) if status == Status.SUCCESS else None
+
     def initialise(self) -> None:
         """Forget an earlier answer."""
         self.answer = None

@@ -325,16 +325,17 @@ def test_causes_come_back_with_failures(live, store, script):
     assert all(step.cause is Cause.PLANNING for step in failed)
 
 
-def test_the_operator_is_not_asked_again_about_a_step_that_was_skipped(compiled):
+@pytest.mark.parametrize(("before", "after"), [(Status.SUCCESS, Status.SUCCESS), (None, Status.RUNNING)])
+def test_the_operator_is_not_asked_again_about_a_step_that_was_skipped(compiled, context, before, after):
     tree = compiled(*TIDY)
     first, *others = tree.mission.children
-    options = {"step": "get it", "options": ("skip",), "default": "stop", "limit_s": 60.0, "text": None}
+    options = {"step": "get it", "options": ("skip", "stop"), "default": "stop", "limit_s": 60.0, "text": None}
     ask = NodeSpec("ask", "alice/ask", "ask", options, (first,))
     mission = dataclasses.replace(tree.mission, children=(ask, *others))
     asking = dataclasses.replace(tree, root=dataclasses.replace(tree.root, children=(mission,)))
-    ended = {ask.path_id: Status.SUCCESS, first.path_id: Status.FAILURE}
+    ended = {} if before is None else {ask.path_id: before, first.path_id: Status.FAILURE}
     steps = {path: StepRecord(status, None, "", 1.0, {}) for path, status in ended.items()}
     again, _ = resumed_tree(asking, Memory(steps, {}, None))
-    assert next(node.kind for node in again.root.walk() if node.path_id == ask.path_id) == "skip"
-    fresh, _ = resumed_tree(asking, Memory({}, {}, None))
-    assert next(node.kind for node in fresh.root.walk() if node.path_id == ask.path_id) == "ask"
+    node = next(node for node in again.build(context).iterate() if node.path_id == ask.path_id)
+    node.decorated.status, node.decorated.cause = Status.FAILURE, Cause.EXECUTION
+    assert node.update() is after

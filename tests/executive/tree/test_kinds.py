@@ -6,7 +6,6 @@ from executive.tree import kinds
 from executive.tree.behaviour import ExplainedNode
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.policies import Timeout
-from executive.tree.nodes.wait import Pause
 from skills.robot import Pose2D
 
 PAUSE = NodeSpec("pause", "alice/limit/wait", "wait", {"duration_s": 9.0})
@@ -34,12 +33,6 @@ def test_a_spec_becomes_its_node_on_the_runs_clock(context, clock):
     clock.advance(6.0)
     root.tick_once()
     assert (root.status, root.children[0].status) == (Status.FAILURE, Status.INVALID)
-
-
-def test_nodes_are_changed_as_they_are_built(context):
-    changed = []
-    kinds.build(LIMIT, context, {PAUSE.path_id: changed.append})
-    assert [type(node) for node in changed] == [Pause]
 
 
 def test_what_a_node_writes_follows_from_its_options():

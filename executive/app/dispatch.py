@@ -366,7 +366,7 @@ class Dispatch(Assigner):
         ended = EndedTree(
             tree,
             node_view(tree.root, result.states),
-            robot_report(result, tree, self.robots[name].kind, report),
+            robot_report(result, self.robots[name].kind, report),
         )
         self.over.append(EndedMission(number, ended, since_s, self._now_s))
         if number in self._parts:

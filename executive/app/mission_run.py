@@ -33,7 +33,6 @@ from executive.run.outcome import RobotResult, RunResult
 from executive.run.runner import run
 from executive.run.visitor import Assigner, Progress, RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
-from executive.tree.compiler import CompiledTree
 from executive.tree.context import RunContext
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.nodes.skill import ERROR_TOPIC, SkillLeaf
@@ -235,14 +234,13 @@ def _judged(
 
     What the others moved in the same run was moved by a robot's mission, too.
     """
-    trees = {each.tree.robot_name: result.trees.get(each.tree.robot_name, each.tree) for each in prepared.all}
-    shares = {each.robot_name: Share(trees[each.robot_name], each, 0) for each in result.robots}
+    shares = {each.robot_name: Share(each.tree, each, 0) for each in result.robots}
     robots: dict[str, RobotReport] = {}
     for name, own in shares.items():
         seen = backend.judge(own.tree, own.result, before=[each for each in shares.values() if each is not own])
-        robots[name] = robot_report(own.result, own.tree, prepared.robots[name].kind, seen)
+        robots[name] = robot_report(own.result, prepared.robots[name].kind, seen)
     worst = min(robots, key=lambda name: (robots[name].achieved, name != result.worst.robot_name))
-    views = {name: node_view(trees[name].root, each.result.states) for name, each in shares.items()}
+    views = {name: node_view(each.tree.root, each.result.states) for name, each in shares.items()}
     ending = {name: value for name, value in vars(robots[worst]).items() if name != "kind"}
     report = RunReport(
         **ending,
@@ -256,10 +254,12 @@ def _judged(
         scenario=(*prepared.request.scenario.lines(), *prepared.request.variation.lines()),
         robots=robots if prepared.request.robots else {},
     )
-    return Finished(report, views[worst]), [EndedTree(trees[name], view, robots[name]) for name, view in views.items()]
+    return Finished(report, views[worst]), [
+        EndedTree(shares[name].tree, view, robots[name]) for name, view in views.items()
+    ]
 
 
-def robot_report(ended: RobotResult, tree: CompiledTree, kind: str, seen: RefereeReport | None) -> RobotReport:
+def robot_report(ended: RobotResult, kind: str, seen: RefereeReport | None) -> RobotReport:
     """How a robot's mission ended, and what the referee has seen of it."""
     return RobotReport(
         kind=kind,
@@ -267,7 +267,7 @@ def robot_report(ended: RobotResult, tree: CompiledTree, kind: str, seen: Refere
         cause=None if ended.cause is None else ended.cause.value,
         message=ended.message,
         referee=seen,
-        commands=tuple(map(str, tree.commands)),
+        commands=tuple(map(str, ended.tree.commands)),
     )
 
 

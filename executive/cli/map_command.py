@@ -78,8 +78,7 @@ def build(
 
     compile_first()
     building = _Building(opened, seed, mapper, points, out, console)
-    control = Control(pace=None)
-    with ended_by_signals(control.cancel):
+    with ended_by_signals((control := Control(pace=None)).cancel):
         ended = building.drive(most_s, lambda: control.poll().cancel is not None)
     result = building.result()
     if ended is not None:

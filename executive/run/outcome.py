@@ -70,27 +70,31 @@ class Ending:
 
 @dataclass(frozen=True)
 class RobotResult:
-    """How one robot's mission ended: its answers to status checks by path id, and the last state of its tree.
+    """How one robot's mission ended, of its `tree` or of the one that took its place, and the last state of its nodes.
 
-    `answers` has the last answer of each node, `findings` all answers in order, and `said` what the robot said.
-    `preempting` are the results of the missions that came in between, in the order of their ends. `stepped_aside` when
-    the robot made way for another after its end. `executions` tells when each part of the mission ran, and `moved_s`
-    when a skill that may drive last did (s on the robot's clock; None: never).
+    `answers` has the last answer of each node to a status check by path id, `findings` all answers in order, and `said`
+    what the robot said. `preempting` are the results of the missions that came in between, in the order of their ends.
+    `stepped_aside` when the robot made way for another after its end. `executions` tells when each part of the mission
+    ran, and `moved_s` when a skill that may drive last did (s on the robot's clock; None: never).
     """
 
-    robot_name: str
+    tree: CompiledTree
     outcome: Outcome
     cause: Cause | None
     message: str
-    answers: Mapping[str, bool]
-    states: Snapshot
-    mission: str = ""
+    answers: Mapping[str, bool] = field(default_factory=dict)
+    states: Snapshot = field(default_factory=dict)
     preempting: tuple[RobotResult, ...] = ()
     findings: tuple[Finding, ...] = ()
     said: tuple[Said, ...] = ()
     stepped_aside: bool = False
     executions: tuple[Execution, ...] = ()
     moved_s: float | None = None
+
+    @property
+    def robot_name(self) -> str:
+        """The robot's name."""
+        return self.tree.robot_name
 
     def message_of_end(self) -> Mapping[str, object]:
         """What the log says of it."""
@@ -112,8 +116,8 @@ class RobotStatus:
 class RunResult:
     """How a run ended. Times in seconds: `sim_time_s` on the robots' clock, `wall_time_s` on the wall's.
 
-    `overruns` counts the ticks that took longer on the wall clock than the tick period. `trees` are the missions
-    that the robots began with, or those that took their place, by robot; `work` is what was computed, by name.
+    `overruns` counts the ticks that took longer on the wall clock than the tick period; `work` is what was computed, by
+    name.
     """
 
     robots: tuple[RobotResult, ...]
@@ -121,8 +125,12 @@ class RunResult:
     overruns: int
     sim_time_s: float
     wall_time_s: float
-    trees: Mapping[str, CompiledTree] = field(default_factory=dict)
     work: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def trees(self) -> Mapping[str, CompiledTree]:
+        """The trees of the missions by robot."""
+        return {each.robot_name: each.tree for each in self.robots}
 
     @property
     def worst(self) -> RobotResult:

@@ -27,7 +27,6 @@ from executive.run.visitor import (
 )
 from executive.run.watchdog import VerbHung
 from executive.tree.behaviour import StoppableTime
-from executive.tree.compiler import CompiledTree
 from skills.api import Cause, Worker
 from skills.files.errors import disk_is_full
 from skills.robot import Clock
@@ -90,7 +89,10 @@ class _AllAtOnce(Assigner):
 
 
 class _Run:
-    """The state of one run. `_sessions` has each robot's last mission, `_over` all that have ended."""
+    """The state of one run. `_sessions` has each robot's last mission, `_ended` all that have ended, in order.
+
+    The visitors were told of the first `_told` of these.
+    """
 
     def __init__(self, assigner: Assigner, shared: RunShared) -> None:
         self._assigner, self._shared = assigner, shared
@@ -100,9 +102,8 @@ class _Run:
         self._resting = Resting(shared.traffic, shared.watchdog, shared.settings.tick_limit_s)
         self._assigned: list[RunEntry] = []
         self._sessions: dict[str, Session] = {}
-        self._results: dict[str, RobotResult] = {}
-        self._over: list[tuple[RobotResult, CompiledTree]] = []
-        self._ends: list[MissionEnd] = []  # that the visitors are to hear of
+        self._ended: list[MissionEnd] = []
+        self._told = 0
         self._idle: list[Session] = []  # whose missions ended in the last tick
         self._seen: dict[str, RobotStatus] = {}
         self._looks_always = type(assigner).recall is not Assigner.recall
@@ -160,7 +161,7 @@ class _Run:
             if disk_is_full(stop):
                 raise
             ending = ending_of(stop, self._visitors.publish)
-            self._note_end(_never_began(entry, ending), entry.tree, ending.message)
+            self._note_end(_never_began(entry, ending), ending.message)
             return
         self._sessions = dict(sorted({**self._sessions, name: session}.items()))
         self._control.mission_begun(name, entry.tree)
@@ -290,7 +291,7 @@ class _Run:
             session.context.traffic.release()
             if session.gone is None and self._look(session, now=True):
                 self._idle.append(session)
-            self._note_end(result, session.main_tree, session.gone)
+            self._note_end(result, session.gone)
 
     def _look(self, session: Session, *, now: bool = False) -> bool:
         """See how a robot is; whether it still answers."""
@@ -300,15 +301,17 @@ class _Run:
         self._seen[session.name] = status
         return True
 
-    def _note_end(self, result: RobotResult, tree: CompiledTree, gone: str | None) -> None:
-        name = result.robot_name
-        self._results[name] = result
-        self._over.append((result, tree))
-        self._ends.append(MissionEnd(result, self._seen.get(name), gone))
+    def _note_end(self, result: RobotResult, gone: str | None) -> None:
+        self._ended.append(MissionEnd(result, self._seen.get(result.robot_name), gone))
+
+    @property
+    def _results(self) -> Mapping[str, RobotResult]:
+        """How the last mission of each robot ended."""
+        return {end.result.robot_name: end.result for end in self._ended}
 
     def _tell_ends(self) -> None:
         """Tell of the missions that have ended."""
-        ends, self._ends = self._ends, []
+        ends, self._told = self._ended[self._told :], len(self._ended)
         for end in ends:
             self._control.mission_ended(end.result.robot_name)
             self._visitors.publish(OUTCOME, {**end.result.message_of_end(), "ticks": self._ticks})
@@ -349,29 +352,28 @@ class _Run:
         self._visitors.ending = True
         self._resting.close()
         for session in self._sessions.values():
-            if session.name not in self._results or self._results[session.name] is not session.result:
+            if self._results.get(session.name) is not session.result or session.result is None:
                 result = session.close(ending)
-                self._note_end(result, session.main_tree, session.gone)
+                self._note_end(result, session.gone)
         if ending is not None:
             for entry in self._assigned:
-                self._note_end(_never_began(entry, ending), entry.tree, None)
+                self._note_end(_never_began(entry, ending), None)
         self._publish_events(self._control.end())
         self._tell_ends()
 
     def _result(self) -> RunResult:
-        over = sorted(self._over, key=lambda each: each[0].robot_name)
+        over = sorted((end.result for end in self._ended), key=lambda each: each.robot_name)
         aside = self._resting.stepped_aside
         return RunResult(
-            robots=tuple(replace(result, stepped_aside=result.robot_name in aside) for result, _ in over),
+            robots=tuple(replace(result, stepped_aside=result.robot_name in aside) for result in over),
             ticks=self._ticks,
             overruns=self._overruns,
             sim_time_s=self._clock.now() - self._begun_s,
             wall_time_s=time.perf_counter() - self._begun_wall_s,
-            trees={result.robot_name: tree for result, tree in over},
             work=self._shared.work.totals(),
         )
 
 
 def _never_began(entry: RunEntry, ending: Ending) -> RobotResult:
     """The result of a robot whose mission did not begin."""
-    return RobotResult(entry.robot.name, ending.outcome, ending.cause, ending.message, {}, {})
+    return RobotResult(entry.tree, ending.outcome, ending.cause, ending.message)

@@ -177,11 +177,6 @@ class Session(RunRobot):
         return self.result is not None or (len(self._stack) == 1 and self._top.finished and not self._later)
 
     @property
-    def main_tree(self) -> CompiledTree:
-        """The mission that the robot began with, or the one that took its place."""
-        return self._stack[0].tree
-
-    @property
     def waiting_at(self) -> str | None:
         """The breakpoint that the mission under way waits at."""
         return self._top.waiting_at
@@ -398,7 +393,7 @@ class Session(RunRobot):
 
     def _note_result(self, result: RobotResult) -> None:
         self._preempting += (result,)
-        self.context.publish(OUTCOME, {**result.message_of_end(), "mission": result.mission})
+        self.context.publish(OUTCOME, {**result.message_of_end(), "mission": result.tree.mission_name})
 
     def _publish_pose(self, estimate: LocalisationEstimate) -> None:
         X_WB = self.context.X_WB()

@@ -207,13 +207,12 @@ class TreeRun:
         elif findings and outcome is Outcome.FAILURE:
             message = f"{message} (found out: {findings_in_words(findings)})"
         return RobotResult(
-            robot_name=self.tree.robot_name,
+            tree=self.tree,
             outcome=outcome,
             cause=cause,
             message=message,
             answers=answers,
             states=self.states,
-            mission=self.tree.mission_name,
             preempting=preempting,
             findings=findings,
             said=said,

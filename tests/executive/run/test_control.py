@@ -184,7 +184,7 @@ def test_another_mission_first_and_the_old_one_after(compiled, run_tree, make, c
     assert script.begun == [*first, *aside, "approach", "grasp", "stow", "navigate", "hand_over"]
     outcomes = [(m.get("mission"), m["outcome"]) for topic, m in published if topic == "outcome"]
     assert outcomes == [("go aside", Outcome.SUCCESS), (None, Outcome.SUCCESS)]
-    assert [done.mission for done in result.worst.preempting] == ["go aside"]
+    assert [done.tree.mission_name for done in result.worst.preempting] == ["go aside"]
     assert result.worst.preempting[0].states["alice/go-aside"].status is Status.SUCCESS
     assert (robot.driving, robot.holder) == (False, None)
 
@@ -456,12 +456,12 @@ def test_a_lease_shown_by_another_is_left_as_it_is(robot):
 def test_a_mission_can_take_the_place_of_the_one_under_way(compiled, run_tree, make, control, robot, script, notes):
     other = compiled(GO, name="go to the bedroom")
     result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({4: lambda: control.replace(other)}))
-    assert (result.outcome, result.worst.mission) == (Outcome.SUCCESS, "go to the bedroom")
+    assert (result.outcome, result.worst.tree.mission_name) == (Outcome.SUCCESS, "go to the bedroom")
     assert result.trees == {"Alice": other}
     assert script.begun == ["navigate", "detect", "navigate"]
     assert script.ended == script.begun
     (given_up,) = result.worst.preempting
-    assert (given_up.mission, given_up.outcome) == ("fetch drink", Outcome.CANCELLED)
+    assert (given_up.tree.mission_name, given_up.outcome) == ("fetch drink", Outcome.CANCELLED)
     assert "given up" in given_up.message
     assert ("replace", "instead 'go to the bedroom'") in notes()
     assert control.state.missions == {"Alice": ()}
@@ -510,17 +510,17 @@ def test_a_mission_that_came_in_between_is_replaced_and_the_first_taken_up(compi
     between, other = compiled(GO, name="between"), compiled(GO, name="other")
     actions = {2: lambda: control.preempt(between), 4: lambda: control.replace(other)}
     result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions))
-    assert (result.outcome, result.worst.mission) == (Outcome.SUCCESS, "fetch drink")
-    ends = [(each.mission, each.outcome) for each in result.worst.preempting]
+    assert (result.outcome, result.worst.tree.mission_name) == (Outcome.SUCCESS, "fetch drink")
+    ends = [(each.tree.mission_name, each.outcome) for each in result.worst.preempting]
     assert ends == [("between", Outcome.CANCELLED), ("other", Outcome.SUCCESS)]
 
 
 def test_a_mission_for_later_begins_when_the_first_is_done(compiled, run_tree, make, control, script):
     other = compiled(GO, name="go to the bedroom")
     result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({4: lambda: control.then(other)}))
-    assert (result.outcome, result.worst.mission) == (Outcome.SUCCESS, "fetch drink")
+    assert (result.outcome, result.worst.tree.mission_name) == (Outcome.SUCCESS, "fetch drink")
     assert script.begun == ["navigate", "detect", "approach", "grasp", "stow", "navigate", "hand_over", "navigate"]
-    assert [each.mission for each in result.worst.preempting] == ["go to the bedroom"]
+    assert [each.tree.mission_name for each in result.worst.preempting] == ["go to the bedroom"]
 
 
 def test_missions_for_later_come_in_their_order(compiled, run_tree, control):
@@ -528,7 +528,7 @@ def test_missions_for_later_come_in_their_order(compiled, run_tree, control):
     control.then(first)
     control.then(second)
     result = run_tree(compiled(GO), control=control)
-    assert [each.mission for each in result.worst.preempting] == ["first", "second"]
+    assert [each.tree.mission_name for each in result.worst.preempting] == ["first", "second"]
 
 
 def test_a_mission_for_later_is_refused_when_it_waits_already(compiled, control):

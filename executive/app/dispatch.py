@@ -300,7 +300,13 @@ class Dispatch(Assigner):
 
     def _entry(self, name: str, mission: FleetMission) -> RunEntry:
         robot, prepared = self._robots[name], mission.options[name]
-        robot.journal = ProgressJournal(prepared.tree, lambda progress: self._progress(mission, progress))
+        number = mission.stored.id
+
+        def note(progress: MissionProgress) -> None:
+            """Keep how far the mission is."""
+            self._given.progress(number, mission.done + progress.done, "it was begun" if progress.begun else None)
+
+        robot.journal = ProgressJournal(prepared.tree, note)
         speaker_W = next(iter(self.robots.values())).start
         entry = self._robot_entry(name, prepared)
         self._announce(prepared)
@@ -318,10 +324,6 @@ class Dispatch(Assigner):
             disturbed = replace(prepared.request, scenario=Scenario(robot.faults))
             robot.entry = entry_for(replace(prepared, request=disturbed), self.backend, None)
         return robot.entry
-
-    def _progress(self, mission: FleetMission, progress: MissionProgress) -> None:
-        done = mission.done + progress.done
-        self._given.progress(mission.stored.id, done, "it was begun" if progress.begun else None)
 
     def _announce(self, prepared: Prepared) -> None:
         if self.log is not None:

@@ -177,20 +177,17 @@ class RouteCache(RoutePlanner):
         """The route from start to goal. Raises ValueError with one sentence when there is none."""
         name = f"{start} {goal}"
         if name not in self._routes:
-            self._routes[name] = self._new(start, goal)
+            try:
+                route = self._planned.route(start, goal)
+                self._routes[name] = [route.length_m, route.progress_m]
+            except ValueError as error:
+                self._routes[name] = str(error)
             with suppress(OSError):
                 self._write()
         known = self._routes[name]
         if isinstance(known, str):
             raise ValueError(known)
         return Route(*known)
-
-    def _new(self, start: Pose2D, goal: Pose2D) -> list[float] | str:
-        try:
-            route = self._planned.route(start, goal)
-        except ValueError as error:
-            return str(error)
-        return [route.length_m, route.progress_m]
 
     def _write(self) -> None:
         """Write the file; another process sees the old one or the new one."""

@@ -6,12 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from executive.app.artifacts import Artifacts
 from executive.app.dispatch import Dispatch, silence
 from executive.app.fleet import (
-    EndedMission,
     FleetMission,
     charging_missions,
     fleet_mission,
@@ -73,11 +72,9 @@ def run_fleet(
             )
         dispatch.close()
     recording = backend.leave(artifacts, out)
-    rows = _rows(dispatch.store, missions_json(dispatch.store, list(dispatch.missions)))
-    kinds = {name: robot.kind for name, robot in dispatch.robots.items()}
     lasted = f"{backend.clock.now() - begun_s:.1f} s simulated in {result.wall_time_s:.1f} s"
     facts = (("world and seed", f"{first.world.name}, seed {seed}"),) if first is not None else ()
-    _write_report(out, rows, dispatch.over, kinds, artifacts, read_events(log.path), (*facts, ("duration", lasted)))
+    _write_report(dispatch, out, artifacts, read_events(log.path), (*facts, ("duration", lasted)))
     if page is not None:
         page.offer(recording)
 
@@ -144,43 +141,31 @@ def _world_of(queued: Sequence[StoredMission]) -> World:
     raise AssertionError("nothing is queued")
 
 
-def _rows(store: MissionStore, values: Sequence[Mapping[str, Any]]) -> Sequence[MissionRow]:
-    """Missions as the report has them."""
-    rows = zip(missions_message(store, values)["missions"], values, strict=True)
-    return [_row(row, each["referee"]) for row, each in rows]
-
-
-def _row(row: Mapping[str, Any], referee: Mapping[str, Any] | None) -> MissionRow:
-    seen = None if referee is None else referee["success"]
-    word = row["outcome"] if referee is None else f"{row['outcome']}, {VERDICTS[seen]}"
-    good = None if row["outcome"] in _OPEN else row["outcome"] == MissionState.SUCCESS.value and seen is not False
-    return MissionRow(row["id"], row["sentence"], row["robot"] or "", good, word, row["reassigned"], row["message"])
-
-
 def _write_report(
-    out: Path,
-    rows: Sequence[MissionRow],
-    ended: Sequence[EndedMission],
-    robots: Mapping[str, str],
-    artifacts: Artifacts,
-    events: Sequence[Event],
-    facts: Sequence[tuple[str, str]],
-) -> Path:
-    """Write the report of a fleet's run; its path. `robots` are their names and kinds."""
-    did = sum(row.good is True for row in rows)
+    dispatch: Dispatch, out: Path, artifacts: Artifacts, events: Sequence[Event], facts: Sequence[tuple[str, str]]
+) -> None:
+    """Write the report of a fleet's run into a folder."""
+    kinds = {name: robot.kind for name, robot in dispatch.robots.items()}
+    values = missions_json(dispatch.store, list(dispatch.missions))
+    rows: list[MissionRow] = []
+    for row, told in zip(missions_message(dispatch.store, values)["missions"], values, strict=True):
+        seen = None if told["referee"] is None else told["referee"]["success"]
+        word = row["outcome"] if told["referee"] is None else f"{row['outcome']}, {VERDICTS[seen]}"
+        good = None if row["outcome"] in _OPEN else row["outcome"] == MissionState.SUCCESS.value and seen is not False
+        number, robot = row["id"], row["robot"] or ""
+        rows.append(MissionRow(number, row["sentence"], robot, good, word, row["reassigned"], row["message"]))
+    parts: list[ReportPart] = []
+    for each in dispatch.over:
+        tree, kind = each.ended.tree, each.ended.report.kind
+        own = [event for event in events if each.since_s <= event.stamp_s <= each.until_s]
+        title = f"Mission {each.number}, {tree.robot_name} ({kind}): {tree.mission_name}"
+        parts.append(part_of(each.ended, tuple(kinds), artifacts, own, title=title))
     page = ReportPage(
         title="Fleet",
-        request=f"{did} of {len(rows)} missions done",
-        facts=(("robots", ", ".join(f"{name} ({kind})" for name, kind in robots.items())), *facts),
+        request=f"{sum(row.good is True for row in rows)} of {len(rows)} missions done",
+        facts=(("robots", ", ".join(f"{name} ({kind})" for name, kind in kinds.items())), *facts),
         missions=rows,
-        map=map_of(artifacts, events, several=len(robots) > 1),
-        parts=[_part(each, tuple(robots), artifacts, events) for each in ended],
+        map=map_of(artifacts, events, several=len(kinds) > 1),
+        parts=parts,
     )
-    return save_report(out, page)
-
-
-def _part(mission: EndedMission, robots: Sequence[str], artifacts: Artifacts, events: Sequence[Event]) -> ReportPart:
-    name = mission.ended.tree.robot_name
-    own = [event for event in events if mission.since_s <= event.stamp_s <= mission.until_s]
-    title = f"Mission {mission.number}, {name} ({mission.ended.report.kind}): {mission.ended.tree.mission_name}"
-    return part_of(mission.ended, robots, artifacts, own, title=title)
+    save_report(out, page)

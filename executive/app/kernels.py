@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
-from executive.app.robots import DEFAULT_KIND, only_robot
+from executive.app.robots import only_robot
 from executive.app.simulated import SimulatedBackend
 from executive.app.worlds import open_world
 from executive.mission.request import Request
@@ -27,19 +26,12 @@ steps: [{skill: navigate, with: {x: 5.2, y: 4.5, yaw: 3.1416}}]
 """
 
 
-@dataclass(frozen=True)
-class _Drive:
-    """A kind of robot that drives, and the components in place of its default ones."""
-
-    kind: str = DEFAULT_KIND
-    stack: str | None = None
-
-
 _DRIVES: Final = (
-    _Drive(),
-    _Drive(stack="{localiser: {use: scan_matching}, costmap: {use: rolling}, controller: {use: mppi}}"),
-    _Drive(kind="fetch"),
+    ("spot", None),
+    ("spot", "{localiser: {use: scan_matching}, costmap: {use: rolling}, controller: {use: mppi}}"),
+    ("fetch", None),
 )
+"""Kinds of robots that drive, and the components in place of their default ones."""
 TICK_S: Final = 0.05
 _DRIVEN_S: Final = 2.5
 _SURVEYED_S: Final = 4.0
@@ -49,12 +41,12 @@ def newly_compiled() -> int:
     """How many functions this process compiled that numba's cache did not hold."""
     modules = [module for name, module in sys.modules.items() if name.startswith(("skills.", "plant."))]
     values = [value for module in modules for value in vars(module).values()]
-    codes = {id(code): code for code in (getattr(value, "machine_code", value) for value in values if _is_code(value))}
+    compiled: list[Any] = [
+        each.machine_code for each in values if isinstance(each, CompiledFunction) and each.is_compiled
+    ]
+    compiled += [each for each in values if isinstance(each, Dispatcher)]
+    codes = {id(code): code for code in compiled}
     return sum(sum(code.stats.cache_misses.values()) for code in codes.values())
-
-
-def _is_code(value: object) -> bool:
-    return isinstance(value, Dispatcher) or (isinstance(value, CompiledFunction) and value.is_compiled)
 
 
 def compile_kernels() -> None:
@@ -63,33 +55,24 @@ def compile_kernels() -> None:
     Takes some seconds where the cache already holds all of it.
     """
     with TemporaryDirectory() as folder:
-        for number, drive in enumerate(_DRIVES):
-            _begin(drive, Path(folder) / str(number))
-    _search()
+        for number, (kind, stack) in enumerate(_DRIVES):
+            _begin(kind, stack, Path(folder) / str(number))
     _bend_arm()
     _see_cells()
     _survey()
 
 
-def _begin(drive: _Drive, folder: Path) -> None:
+def _begin(kind: str, components: str | None, folder: Path) -> None:
     """Drive for some seconds towards a place, as a mission does."""
     folder.mkdir()
     mission, stack = folder / "warm_up.yaml", None
     mission.write_text(_MISSION, encoding="utf-8")
-    if drive.stack is not None:
+    if components is not None:
         stack = folder / "stack.yaml"
-        stack.write_text(drive.stack, encoding="utf-8")
-    robots = (RobotConfig("Alice", drive.kind, stack=stack),)
+        stack.write_text(components, encoding="utf-8")
+    robots = (RobotConfig("Alice", kind, stack=stack),)
     prepared = prepare(Request(file=mission, out=folder, record=False, time_limit_s=_DRIVEN_S, robots=robots))
     run_request(prepared, SimulatedBackend(prepared.world, prepared.robots, seed=1, record=False))
-
-
-def _search() -> None:
-    """Compare scans at places where the robot may be, as one does that does not know where it is."""
-    from skills.estimate.grid_map import load_grid_map
-    from skills.estimate.matching import score_poses
-
-    score_poses(load_grid_map(open_world(DEFAULT_WORLD).scan_map_path), np.ones((2, 3)), np.ones((1, 3)))
 
 
 def _bend_arm() -> None:
@@ -124,13 +107,16 @@ def _see_cells() -> None:
 
 
 def _survey() -> None:
-    """Begin to make a map, and look for a place in it."""
+    """Begin to make a map, and look for a place in it and, by comparing scans, in the map of a world."""
     from executive.app.simulated import simulate
+    from skills.estimate.grid_map import load_grid_map
+    from skills.estimate.matching import score_poses
     from skills.mapping.closures import Window
     from skills.mapping.mapper import Mapper
     from skills.mapping.survey import Survey
 
     world, name = open_world(DEFAULT_WORLD), "Alice"
+    score_poses(load_grid_map(world.scan_map_path), np.ones((2, 3)), np.ones((1, 3)))
     simulation = simulate(world, {name: only_robot(name, world)}, seed=1, record=False)
     robot, clock, mapper = simulation.robots[name], simulation.clock, Mapper(world.start)
     survey = Survey(robot, robot.acquire_lease("errand warm-up"), mapper, home=world.start)

@@ -41,7 +41,7 @@ from plant.worlds.world import World
 from skills.api import PlanningError, Publish, Worker
 from skills.estimate.grid_map import load_grid_map
 from skills.faults.faulty_robot import FaultyRobot, with_faults
-from skills.faults.words import Fault, parse_fault
+from skills.faults.words import parse_fault
 from skills.files.errors import InputError
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path
@@ -103,8 +103,11 @@ def run_request(
         if profile is not None:
             watching.append(RunProfile(profile, backend, (artifacts, log), journals))
         result = run_watched(entries, backend, watching, settings=settings, control=control, spare=spare)
-        if durable is not None:
-            _keep(durable, log, prepared.tree.robot_name)
+        if durable is not None:  # the next mission begins in the world that this one leaves
+            next(iter(durable.journals.values())).keep_world()
+            for trouble in durable.troubles:
+                error = {"node": prepared.tree.robot_name, "what": "keep the mission's state", "traceback": trouble}
+                log(ERROR_TOPIC, error)
         counts = dict(sorted(Counter({**result.work, **backend.work(), "bytes_logged": log.bytes}).items()))
         log(WORK, counts)
     events = mission_events(path)
@@ -172,7 +175,8 @@ def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> 
     """The robot of a mission with its faults, and its numeric code warm."""
     entry, clock = backend.entry(prepared.tree, durable), backend.clock
     preload(entry)
-    faults = _to_come(prepared.request.scenario.faults, clock.now())
+    every = map(parse_fault, prepared.request.scenario.faults)
+    faults = [each for each in every if not each.over_by(clock.now())]  # some are, in a run that goes on
     return replace(
         entry,
         robot=with_faults(entry.robot, clock, faults, since_s=0.0),
@@ -188,18 +192,6 @@ def _settings(request: Request) -> RunSettings:
     hours, minutes = map(int, (request.time_of_day or "0:0").split(":"))
     time_s = None if request.time_of_day is None else 3600.0 * hours + 60.0 * minutes
     return replace(usual, time_limit_s=limit_s, time_of_day_s=time_s)
-
-
-def _to_come(faults: Sequence[str], now_s: float) -> list[Fault]:
-    """The faults that are not over by now, as some are in a run that goes on after a restart."""
-    return [fault for fault in map(parse_fault, faults) if not fault.over_by(now_s)]
-
-
-def _keep(durable: Durable, log: EventLog, robot_name: str) -> None:
-    """Keep the world for the next mission, which begins where this one ended, and log what could not be kept."""
-    next(iter(durable.journals.values())).keep_world()
-    for trouble in durable.troubles:
-        log(ERROR_TOPIC, {"node": robot_name, "what": "keep the mission's state", "traceback": trouble})
 
 
 def log_name(start: int) -> str:
@@ -281,11 +273,7 @@ def preload(entry: RunEntry) -> None:
     there = Pose2D(here.x_m, here.y_m, here.yaw_rad + 0.5)
     with suppress(PlanningError):
         plan_path(costmap, Footprint.of(robot.capabilities()), here, there)
-    _spare_the_collector()
-
-
-def _spare_the_collector() -> None:
-    """Keep what lives as long as the run out of garbage collections; what an earlier run left is collected first."""
+    # what lives as long as the run is kept out of garbage collections; what an earlier run left is collected first
     if gc.get_freeze_count():
         gc.unfreeze()
         gc.collect()

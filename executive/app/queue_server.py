@@ -221,7 +221,10 @@ class Listeners:
         for kind, (topics, source) in list(self._sources.items()):
             if wanted.get(kind) != topics:
                 del self._sources[kind]
-                self._stop(kind, source)
+                try:
+                    run_in_thread(source.stop, limit_s=self._limit_s)
+                except PluginDefect as defect:
+                    self._tell(f"trigger source '{kind}' does not stop ({defect})")
         self._unheard = {kind: why for kind, why in self._unheard.items() if kind in wanted}
         for kind, topics in wanted.items():
             if kind in self._sources:
@@ -262,13 +265,6 @@ class Listeners:
                 self._stuck[kind] = message
             raise InputError(message, hint=_SEE) from defect
         return source
-
-    def _stop(self, kind: str, source: TriggerSource) -> None:
-        """Stop a plug-in; that it raises is told, and harms nothing else."""
-        try:
-            run_in_thread(source.stop, limit_s=self._limit_s)
-        except PluginDefect as defect:
-            self._tell(f"trigger source '{kind}' does not stop ({defect})")
 
 
 class TriggerCalls:
@@ -351,17 +347,14 @@ def call_token(given: str | None, store: Path) -> CallToken:
         try:
             opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         except FileExistsError:
-            return CallToken(_kept(file), file)
+            if stat.S_IMODE(file.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO):
+                hint = f"chmod 600 {file}, or remove it for a new one"
+                raise InputError("others can read the token", hint=hint, file=file) from None
+            return CallToken(_checked(file.read_text(encoding="utf-8", errors="replace").strip(), file), file)
         text = secrets.token_urlsafe(32)
         with os.fdopen(opened, "w", encoding="ascii") as writer:
             writer.write(f"{text}\n")
     return CallToken(text, file, new=True)
-
-
-def _kept(file: Path) -> str:
-    if stat.S_IMODE(file.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO):
-        raise InputError("others can read the token", hint=f"chmod 600 {file}, or remove it for a new one", file=file)
-    return _checked(file.read_text(encoding="utf-8", errors="replace").strip(), file)
 
 
 def _checked(text: str, file: Path | None) -> str:

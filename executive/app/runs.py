@@ -169,7 +169,10 @@ class MissionRuns:
             cause = f"{error.filename}: {error.strerror}" if error.filename else str(error)
         except Exception as defect:
             cause = f"a defect of errand or of a plug-in ended it ({type(defect).__name__}: {defect})"
-            self._screen.tell(f"The traceback is in {_traceback_file(self._missions, mission)}")
+            file = self._missions.path.with_name(f"mission-{mission.id}-traceback.txt")
+            with suppress(OSError):
+                file.write_text(traceback.format_exc(), encoding="utf-8")
+            self._screen.tell(f"The traceback is in {file}")
         finally:
             return_memory()
         return self.set_aside(mission, cause)
@@ -275,14 +278,6 @@ def _in_its_folder(mission: StoredMission, prepared: Prepared) -> Prepared:
     asked = mission.request
     out = asked.out / f"{mission.id:03d}-{slug(asked.name)}" if mission.queued else asked.out
     return replace(prepared, request=replace(prepared.request, out=out))
-
-
-def _traceback_file(missions: MissionStore, mission: StoredMission) -> Path:
-    """Write the traceback of a defect beside the store, where that can be done; the file."""
-    file = missions.path.with_name(f"mission-{mission.id}-traceback.txt")
-    with suppress(OSError):
-        file.write_text(traceback.format_exc(), encoding="utf-8")
-    return file
 
 
 def plant_file(store: MissionStore) -> Path:

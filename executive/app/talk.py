@@ -16,12 +16,10 @@ from executive.language.cleaning import addressed_to
 from executive.language.followups import remark_of
 from executive.language.parser import load_parser
 from executive.language.questions import RefusalError
-from executive.language.reference import Memory
-from executive.language.understand import Understanding, understand
+from executive.language.understand import understand
 from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
-from executive.tree.compiler import CompiledTree, compile_mission
-from executive.tree.registry import installed_skills
+from executive.tree.compiler import CompiledTree
 from executive.words.mission import Mission
 from executive.words.step import Step
 
@@ -90,22 +88,18 @@ def conversation_of(prepared: Prepared, control: Control) -> Conversation:
     speech = Speech(
         knowledge=prepared.knowledge,
         robot_name=prepared.mission.robot_name,
-        understand=lambda text, memory: _understood(text, memory, prepared),
+        understand=lambda text, memory: understand(
+            text,
+            parser=load_parser(),
+            knowledge=prepared.knowledge,
+            require_wake=False,
+            robot_name=prepared.mission.robot_name,
+            memory=memory,
+        ),
         compile=lambda steps, taken: _compiled(steps, taken, prepared),
     )
     robot = prepared.knowledge.robot
     return Conversation(speech, control, require_wake=robot.require_wake, others=robot.others)
-
-
-def _understood(text: str, memory: Memory | None, prepared: Prepared) -> Understanding:
-    return understand(
-        text,
-        parser=load_parser(),
-        knowledge=prepared.knowledge,
-        require_wake=False,
-        robot_name=prepared.mission.robot_name,
-        memory=memory,
-    )
 
 
 def _compiled(steps: Sequence[Step], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
@@ -113,8 +107,6 @@ def _compiled(steps: Sequence[Step], taken: frozenset[str], prepared: Prepared) 
     mission = Mission.of_steps(steps, world=prepared.world.name, robot=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)
-    tree = compile_mission(
-        mission.model_copy(update={"name": name}), knowledge=prepared.knowledge, registry=installed_skills()
-    )
-    refuse_impossible(replace(prepared, tree=tree))
-    return tree
+    own = replace(prepared, others=()).with_mission(mission.model_copy(update={"name": name}))
+    refuse_impossible(own)
+    return own.tree

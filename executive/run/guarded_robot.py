@@ -164,11 +164,7 @@ def _or_none(check: Check) -> Check:
     return lambda answer: None if answer is None else check(answer)
 
 
-def _nothing_more(reading: Any) -> str | None:
-    return None
-
-
-def _reading(kind: type[Any], more: Check = _nothing_more) -> Check:
+def _reading(kind: type[Any], more: Check = lambda reading: None) -> Check:
     """The type, a stamp, finite numbers in all fields that are annotated as numbers, and what `more` looks at."""
     fields = [(each.name, _GOOD[str(each.type)]) for each in dataclasses.fields(kind) if str(each.type) in _GOOD]
 

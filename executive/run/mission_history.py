@@ -75,7 +75,7 @@ class Executions:
         self._nodes = {path: named[path] for path in self._below if path in named}
         self._drivers = {path: named[path] for path in self._base if path in named}
         self._driving = {path for path, node in self._drivers.items() if node.status is Status.RUNNING}
-        self._open = {path for path in self._nodes if self._last_is_open(path)}
+        self._open = {path for path in self._nodes if (kept := self._of(path)) and kept[-1].ended_s is None}
         self._taken_up = set(self._open)
         self._moved_s = board.get(self._keys.moved) if self._keys.moved in board else None
         self._paths: Mapping[Behaviour, str] = {node: path for path, node in self._nodes.items()}
@@ -146,10 +146,6 @@ class Executions:
                 self._put(below, spoiled)
         over = replace(one, ended_s=self._clock.now(), done=done)
         self._put(path, (*before, over) if path in self._parts else ())
-
-    def _last_is_open(self, path: str) -> bool:
-        found = self._of(path)
-        return bool(found) and found[-1].ended_s is None
 
     def _of(self, path: str) -> tuple[Execution, ...]:
         key = _executions_key(path)

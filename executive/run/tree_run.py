@@ -93,11 +93,17 @@ class TreeRun:
         """Tick once and log what changed; True when anything did."""
         self._breakpoints = breakpoints
         if not breakpoints <= self._gates.keys():
-            self._set_gates(breakpoints)
+            for node in self._observed.nodes:
+                path_id = node.path_id if isinstance(node, Explained) else None
+                if path_id in breakpoints and path_id is not None and path_id not in self._gates:
+                    self._gates[path_id] = Gate(node, self._closed(path_id))
         self._tick()
         self._changes = self.log_changes()
-        for change in self._changes:
-            self._note_running(change)
+        for path_id, _, after in (change for change in self._changes if change.path_id in self._skills):
+            if after.status is Status.RUNNING:
+                self._running[path_id] = self._skills[path_id]
+            else:
+                self._running.pop(path_id, None)
         self._executions.after_tick(change.path_id for change in self._changes)
         return bool(self._changes)
 
@@ -113,14 +119,6 @@ class TreeRun:
             self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.known_pose()
             charge = context.robot.battery().charge
         return TickNote(self.tree, now_s, changes, board, pose, checkpoints, charge)
-
-    def _note_running(self, change: Change) -> None:
-        if change.path_id not in self._skills:
-            return
-        if change.after.status is Status.RUNNING:
-            self._running[change.path_id] = self._skills[change.path_id]
-        else:
-            self._running.pop(change.path_id, None)
 
     def _tick(self) -> None:
         """Tick the tree; or, while the rest of it stands still, what a node that was stopped was still to do."""
@@ -203,7 +201,9 @@ class TreeRun:
         }
         findings, said = self._findings.findings, self._findings.said
         if findings and outcome is Outcome.SUCCESS:
-            message = claim("" if self._tells_nothing_more() else message, findings, self._skipped())
+            skips = (node for node in self._observed.nodes if isinstance(node, Skip) and node.status is Status.SUCCESS)
+            skipped = [f"{node.step} ({node.skipped})" for node in skips if node.skipped is not None]
+            message = claim("" if self._tells_nothing_more() else message, findings, skipped)
         elif findings and outcome is Outcome.FAILURE:
             message = f"{message} (found out: {findings_in_words(findings)})"
         return RobotResult(
@@ -225,17 +225,6 @@ class TreeRun:
         last = self.tree.parts[-1] if self.tree.parts else None
         plain = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN)
         return last is None or last.goal is None or last.goal.kind in plain
-
-    def _skipped(self) -> Sequence[str]:
-        """What was skipped, and why."""
-        nodes = (node for node in self._observed.nodes if isinstance(node, Skip) and node.status is Status.SUCCESS)
-        return [f"{node.step} ({node.skipped})" for node in nodes if node.skipped is not None]
-
-    def _set_gates(self, breakpoints: frozenset[str]) -> None:
-        for node in self._observed.nodes:
-            path_id = node.path_id if isinstance(node, Explained) else None
-            if path_id in breakpoints and path_id is not None and path_id not in self._gates:
-                self._gates[path_id] = Gate(node, self._closed(path_id))
 
     def _closed(self, path_id: str) -> Callable[[], bool]:
         return lambda: path_id in self._breakpoints

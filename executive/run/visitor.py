@@ -185,10 +185,6 @@ class RunShared:
         limits, told_s = self.settings, self.settings.time_of_day_s
         self.traffic = TrafficTable({}, self.clock.now)
         self.watchdog = Watchdog(min(limits.verb_limit_s, limits.image_limit_s, limits.tick_limit_s))
-        self.day_began_s = (_time_of_day_s() if told_s is None else told_s) - self.clock.now()
-
-
-def _time_of_day_s() -> float:
-    """The time of day on this machine (s after midnight)."""
-    now = time.localtime()
-    return 3600.0 * now.tm_hour + 60.0 * now.tm_min + now.tm_sec
+        now = time.localtime()
+        here_s = 3600.0 * now.tm_hour + 60.0 * now.tm_min + now.tm_sec
+        self.day_began_s = (here_s if told_s is None else told_s) - self.clock.now()

@@ -6,6 +6,7 @@ import gc
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, wait
+from contextlib import suppress
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -48,16 +49,11 @@ class WorkThread:
     def close(self, wait_s: float) -> None:
         """Drop what has not begun, and wait so long for what runs; idempotent."""
         self._closed = True
-        while (given := self._next()) is not None:
-            given[1].cancel()
+        with suppress(Empty):
+            while (given := self._work.get_nowait()) is not None:
+                given[1].cancel()
         self._work.put(None)
         self._thread.join(wait_s)
-
-    def _next(self) -> _Work | None:
-        try:
-            return self._work.get_nowait()
-        except Empty:
-            return None
 
     def __del__(self) -> None:
         self._work.put(None)
@@ -166,7 +162,9 @@ class LockStepWorker:
         try:
             given = read()
         except Exception as defect:
-            return self.submit(_raising(defect), latency_s=latency_s, name=name)
+            failed: Future[ReadT] = Future()
+            failed.set_exception(defect)
+            return self.submit(lambda: work(failed.result()), latency_s=latency_s, name=name)
         return self.submit(lambda: work(given), latency_s=latency_s, name=name)
 
     def close(self) -> None:
@@ -178,13 +176,6 @@ class LockStepWorker:
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
         self.close()
-
-
-def _raising(defect: Exception) -> Callable[[], Any]:
-    def work() -> Any:
-        raise defect
-
-    return work
 
 
 class ThreadWorker:

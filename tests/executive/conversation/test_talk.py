@@ -328,7 +328,7 @@ def test_an_addition_is_corrected_while_it_waits(talk, speech, control, run_tree
             conversation.hear(said.pop(progress.ticks))
 
     result = run_tree(tree, control=control, observer=observe)
-    assert [each.mission for each in result.worst.preempting] == ["go kitchen"]
+    assert [each.tree.mission_name for each in result.worst.preempting] == ["go kitchen"]
     assert script.begun == ["navigate", "navigate"]
 
 

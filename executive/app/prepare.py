@@ -89,21 +89,25 @@ class Setting:
         world = replace(self.world, start=robot.start, dock=robot.dock)
         return replace(self, world=world, knowledge=knowledge_for(robot, self.robots, self.knowledge))
 
-    def understand(self) -> Understanding:
-        """What the request's sentence asks of each robot. Raises InputError: it is not understood."""
-        from executive.language.robots import understand_for_robots  # which a mission file does not need
-        from executive.language.understand import ask_until_clear
-
+    @property
+    def require_wake(self) -> bool:
+        """Whether the robot's name must be said: by the request, else by the world."""
         asked = self.request.require_wake
-        meaning = partial(
-            understand_for_robots,
-            robots=tuple(self.robots),
-            parser=load_parser(),
-            knowledge=self.knowledge,
-            require_wake=self.knowledge.robot.require_wake if asked is None else asked,
-        )
-        meant = ask_until_clear(self.request.sentence or "", meaning, self.answerer(self.request.questions))
-        _refuse_unclear(meant)
+        return self.knowledge.robot.require_wake if asked is None else asked
+
+    def understand(self) -> Understanding:
+        """What the request's sentence asks of the only robot, or of each. Raises InputError: it is not understood."""
+        from executive.language.robots import understand_for_robots  # which a mission file does not need
+        from executive.language.understand import Status, ask_until_clear, understand
+
+        meaning: Callable[..., Understanding] = understand
+        if self.robots:
+            meaning = partial(understand_for_robots, robots=tuple(self.robots))
+        known = {"parser": load_parser(), "knowledge": self.knowledge, "require_wake": self.require_wake}
+        answer = self.answerer(self.request.questions)
+        meant = ask_until_clear(self.request.sentence or "", partial(meaning, **known), answer)
+        if meant.status is not Status.OK:
+            raise InputError(meant.reason or "the sentence was not understood")
         return meant
 
     def answerer(self, policy: QuestionPolicy | None) -> Answerer:
@@ -211,23 +215,10 @@ def _for_the_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
         return setting.for_file(loaded)
     if request.sentence is None:
         return setting.compile(setting.mission_of_commands())
-    from executive.language.understand import ask_until_clear, understand  # which a mission file does not need
-
-    wake = robot.require_wake if request.require_wake is None else request.require_wake
-    meaning = partial(understand, parser=load_parser(), knowledge=setting.knowledge, require_wake=wake)
-    meant = ask_until_clear(request.sentence, meaning, setting.answerer(request.questions))
-    _refuse_unclear(meant)
+    meant = setting.understand()
     mission = Mission.of_steps(meant.all_steps, world=setting.world.name, robot=robot.name).with_notes(meant.notes)
-    asked = replace(request, sentence=meant.text, require_wake=wake)
+    asked = replace(request, sentence=meant.text, require_wake=setting.require_wake)
     return replace(setting, request=asked).compile(mission, meant)
-
-
-def _refuse_unclear(meant: Understanding) -> None:
-    """Raise InputError where a sentence is refused, leaves a question open or is not for this robot."""
-    from executive.language.understand import Status
-
-    if meant.status is not Status.OK:
-        raise InputError(meant.reason or "the sentence was not understood")
 
 
 def _for_whom_it_calls(setting: Setting) -> Prepared:

@@ -637,7 +637,7 @@ def _wrong(
         "the robot drives": robot.driving,
         f"skills are left: {[skill.name for skill in robotics.active]}": bool(robotics.active),
         f"nodes still run: {running[:3]}": bool(running),
-        "a question is open": any(asked._answer is None for asked in operator.asked),
+        "a question is open": any(asked.answer is None for asked in operator.asked),
         "no cause": worst.outcome is not Outcome.SUCCESS and worst.cause is None,
         "no sentence": not worst.message,
     }

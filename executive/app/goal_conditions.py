@@ -21,7 +21,7 @@ _MOVING = frozenset({GoalKind.GRASPED, GoalKind.PLACED, GoalKind.HANDED_OVER, Go
 
 @dataclass(frozen=True)
 class Share:
-    """What another robot did of a mission, before it was handed on or beside this one.
+    """The part of a mission that another robot did, before it was handed on or beside this one.
 
     The first `done` parts of its tree belong to what is judged; all that it moved was moved by the mission.
     """
@@ -144,7 +144,7 @@ def _timed(
 
 
 def _moves(share: Share) -> Iterator[_Move]:
-    """When a robot moved objects on purpose: in all parts that do, also where they failed or were stopped."""
+    """The times when a robot moved objects on purpose, also in parts that failed or were stopped."""
     for part in share.tree.parts:
         goal = part.goal
         if goal is None:
@@ -191,7 +191,7 @@ def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str
 
 
 def _is_text(heard: str, text: str | Template | Expression | None) -> bool:
-    """Whether what was heard is the text of a step; the values in it may be any."""
+    """Whether the robot said the text of a step, with any values in it."""
     return text.could_be(heard) if isinstance(text, Template) else not isinstance(text, str) or heard == text
 
 

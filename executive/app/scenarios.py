@@ -91,14 +91,14 @@ def doorway(grid: GridMap, at_W: tuple[float, float]) -> dict[str, Any]:
 
 
 def _free_m(grid: GridMap, at_W: tuple[float, float], yaw: float) -> float:
-    """How far it is from a point to the first occupied cell."""
+    """Distance from a point to the first occupied cell, in metres."""
     away_m = np.arange(0.0, 10.0, _STEP_M)
     met = _occupied(grid, np.array(at_W) + away_m[:, None] * [math.cos(yaw), math.sin(yaw)])
     return float(away_m[int(np.argmax(met))]) if met.any() else float(away_m[-1])
 
 
 def _wall_m(grid: GridMap, middle_W: FloatArray, along: FloatArray, width_m: float) -> float:
-    """How much wall, up to a little more than the door's width, is beside the doorway in a direction."""
+    """Length of the wall beside the doorway in a direction, up to a little more than the door's width, in metres."""
     away_m = np.arange(0.5 * width_m + _STEP_M, 1.5 * width_m + _BEYOND_M, _STEP_M)
     met = _occupied(grid, middle_W + away_m[:, None] * along)
     return _STEP_M * float(np.count_nonzero(np.logical_and.accumulate(met)))
@@ -128,7 +128,7 @@ class _Strict(BaseModel):
 
 
 class EventFile(_Strict):
-    """Something that happens: exactly one of `person`, `door` and `object` says to whom or what."""
+    """An event of exactly one person, door or object."""
 
     person: Name | None = Field(None, description="Somebody who walks; known in the world, or somebody new.")
     door: tuple[Name, Name] | None = Field(None, description="The two rooms that a door joins.")
@@ -286,7 +286,7 @@ class _Events:
         self.moves.append({"name": (named or of_class)[0], "at": event.at, "to": self._rest(event.to, (*path, "to"))})
 
     def _rest(self, to: Any, path: KeyPath) -> str | Spot:
-        """The surface that is meant, or the point."""
+        """The surface or the point where an object is put."""
         if not isinstance(to, str):
             x, y, z = to
             return x, y, z
@@ -299,6 +299,6 @@ class _Events:
 
 
 def _stops(to: Any) -> list[Stop]:
-    """Where a person goes, one after the other."""
+    """The places where a person goes, one after the other."""
     single = isinstance(to, str) or isinstance(to[0], float | int)
     return [each if isinstance(each, Stop) else Stop(at=each, pause=0.0) for each in ((to,) if single else to)]

@@ -42,8 +42,7 @@ def check(
 
 
 def to_json(checked: Sequence[Checked]) -> dict[str, Any]:
-    """All files as one object: whether all are well, errors, warnings, how many nodes, the commands in order, and what
-    each file that is well takes."""
+    """All files as one object: `ok`, errors, warnings, the number of nodes, the commands, and an estimate of each."""
     trees = [tree for one in checked for tree in one.trees]
     return {
         "ok": all(one.ok for one in checked),
@@ -56,7 +55,7 @@ def to_json(checked: Sequence[Checked]) -> dict[str, Any]:
 
 
 def _estimate_json(one: Checked) -> dict[str, Any]:
-    """What a file takes; `most_s` is null where nobody knows how long it may take."""
+    """The estimate of a file; `most_s` is null where nobody knows how long it may take."""
     taken = one.estimate
     return {
         "file": str(one.file),

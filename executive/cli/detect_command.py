@@ -25,7 +25,7 @@ MOST_PIXELS_TOGETHER: Final = 8_000_000
 
 
 @dataclass(frozen=True)
-class Looked:
+class PictureResult:
     """A picture file, and where it is drawn: what was found, its share of the time (ms), or why it cannot be read."""
 
     file: Path
@@ -68,16 +68,16 @@ def detect(
     finish([one.to_json() for one in looked], as_json, good=good, otherwise=BAD_INPUT)
 
 
-def _groups(files: Iterable[tuple[Path, Path | None]]) -> Iterator[list[Looked]]:
+def _groups(files: Iterable[tuple[Path, Path | None]]) -> Iterator[list[PictureResult]]:
     """The files read, in groups that are looked at together: some pictures, or one that is very large."""
-    group, pixels = list[Looked](), 0
+    group, pixels = list[PictureResult](), 0
     for file, drawing in files:
         try:
             picture = read_picture(file)
             pixels += picture.shape[0] * picture.shape[1]
-            group.append(Looked(file, drawing, picture))
+            group.append(PictureResult(file, drawing, picture))
         except InputError as error:
-            group.append(Looked(file, drawing, error=error))
+            group.append(PictureResult(file, drawing, error=error))
         if len(group) >= MOST_TOGETHER or pixels >= MOST_PIXELS_TOGETHER:
             yield group
             group, pixels = [], 0
@@ -85,7 +85,7 @@ def _groups(files: Iterable[tuple[Path, Path | None]]) -> Iterator[list[Looked]]
         yield group
 
 
-def _look(detector: Detector, group: Sequence[Looked]) -> Iterator[Looked]:
+def _look(detector: Detector, group: Sequence[PictureResult]) -> Iterator[PictureResult]:
     """What is seen in each file, drawn where wished. Raises InputError when a drawing cannot be written."""
     pictures = [one.picture for one in group if one.picture is not None]
     begun = time.perf_counter()
@@ -110,7 +110,7 @@ def _drawing_names(images: Sequence[Path], folder: Path) -> Sequence[Path]:
     return names
 
 
-def _show(console: Console, looked: Sequence[Looked]) -> None:
+def _show(console: Console, looked: Sequence[PictureResult]) -> None:
     table = list[tuple[str, ...]]()
     for one in looked:
         values = [(d.class_name, f"{d.score:.2f}", ", ".join(f"{value:.0f}" for value in d.box)) for d in one.found]

@@ -37,7 +37,7 @@ _KNOWN: Final[Mapping[str, str]] = {"dataset": "errand-train"}
 
 @dataclass(frozen=True)
 class _Command:
-    """Where a command stands: its module, the function or `typer.Typer` in it, and its line in the help."""
+    """The module of a command, the function or `typer.Typer` in it, and its line in the help."""
 
     module: str
     attribute: str
@@ -82,8 +82,8 @@ COMMANDS: Final[Mapping[str, _Command]] = {
 """The commands of Errand by name, in the order of the help; those of plug-ins follow them."""
 
 
-def loaded(name: str) -> Any:
-    """The command of a name, its module imported. Raises KeyError."""
+def shipped_command(name: str) -> Any:
+    """The command of a name; imports its module. Raises KeyError."""
     entry = COMMANDS[name]
     return as_command(name, getattr(import_module(f"executive.cli.{entry.module}"), entry.attribute))
 
@@ -170,7 +170,7 @@ class _LazyGroup(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first argument names, imported."""
         if args and args[0] in COMMANDS:
-            self.add_command(loaded(args[0]), args[0])
+            self.add_command(shipped_command(args[0]), args[0])
         elif args and (found := plugin_command(args[0])) is not None:
             self.add_command(found, args[0])
         return super().resolve_command(ctx, args)

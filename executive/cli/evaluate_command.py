@@ -123,7 +123,7 @@ def _bar(console: Console, total: int) -> Iterator[Callable[[], None]]:
 
 @contextmanager
 def _file_of(results: Path | None) -> Iterator[Path]:
-    """The results file that is named, else one that nobody needs afterwards."""
+    """The results file that the user names, else a temporary one."""
     if results is not None:
         yield results
         return
@@ -282,14 +282,14 @@ def _evaluated(kept: ResultsFile) -> Evaluated:
 
 
 def _show_report(console: Console, found: Evaluated, other: Sequence[Case] | None) -> None:
-    from executive.app.evaluate.summary import causes_of, compared, label_of, time_rows
+    from executive.app.evaluate.summary import causes_of, comparisons_of, label_of, time_rows
 
     _show_cases(console, found)
     for row in causes_of(found.cases, most=1):
         console.print(f"{row.cause}: {row.runs}, as in: {next(iter(row.messages))}", markup=False)
     rows = ((row.skill, str(row.runs), f"{row.sim_s:.1f}", f"{row.share:.1%}") for row in time_rows(found.cases))
     show_table(console, ("skill", "runs", "simulated s", "share"), rows)
-    for each in compared(found.cases, other) if other is not None else ():
+    for each in comparisons_of(found.cases, other) if other is not None else ():
         test = "McNemar" if each.paired else "Fisher"
         here, there = (f"{rate.successes} of {rate.total}" for rate in (each.here, each.there))
         what = label_of(each.dimension, each.name)

@@ -176,7 +176,7 @@ def tree(
 
 
 def _view(text: str | None, request: Request, at_s: float | None, robot: str | None) -> NodeView:
-    """What ends in .mcap is a log, what ends in .yaml, exists or is shipped a mission file, and all else a sentence."""
+    """The tree of a log (.mcap), of a mission file (.yaml, a file, or a shipped one), or of a sentence."""
     if text is not None and text.endswith(LOG_SUFFIX):
         history = read_history(Path(text))
         if robot is None and len(history.robots) > 1:
@@ -197,7 +197,7 @@ def _view(text: str | None, request: Request, at_s: float | None, robot: str | N
 
 
 def _request(text: str | None, request: Request) -> Request:
-    """The request for what is to be shown. Raises InputError: nothing is, or two things."""
+    """The request whose tree is shown. Raises InputError: there is none, or two are given."""
     from executive.app.mission_files import shipped_missions
 
     if text is None and request.sentence is None:

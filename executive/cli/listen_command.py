@@ -1,4 +1,4 @@
-"""`errand listen`: what recordings, or a microphone, say, and the commands that it means."""
+"""`errand listen`: the words and commands in recordings, or at the microphone."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def hear_request(wav: Path, request: Request, *, console: Console) -> str:
 
 
 def answer_line(meaning: Understanding) -> str:
-    """What the robot says to a request, in one line."""
+    """The robot's answer to a request, in one line."""
     if meaning.status is Status.OK:
         return "All right: " + "; ".join(map(str, meaning.commands))
     return (meaning.reason or "I did not understand.").split(";")[0]

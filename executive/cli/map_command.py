@@ -88,7 +88,7 @@ def build(
 
 
 class _Building:
-    """One drive: plant, survey, what is told and drawn meanwhile, and the truth for judging the map afterwards."""
+    """One drive: plant, survey, progress lines and pictures, and the true poses that judge the map afterwards."""
 
     def __init__(
         self,
@@ -125,7 +125,7 @@ class _Building:
         self._begun_s = time.monotonic()
 
     def drive(self, most_s: float, cancelled: Callable[[], bool]) -> str | None:
-        """Until the survey is done; why it ended before, None when it did not."""
+        """Drive until the survey is done; returns why it ended before, or None."""
         clock, survey = self._simulation.clock, self._survey
         told_s, drawn_s, kept_s = 0.0, -math.inf, time.monotonic()
         try:
@@ -155,7 +155,7 @@ class _Building:
         return "it was broken off; the same command goes on" if cancelled() else f"{most_s:g} s are over"
 
     def result(self) -> dict[str, Any]:
-        """Save the grids; what scripts are told. Raises InputError."""
+        """Save the grids; returns the result as JSON values. Raises InputError."""
         from plant.referee.trajectory import trajectory_error_m
         from skills.mapping.map_folder import save_grids, surveyed
 
@@ -205,7 +205,7 @@ class _Building:
             draft.replace(self._out / PICTURE)
 
     def _keep(self) -> None:
-        """Save what the next run goes on from."""
+        """Save the graph, from which the next run goes on."""
         from skills.mapping.map_folder import save_graph
 
         with writing(self._out, _OTHER):

@@ -1,4 +1,4 @@
-"""What the command line writes: people read the console, scripts the last line of standard output; what it asks."""
+"""Output of the command line: people read the console, scripts the last line of standard output; and questions."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def new_folder(out: Path) -> Iterator[Path]:
 
 
 def terminal_answerer() -> Answerer | None:
-    """Who answers questions at the terminal; None where nobody sits there, as in scripts."""
+    """The function that asks at the terminal; None where nobody sits there, as in scripts."""
     somebody = sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
     return ask_at_terminal if somebody else None
 

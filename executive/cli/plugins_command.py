@@ -75,7 +75,7 @@ def _key(entry: EntryPoint) -> str:
 
 
 def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
-    """What becomes of a plug-in that is loaded in a process of its own."""
+    """The result of loading a plug-in in a process of its own."""
     plugin = Plugin(entry.group, entry.name, distribution_of(entry), entry.value)
     namesakes = entry_points(group=entry.group, name=entry.name)
     clash = next((each for each in namesakes if _key(each) != _key(entry)), None)

@@ -132,7 +132,7 @@ def period(hands: Teleop, context: SkillContext) -> None:
 
 
 class TerminalKeys:
-    """A terminal tells of keys that are pressed, and again and again of one that is held; not of those let go."""
+    """Keys of a terminal, which reports presses and repeats of a held key, but no releases."""
 
     def __init__(self, hands: Teleop, save: Callable[[str | None], str], say: Callable[[str], None]) -> None:
         self._hands, self._save, self._say = hands, save, say
@@ -148,7 +148,7 @@ class TerminalKeys:
 
 
 def page_actions(hands: Teleop, save: Callable[[str | None], str], scene: Scene | None) -> Mapping[str, Action]:
-    """What the page asks for: `teleop` with held keys and sticks, `save_pose` with a name."""
+    """Actions of the page: `teleop` with held keys and sticks, `save_pose` with a name."""
 
     def ask(values: Mapping[str, Any]) -> str:
         try:
@@ -168,7 +168,7 @@ def page_actions(hands: Teleop, save: Callable[[str | None], str], scene: Scene 
 
 
 def _told(hands: Teleop) -> dict[str, Any]:
-    """What the page shows."""
+    """The state that the page shows."""
     pose = hands.pose()
     return {
         "note": hands.note,

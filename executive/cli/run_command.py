@@ -101,7 +101,7 @@ def refuse_unaddressed(request: Request) -> None:
 
 
 def _robot_of(world: str) -> dict[str, Any]:
-    """What the knowledge file of a world says about its one robot; {} where it says nothing, or has several."""
+    """The robot in the knowledge file of a world; {} where it has none, or several."""
     worlds = find_spec("plant.worlds")
     folders = [Path(world), *(Path(each) / world for each in (worlds and worlds.submodule_search_locations) or ())]
     file = next(file for folder in folders if is_file(file := folder / "knowledge.yaml") or folder is folders[-1])

@@ -206,11 +206,11 @@ class _Picture(RunVisitor):
         ]
         below = sum(len(text.split("\n")) for text in (*lines, *prompt))
         rows = max(FEWEST_ROWS, (self._live.console.height - below) // max(1, len(pictures)))
-        shown = [fitted(picture, rows) for picture in pictures]
+        shown = [visible_rows(picture, rows) for picture in pictures]
         self._live.update(Group(*shown, *lines, *prompt), refresh=True)
 
 
-def fitted(picture: Text, rows: int) -> Text:
+def visible_rows(picture: Text, rows: int) -> Text:
     """At most so many lines of a tree, with what runs among them."""
     lines = picture.split("\n")
     if len(lines) <= rows:

@@ -15,7 +15,7 @@ RandomFaults = Annotated[int, Quantity(ge=0, le=100)]
 
 @dataclass(frozen=True)
 class Scenario:
-    """What goes wrong and what happens, understood: words of faults, how many the seed draws, and events as plain data.
+    """Faults by their words, the number that the seed draws, and events as plain data.
 
     `people` are routes by name, `doors` doorways with the times at which they close and open, `moves` objects with the
     time at which they are moved and where to; all points are in the world frame, in metres.
@@ -55,7 +55,7 @@ class Scenario:
         return replace(self, faults=(*self.faults, *faults), random=0)
 
     def lines(self) -> tuple[str, ...]:
-        """What goes wrong and happens, one line each."""
+        """The faults and events, one line each."""
         people = (f"{name} sets off at {route['start']:g} s" for name, route in self.people.items())
         doors = (f"the {door['name']} {_times(door)}" for door in self.doors)
         moves = (f"somebody moves the {_moved(move)} at {move['at']:g} s" for move in self.moves)
@@ -67,12 +67,12 @@ NO_SCENARIO: Final = Scenario()
 
 
 def _times(door: Mapping[str, Any]) -> str:
-    """When a door closes and opens, in order."""
+    """The times at which a door closes and opens, in order."""
     told = sorted((door[verb], verb) for verb in ("closes", "opens") if door[verb] is not None)
     return " and ".join(f"{verb} at {at_s:g} s" for at_s, verb in told)
 
 
 def _moved(move: Mapping[str, Any]) -> str:
-    """What is moved, and where to."""
+    """The object that is moved, and its destination."""
     to = move["to"]
     return f"{move['name']} to {f'the {to}' if isinstance(to, str) else '({:g}, {:g}, {:g})'.format(*to)}"

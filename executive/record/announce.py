@@ -1,4 +1,4 @@
-"""What the log says at the beginning: the run's facts, one message for each command, and the map."""
+"""Messages at the beginning of a log: the run's facts, one for each command, and the map."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def command_type(task: Task | None) -> int:
 
 
 def goal_position(knowledge: Knowledge, command: Command) -> tuple[float, float]:
-    """Where a command's goal is, (x, y) in the world frame (m); NaN where it was left open."""
+    """Position of a command's goal, (x, y) in the world frame (m); NaN where it was left open."""
     if command.goal is None:
         return math.nan, math.nan
     person = knowledge.person(command.goal)

@@ -52,7 +52,7 @@ def write_ros2(events: Iterable[Event], path: Path) -> int:
             schemas = {name: writer.register_msgdef(name, text) for name, text in DEFINITIONS.items()}
             for event in events:
                 if event.topic != BOXES:
-                    topic, kind, message = translated(event)
+                    topic, kind, message = ros2_message(event)
                     time_ns = round(event.stamp_s * 1e9)
                     writer.write_message(topic, schemas[kind], message, time_ns, time_ns, count)
                     count += 1
@@ -62,7 +62,7 @@ def write_ros2(events: Iterable[Event], path: Path) -> int:
     return count
 
 
-def translated(event: Event) -> tuple[str, str, Data]:
+def ros2_message(event: Event) -> tuple[str, str, Data]:
     """A message's topic, type and fields in ROS 2."""
     form = _FORMS.get(event.topic)
     if form is None or (event.topic == DETECTIONS and "data" not in event.data):

@@ -1,4 +1,4 @@
-"""What a run computed, as counters that are equal for equal seeds, and where its CPU time went."""
+"""Counters of what a run computed, equal for equal seeds, and its CPU time by subsystem."""
 
 from __future__ import annotations
 

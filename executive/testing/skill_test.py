@@ -81,7 +81,7 @@ class BlockSetup(_Strict):
 
 
 class WorldSetup(_Strict):
-    """What stands around the robot."""
+    """The robot's surroundings."""
 
     room: bool = Field(default=True, description="a room of 6 m by 5 m, with a table before the origin")
     can: bool = Field(default=True, description="a red can near the edge of the table")

@@ -47,7 +47,7 @@ def _write_yaml(path: Path, data: Mapping[str, Any]) -> None:
 
 @cache
 def _facts() -> dict[str, Any]:
-    """What is written down of the room: knowledge and objects."""
+    """The knowledge and the objects of the room."""
     facts: dict[str, Any] = read_yaml(Path(__file__).with_suffix(".yaml")).data
     return facts
 

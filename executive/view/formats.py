@@ -126,10 +126,10 @@ def _label(node: NodeView) -> str:
     title = node.name if node.kind == "skill" else f"{node.kind} {node.name}"
     folded = f"({node.hidden} nodes below)" if node.hidden else ""
     rows = filter(None, (f"{style_of(node.state).symbol} {title}", note_of(node), folded))
-    return "<br/>".join(map(escaped, rows))
+    return "<br/>".join(map(mermaid_text, rows))
 
 
-def escaped(text: str) -> str:
+def mermaid_text(text: str) -> str:
     """The text, with a character reference for every character that Mermaid might read as syntax."""
     return "".join(char if char in _SAFE else f"#{ord(char)};" for char in printable(text))
 

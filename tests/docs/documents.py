@@ -5,11 +5,11 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from executive.cli.entry import COMMANDS, loaded, plugin_command
+from executive.cli.entry import COMMANDS, plugin_command, shipped_command
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-_COMMANDS = {**{name: loaded(name) for name in COMMANDS}, "dataset": plugin_command("dataset")}
+_COMMANDS = {**{name: shipped_command(name) for name in COMMANDS}, "dataset": plugin_command("dataset")}
 _BLOCK = re.compile(r"(?:^<!-- (?P<mark>[^>]*) -->\n+)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\]\((?!https?:)([^)#]*)(#[^)]*)?\)")
 

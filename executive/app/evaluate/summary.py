@@ -205,7 +205,7 @@ class Comparison:
     p: float
 
 
-def compared(here: Sequence[Case], there: Sequence[Case]) -> Sequence[Comparison]:
+def comparisons_of(here: Sequence[Case], there: Sequence[Case]) -> Sequence[Comparison]:
     """Two results compared: in all, and by what the groups are by where both have it."""
     twins, others, found = {case.run.id: case for case in there}, _keyed(there), list[Comparison]()
     paired = any(case.run.id in twins for case in here)
@@ -267,7 +267,7 @@ def standings_json(found: Evaluated, command_of: CommandOf) -> dict[str, Any]:
 def summary_json(found: Evaluated, command_of: CommandOf, against: Sequence[Case] | None = None) -> dict[str, Any]:
     """All that the results say as JSON values, compared with the cases of another file where these are given."""
     cases = found.cases
-    comparisons = {} if against is None else {"against": [asdict(each) for each in compared(cases, against)]}
+    comparisons = {} if against is None else {"against": [asdict(each) for each in comparisons_of(cases, against)]}
     return {
         "scenario": found.about["scenario"],
         "runs": len(cases),
@@ -305,7 +305,7 @@ def to_page(
         groups=groups_of(cases),
         standings=standing_rows(cases),
         other=other,
-        comparisons=None if against is None else compared(cases, against),
+        comparisons=None if against is None else comparisons_of(cases, against),
         causes=causes_of(cases),
         times=time_rows(cases),
         work=_mean_work(cases),

@@ -1,4 +1,4 @@
-"""What pytest loads with the package (entry point `errand` in the group `pytest11`).
+"""The pytest plug-in of the package (entry point `errand` in the group `pytest11`).
 
 It gives fixtures for tests of skills and collects files named `*.skilltest.yaml`. Heavy modules are imported when a
 test asks for them, so that the tests of other projects start no slower.

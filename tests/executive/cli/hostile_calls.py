@@ -143,7 +143,7 @@ def places() -> list[Place]:
 
 def commands() -> dict[str, Any]:
     """All commands by the words that call them."""
-    top = {name: entry.loaded(name) for name in entry.COMMANDS}
+    top = {name: entry.shipped_command(name) for name in entry.COMMANDS}
     top["dataset"] = entry.plugin_command("dataset")
     return {" ".join(words): found for name, each in top.items() for words, found in _below((name,), each)}
 

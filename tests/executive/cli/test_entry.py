@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.cli.entry import loaded
+from executive.cli.entry import shipped_command
 
 MISSIONS = Path(__file__).parents[3] / "missions"
 UNUSED_AT_RUN_TIME = ("errand_train", "plant.models.builder", "plant.worlds.builder")
@@ -99,7 +99,7 @@ def test_the_process_ends_with_its_exit_status_after_threads_and_exit_handlers(a
     ],
 )
 def test_a_start_is_one_word_or_three_numbers(words, value):
-    command = loaded("run")
+    command = shipped_command("run")
     context = command.make_context("run", ["missions/go_to_pose.yaml", *words])
     assert context.params["start"] == value
     assert str(context.params["file"]) == "missions/go_to_pose.yaml"

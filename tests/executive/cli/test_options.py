@@ -12,7 +12,7 @@ import typer
 from typer.testing import CliRunner
 
 from executive.app.evaluate.case import RunSpec
-from executive.cli.entry import loaded
+from executive.cli.entry import shipped_command
 from executive.cli.options import StartCommand, request_arguments, takes_request
 from executive.mission.request import Request
 from executive.store.database import form
@@ -49,7 +49,9 @@ def test_an_option_makes_the_request_that_is_written_down(words):
 
 
 def test_every_option_of_run_that_is_of_the_request_is_written_down():
-    typed = {option for each in loaded("run").params for option in (*each.opts, *each.secondary_opts)} - {"file"}
+    typed = {option for each in shipped_command("run").params for option in (*each.opts, *each.secondary_opts)} - {
+        "file"
+    }
     written = {word.partition("=")[0] for words in GOLDEN for word in shlex.split(words) if word.startswith("--")}
     assert typed - NOT_OF_THE_REQUEST == written
 

@@ -8,7 +8,7 @@ from py_trees.common import Status
 from rich.console import Console
 from rich.text import Text
 
-from executive.cli.screen import SILENCE, HeardSpeech, fitted, live_view, voice_for
+from executive.cli.screen import SILENCE, HeardSpeech, live_view, visible_rows, voice_for
 from executive.run.control import Control
 from executive.run.visitor import Progress
 from executive.speech import voice as voices
@@ -53,18 +53,18 @@ def tree_of(count, running):
 
 @pytest.mark.parametrize("running", [0, 1, 17, 38, 39])
 def test_what_runs_is_among_the_lines_that_fit(running):
-    shown = fitted(tree_of(40, running), 10).plain.splitlines()
+    shown = visible_rows(tree_of(40, running), 10).plain.splitlines()
     assert len(shown) == 10
     assert f"▶ node {running}" in shown
 
 
 def test_a_tree_that_fits_is_shown_whole():
     picture = tree_of(8, 3)
-    assert fitted(picture, 8) is picture
+    assert visible_rows(picture, 8) is picture
 
 
 def test_a_tree_at_rest_is_shown_from_its_root():
-    assert fitted(tree_of(40, None), 10).plain.splitlines()[0] == "○ node 0"
+    assert visible_rows(tree_of(40, None), 10).plain.splitlines()[0] == "○ node 0"
 
 
 def test_the_tree_under_way_is_drawn_on_a_small_terminal(compiled, make):

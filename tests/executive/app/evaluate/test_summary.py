@@ -6,7 +6,7 @@ from executive.app.evaluate.case import Case, Evidence, RunSpec, Standing
 from executive.app.evaluate.results import Evaluated
 from executive.app.evaluate.summary import (
     Rate,
-    compared,
+    comparisons_of,
     fisher,
     groups_of,
     mcnemar,
@@ -115,12 +115,12 @@ def test_fisher_of_the_lady_tasting_tea():
 
 def test_two_results_are_compared_by_the_runs_that_both_have():
     other = tuple(case(number, "failure", cause="TIMEOUT", kind=kind) for number, kind in ((1, "fetch"), (5, "fetch")))
-    both = next(iter(compared(CASES, other)))
+    both = next(iter(comparisons_of(CASES, other)))
     assert (both.paired, both.here, both.there, both.only_here, both.only_there) == (True, (1, 2), (0, 2), 1, 0)
 
 
 def test_results_without_a_run_in_common_are_compared_as_a_whole():
     other = (case(91, "success", True), case(92, "success", True))
-    found = {each.name: each for each in compared(CASES, other)}
+    found = {each.name: each for each in comparisons_of(CASES, other)}
     assert (found["all runs"].paired, found["all runs"].here, found["all runs"].there) == (False, (3, 9), (2, 2))
     assert set(found) == {"all runs", "fetch", "flat"}

@@ -9,21 +9,24 @@ from __future__ import annotations
 import logging
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
-    from executive.cli.testing.small_plant import SmallPlant
     from executive.testing.bench import SkillBench
     from executive.testing.suite import SkillTestSettings
+    from plant.simulation import Simulation
+    from plant.worlds.world import World
     from skills.api import SkillContext
     from skills.robot import Capabilities
     from skills.testing.clock import VirtualClock
     from skills.testing.robot import ScriptedRobot
 
 SUFFIX = ".skilltest.yaml"
+_ROBOT = "Alice"
 _SETTINGS: pytest.StashKey[SkillTestSettings] = pytest.StashKey()
 
 
@@ -74,12 +77,43 @@ def _settings(config: pytest.Config) -> SkillTestSettings:
     return config.stash[_SETTINGS]
 
 
+@dataclass(frozen=True)
+class SmallPlant:
+    """The simulated room: `bench` runs skills with the robot in it; its clock steps the plant."""
+
+    world: World
+    simulation: Simulation
+    bench: SkillBench
+
+
+def _small_plant(folder: Path, *, can: bool = True) -> SmallPlant:
+    """Write the world into `folder` and put the robot into it, at (-0.5, 0) and 1.7 m before the table."""
+    from executive.app.robots import shared_detector
+    from executive.testing.bench import SkillBench
+    from executive.testing.small_room import write_small_room
+    from plant.simulation import Simulation
+    from plant.worlds.world import load_world
+    from skills.estimate.costmap import LayeredCostmap
+    from skills.estimate.grid_map import load_grid_map
+    from skills.estimate.localiser import ScanMatchingLocaliser
+
+    world = load_world(write_small_room(folder, can=can))
+    simulation = Simulation(world, seed=1, robots={_ROBOT: "spot"}, visuals=False)
+    bench = SkillBench(
+        simulation.robots[_ROBOT],
+        simulation.clock,
+        localiser=ScanMatchingLocaliser(load_grid_map(world.scan_map_path), world.start),
+        costmap=LayeredCostmap(load_grid_map(world.keepout_map_path)),
+        detector=shared_detector(),
+        seed=1,
+    )
+    return SmallPlant(world, simulation, bench)
+
+
 def _plant_bench(_robot: Any, world: Any) -> SkillBench:
     """A bench in the small plant, whose files are deleted once it is built."""
-    from executive.cli.testing.small_plant import make_small_plant
-
     with tempfile.TemporaryDirectory() as folder:
-        return make_small_plant(Path(folder), can=world.can).bench
+        return _small_plant(Path(folder), can=world.can).bench
 
 
 def _spot() -> Capabilities:
@@ -149,6 +183,4 @@ def skill_context(virtual_clock: VirtualClock) -> Callable[..., SkillContext]:
 def small_plant(tmp_path: Path) -> SmallPlant:
     """Spot in one room with a table and a can, simulated: contact, noisy sensors, scan matching."""
     _spot()
-    from executive.cli.testing.small_plant import make_small_plant
-
-    return make_small_plant(tmp_path / "small_room")
+    return _small_plant(tmp_path / "small_room")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from executive.app.checker import Checked
-    from executive.app.evaluate.case import Case
+    from executive.app.evaluate.results import Case
     from executive.app.report import RunReport
     from executive.language.understand import Understanding
     from executive.mission.request import Request

@@ -23,8 +23,7 @@ from skills.quantities import Count
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from executive.app.evaluate.case import Case, Evaluation, RunSpec
-    from executive.app.evaluate.results import Evaluated, ResultsFile
+    from executive.app.evaluate.results import Case, Evaluated, Evaluation, ResultsFile, RunSpec
     from executive.app.evaluate.summary import Group, StandingRow
 
 RESULTS: Final = "results.sqlite"
@@ -212,7 +211,7 @@ def _shown(evaluation: Evaluation, found: Evaluated, kept_in: Path, console: Con
 
 def _show_cases(console: Console, found: Evaluated) -> None:
     """Show success by groups, claims against verdicts, and each run that is to be looked at with its log's folder."""
-    from executive.app.evaluate.case import Standing
+    from executive.app.evaluate.results import Standing
     from executive.app.evaluate.summary import groups_of, standing_rows, to_look_at
 
     head = ("", "runs", "success", "95 %", *(standing.column for standing in Standing))
@@ -231,7 +230,7 @@ def _show_cases(console: Console, found: Evaluated) -> None:
 
 
 def _group_row(group: Group) -> tuple[str, ...]:
-    from executive.app.evaluate.case import Standing
+    from executive.app.evaluate.results import Standing
 
     rate = group.rate
     counts = (str(group.standings.get(standing, 0)) for standing in Standing)

@@ -21,9 +21,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from executive.app.evaluate.case import Case, Evaluation, Evidence, RunSpec
 from executive.app.evaluate.evaluation import run_one
-from executive.app.evaluate.results import ResultsFile
+from executive.app.evaluate.results import Case, Evaluation, Evidence, ResultsFile, RunSpec
 from executive.app.evaluate.summary import to_page
 from executive.app.evaluate.workers import local_cluster
 from executive.app.report import RefereeReport, RunReport

@@ -21,8 +21,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.app.evaluate.case import Case, Evaluation, Evidence, RunSpec, Standing
-from executive.app.evaluate.results import Evaluated, ResultsFile
+from executive.app.evaluate.results import Case, Evaluated, Evaluation, Evidence, ResultsFile, RunSpec, Standing
 from executive.app.evaluate.workers import Pool, installed_code
 from executive.app.feasibility import refuse_impossible
 from executive.app.mission_run import return_memory, run_request

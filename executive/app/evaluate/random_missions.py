@@ -9,8 +9,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from executive.app.evaluate.case import Evaluation, RunSpec
 from executive.app.evaluate.evaluation_file import MOST_RUNS, seed_range
+from executive.app.evaluate.results import Evaluation, RunSpec
 from executive.app.feasibility import abilities_in
 from executive.app.worlds import knowledge_of, open_world
 from executive.mission.request import Request

@@ -11,8 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from scipy.stats import binomtest, fisher_exact
 
-from executive.app.evaluate.case import Case, Evidence, RunSpec, Standing
-from executive.app.evaluate.results import Evaluated
+from executive.app.evaluate.results import Case, Evaluated, Evidence, RunSpec, Standing
 from executive.view.html import render
 
 _CONFIDENCE: Final = 0.95

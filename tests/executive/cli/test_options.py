@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from executive.app.evaluate.case import RunSpec
+from executive.app.evaluate.results import RunSpec
 from executive.cli.entry import shipped_command
 from executive.cli.options import StartCommand, request_arguments, takes_request
 from executive.mission.request import Request

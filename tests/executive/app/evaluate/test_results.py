@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.app.evaluate.case import Case, Evaluation, Evidence, RunSpec
-from executive.app.evaluate.results import ResultsFile
+from executive.app.evaluate.results import Case, Evaluation, Evidence, ResultsFile, RunSpec
 from executive.app.report import RunReport
 from executive.mission.request import Request
 from skills.files.errors import InputError

@@ -2,8 +2,7 @@
 
 import pytest
 
-from executive.app.evaluate.case import Case, Evidence, RunSpec, Standing
-from executive.app.evaluate.results import Evaluated
+from executive.app.evaluate.results import Case, Evaluated, Evidence, RunSpec, Standing
 from executive.app.evaluate.summary import (
     Rate,
     comparisons_of,

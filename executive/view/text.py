@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 from py_trees.common import Status
 from rich.text import Text
@@ -11,23 +11,18 @@ from rich.text import Text
 from executive.tree.node_view import NodeView
 from executive.view.styles import NodeStyle, style_of
 
-
-@dataclass(frozen=True)
-class Line:
-    """One node as a line: the branches before it, its style, kind and name, and a note on its state."""
-
-    branches: str
-    style: NodeStyle
-    kind: str
-    name: str
-    note: str
+MANY_NODES = 80
+DRAWN_NODES = 40
+_BRANCHES, _ASCII_BRANCHES = ("├─ ", "└─ ", "│  ", "   "), ("|-- ", "`-- ", "|   ", "    ")
+_PLUMBING = frozenset({"monitor", "remember"})
 
 
 def to_text(root: NodeView, *, ascii_only: bool = False) -> str:
     """The tree as plain lines."""
+    lines = _lines(root, "", "", _ASCII_BRANCHES if ascii_only else _BRANCHES, False)
     text = "\n".join(
-        f"{line.branches}{line.style.ascii if ascii_only else line.style.symbol} {_label(line)}{_dashed(line.note)}"
-        for line in lines(root, ascii_only=ascii_only)
+        f"{branches}{style.ascii if ascii_only else style.symbol} {label}{note}"
+        for branches, style, label, note in lines
     )
     return text.encode("ascii", "replace").decode() if ascii_only else text
 
@@ -35,29 +30,25 @@ def to_text(root: NodeView, *, ascii_only: bool = False) -> str:
 def to_rich(root: NodeView, *, collapsed: bool = True) -> Text:
     """The tree with colours, for a terminal; `collapsed` hides nodes below those that succeeded or have not begun."""
     text = Text(no_wrap=True, overflow="ellipsis")
-    for n, line in enumerate(lines(root, collapsed=collapsed)):
+    for n, (branches, style, label, note) in enumerate(_lines(root, "", "", _BRANCHES, collapsed)):
         text.append("\n" if n else "")
-        text.append(line.branches, style="dim")
-        text.append(f"{line.style.symbol} ", style=line.style.rich)
-        text.append(_label(line), style=line.style.rich)
-        text.append(_dashed(line.note), style="italic")
+        text.append(branches, style="dim")
+        text.append(f"{style.symbol} ", style=style.rich)
+        text.append(label, style=style.rich)
+        text.append(note, style="italic")
     return text
 
 
-def lines(root: NodeView, *, ascii_only: bool = False, collapsed: bool = False) -> Iterator[Line]:
-    """One line for each node, parents first."""
-    pieces = ("|-- ", "`-- ", "|   ", "    ") if ascii_only else ("├─ ", "└─ ", "│  ", "   ")
-    return _lines(root, "", "", pieces, collapsed)
-
-
-def _lines(node: NodeView, own: str, below: str, pieces: tuple[str, str, str, str], collapsed: bool) -> Iterator[Line]:
+def _lines(
+    node: NodeView, own: str, below: str, pieces: Sequence[str], collapsed: bool
+) -> Iterator[tuple[str, NodeStyle, str, str]]:
+    """One line for each node, parents first: the branches before it, its style, its label, and a note on its state."""
     branch, last_branch, bar, blank = pieces
     hidden = collapsed and is_closed(node)
-    note = note_of(node)
     unseen = node.below if hidden else node.hidden
-    if unseen:
-        note = " ".join(filter(None, (note, f"({unseen} nodes)")))
-    yield Line(own, style_of(node.state), node.kind, node.name, note)
+    note = " ".join(filter(None, (note_of(node), f"({unseen} nodes)" if unseen else "")))
+    label = printable(node.name if node.kind == "skill" else f"{node.kind} {node.name}")
+    yield own, style_of(node.state), label, f" - {printable(note)}" if note else ""
     for child in () if hidden else node.children:
         last = child is node.children[-1]
         yield from _lines(
@@ -81,19 +72,6 @@ def is_closed(node: NodeView) -> bool:
 def printable(text: str) -> str:
     """The text on one line without control characters, which XML does not allow and terminals obey."""
     return "".join(" " if char in "\n\r\t" else char if char.isprintable() else "\ufffd" for char in text)
-
-
-def _label(line: Line) -> str:
-    return printable(line.name if line.kind == "skill" else f"{line.kind} {line.name}")
-
-
-def _dashed(note: str) -> str:
-    return f" - {printable(note)}" if note else ""
-
-
-MANY_NODES = 80
-DRAWN_NODES = 40
-_PLUMBING = frozenset({"monitor", "remember"})
 
 
 def fold_below(root: NodeView, depth: int) -> NodeView:
@@ -124,16 +102,13 @@ def fold_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
     return shown
 
 
-def executed_tree(root: NodeView) -> NodeView:
+def executed_tree(node: NodeView, above: NodeView | None = None) -> NodeView:
     """The nodes that ran, with their actions in their names, without those that only pass on their one child's result.
 
-    Conditions that held and stored poses are left out, too. Nodes that failed or were cancelled never are.
+    Conditions that held and stored poses are left out, too. Nodes that failed or were cancelled never are. `above` is
+    the parent of the node.
     """
-    return _ran(root, None)
-
-
-def _ran(node: NodeView, above: NodeView | None) -> NodeView:
-    below = tuple(_ran(child, node) for child in node.children if not _unseen(child))
+    below = tuple(executed_tree(child, node) for child in node.children if not _unseen(child))
     if len(below) == 1 and (node.state.cause is None or node.state.message == below[0].state.message):
         return below[0]
     return replace(node, name=node.title(above), children=below)

@@ -30,7 +30,8 @@ class Server:
         app = Starlette(routes=routes)
         config = uvicorn.Config(app, log_level="error", access_log=False, lifespan="off", **settings)
         self._socket, self._server = opened, uvicorn.Server(config)
-        self._thread = threading.Thread(target=self._serve, name="errand-server", daemon=True)
+        serve = self._serve_in_loop
+        self._thread = threading.Thread(target=lambda: asyncio.run(serve()), name="errand-server", daemon=True)
         self._thread.start()
         self._ready.wait(START_LIMIT_S)
 
@@ -49,9 +50,6 @@ class Server:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    def _serve(self) -> None:
-        asyncio.run(self._serve_in_loop())
 
     async def _serve_in_loop(self) -> None:
         self._loop = asyncio.get_running_loop()

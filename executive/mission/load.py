@@ -30,7 +30,7 @@ def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN, text: str | 
     """
     source = read_yaml(path) if text is None else parse_yaml(text, Path(path))
     document = with_parameters(source, parameters)
-    mission = validate(Mission, document).with_document(document)
+    mission = validate(Mission, document).with_place(Place(document))
     locate(mission, document, ())
     return mission
 
@@ -55,7 +55,10 @@ def for_robot(mission: Mission, robot: str, part: str | None = None) -> Mission:
     own = None if part is None or mission.parts is None else mission.parts[part]
     laid_over = {} if own is None else {key: getattr(own, key) for key in own.model_fields_set - {"after"}}
     alone = mission.model_copy(update={**laid_over, "robot": robot, "robots": None, "parts": None})
-    return alone if own is None or part is None else alone.with_part(part)
+    document = mission.document
+    if own is None or part is None or document is None:
+        return alone
+    return alone.with_place(Place(document, ("parts", part), part=True))
 
 
 def import_folders(mission: Mission) -> tuple[Path, ...]:

@@ -24,7 +24,7 @@ from executive.words.knowledge import ANYBODY, Knowledge
 from executive.words.leaf_steps import CallSkill, Do, Say, Set, UseMission
 from executive.words.mission import Mission, Parameter, QuestionPolicy
 from executive.words.policy import Policy
-from executive.words.step import Place, Step
+from executive.words.step import Step
 from executive.words.steps import ForEach, Group, Steps
 from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.files.outside import is_file
@@ -291,7 +291,7 @@ class _Resolver:
         assert place is not None and name is not None
         made = []
         for value in self._round_values(step):
-            document = round_source(place.source, (*place.path, "steps"), step.steps, name, value)
+            document = round_source(place.document, (*place.path, "steps"), step.steps, name, value)
             steps = validate(_Round, document).steps
             locate(steps, document, ("steps",))
             made.append(_group(Group.model_construct().with_place(place), self._steps(scope, steps), str(value)))
@@ -359,7 +359,7 @@ class _Resolver:
             _refuse_top_keys(used, scope.file)
             return self.mission(used, (*chain, used_path.resolve()))
         except InputError as error:
-            here = None if step.place is None else Place(step.place.source, (*step.place.path, "use")).line
+            here = None if step.place is None else step.place.line(("use",))
             raise error if here is None else error.within(here.file, here.line) from error
 
 

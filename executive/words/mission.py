@@ -13,11 +13,11 @@ from executive.words.forms import Strict
 from executive.words.knowledge import Corner
 from executive.words.policy import OnFailure, OperatorQuestion, Policy
 from executive.words.robots import RobotsFile
-from executive.words.step import Given, Scalar, Step
+from executive.words.step import Given, Placed, Scalar, Step
 from executive.words.steps import Branch, Handler, Steps, While
-from skills.files.errors import InputError, SourceLine
+from skills.files.errors import SourceLine
 from skills.files.schema import Name, Text
-from skills.files.yaml_source import KeyPath, YamlSource
+from skills.files.yaml_source import YamlSource
 from skills.quantities import Delay, Speed
 
 DEFAULT_WORLD: Final = "flat"
@@ -85,7 +85,7 @@ else:
     ]
 
 
-class _Whole(Policy):
+class _Whole(Placed):
     """The policy of a mission, or of a robot's part of it."""
 
     @field_validator("on_failure")
@@ -180,9 +180,7 @@ class Mission(_Whole):
     when: tuple[Handler, ...] | None = Field(
         default=None, description="What interrupts the mission, the most important first."
     )
-    _document: YamlSource | None = PrivateAttr(default=None)
     _notes: tuple[str, ...] = PrivateAttr(default=())
-    _part: KeyPath = PrivateAttr(default=())
 
     @model_validator(mode="before")
     @classmethod
@@ -207,7 +205,7 @@ class Mission(_Whole):
     @property
     def document(self) -> YamlSource | None:
         """The file's data and lines; None when it was not read from a file."""
-        return self._document
+        return None if self._place is None else self._place.document
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -222,7 +220,7 @@ class Mission(_Whole):
     @property
     def source(self) -> SourceLine | None:
         """The line of its name; None when it was spoken."""
-        return self.line(("name",))
+        return None if self._place is None else self._place.line(("name",))
 
     @property
     def commands(self) -> tuple[Command, ...]:
@@ -249,31 +247,3 @@ class Mission(_Whole):
         copy = self.model_copy()
         copy._notes = notes
         return copy
-
-    def with_document(self, document: YamlSource) -> Self:
-        """The same mission, which knows where it was read."""
-        copy = self.model_copy()
-        copy._document = document
-        return copy
-
-    def with_part(self, name: str) -> Self:
-        """The same mission, which is the part of this name of a file for several robots."""
-        copy = self.model_copy()
-        copy._part = ("parts", name)
-        return copy
-
-    def line(self, path: KeyPath) -> SourceLine | None:
-        """Where `path` stands in the file."""
-        document = self._document
-        return None if document is None else SourceLine(document.path, document.line(self._full(path)))
-
-    def error(self, path: KeyPath, message: str, hint: str) -> InputError:
-        """An error in what stands at `path`, for instance ("world",)."""
-        if self._document is None:
-            return InputError(message, hint=hint)
-        return self._document.error(self._full(path), message, hint)
-
-    def _full(self, path: KeyPath) -> KeyPath:
-        """The path in the file: in the robot's own part where it stands there, else at the top."""
-        own = (*self._part, *path)
-        return own if self._document is not None and own in self._document.lines else path

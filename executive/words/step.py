@@ -23,26 +23,31 @@ Fault = tuple[KeyPath, str, str]
 
 @dataclass(frozen=True)
 class Place:
-    """The place of a step in a file: the document, and the path in it."""
+    """The place of a step or a mission in a file: the document, and the path in it.
 
-    source: YamlSource
-    path: KeyPath
+    What does not stand in the `part` of one of several robots is looked for at the file's top.
+    """
 
-    @property
-    def line(self) -> SourceLine:
-        """Its line."""
-        return SourceLine(self.source.path, self.source.line(self.path))
+    document: YamlSource
+    path: KeyPath = ()
+    part: bool = False
+
+    def line(self, below: KeyPath = ()) -> SourceLine:
+        """The line of what stands at a path below."""
+        return SourceLine(self.document.path, self.document.line(self._whole(below)))
 
     def error(self, below: KeyPath, message: str, hint: str) -> InputError:
         """An error in what stands at a path below."""
-        return self.source.error((*self.path, *below), message, hint)
+        return self.document.error(self._whole(below), message, hint)
+
+    def _whole(self, below: KeyPath) -> KeyPath:
+        own = (*self.path, *below)
+        return below if self.part and own not in self.document.lines else own
 
 
-class Step(Policy):
-    """A step: its policy, and what it is to do."""
+class Placed(Policy):
+    """A step or a mission: its policy, and where it stands in a file."""
 
-    key: ClassVar[str] = ""
-    """The first key of its form, which names it in path ids."""
     _place: Place | None = PrivateAttr(default=None)
 
     @property
@@ -50,10 +55,27 @@ class Step(Policy):
         """Where it stands in a file; None when it was spoken."""
         return self._place
 
+    def error(self, below: KeyPath, message: str, hint: str) -> InputError:
+        """An error in what stands at a path below it, for instance ("world",)."""
+        return InputError(message, hint=hint) if self._place is None else self._place.error(below, message, hint)
+
+    def with_place(self, place: Place | None) -> Self:
+        """The same, which stands at a place."""
+        copy = self.model_copy()
+        copy._place = place
+        return copy
+
+
+class Step(Placed):
+    """A step: its policy, and what it is to do."""
+
+    key: ClassVar[str] = ""
+    """The first key of its form, which names it in path ids."""
+
     @property
     def source(self) -> SourceLine | None:
         """The line where it stands; None when it was spoken."""
-        return None if self._place is None else self._place.line
+        return None if self._place is None else self._place.line()
 
     @property
     def is_block(self) -> bool:
@@ -79,16 +101,6 @@ class Step(Policy):
     def faults(self) -> Iterator[Fault]:
         """What is wrong with its values by themselves."""
         yield from ()
-
-    def error(self, below: KeyPath, message: str, hint: str) -> InputError:
-        """An error in what stands at a path below the step."""
-        return InputError(message, hint=hint) if self._place is None else self._place.error(below, message, hint)
-
-    def with_place(self, place: Place | None) -> Self:
-        """The same step, which stands at a place."""
-        copy = self.model_copy()
-        copy._place = place
-        return copy
 
     def walk(self) -> Iterator[Step]:
         """Itself and all steps that it holds, those of a used mission included."""

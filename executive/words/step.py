@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import PrivateAttr, StrictBool
 
@@ -89,8 +89,8 @@ class Step(Placed):
 
     @property
     def inner_steps(self) -> tuple[Step, ...]:
-        """The steps that it holds, in order."""
-        return ()
+        """The steps that it holds, in the order of its fields."""
+        return tuple(step for name in type(self).model_fields for step in _steps_in(getattr(self, name)))
 
     @property
     def words(self) -> str:
@@ -107,6 +107,14 @@ class Step(Placed):
         yield self
         for step in self.inner_steps:
             yield from step.walk()
+
+
+def _steps_in(value: Any) -> Iterator[Step]:
+    if isinstance(value, Step):
+        yield value
+    elif isinstance(value, tuple | dict):
+        for part in value.values() if isinstance(value, dict) else value:
+            yield from _steps_in(part)
 
 
 def unreadable(path: KeyPath, read: Callable[[], object]) -> Iterator[Fault]:

@@ -66,11 +66,6 @@ class Choose(Step):
     ] = ()
 
     @property
-    def inner_steps(self) -> Steps:
-        """The steps of both branches."""
-        return (*self.then, *self.otherwise)
-
-    @property
     def words(self) -> str:
         """The condition in words."""
         return f"if {self.condition}"
@@ -123,11 +118,6 @@ class Repeat(Step):
     loop: Annotated[Loop, Field(alias="repeat", description=_ROUNDS)]
     steps: Annotated[Steps, Field(description="The steps that `repeat` repeats.")]
 
-    @property
-    def inner_steps(self) -> Steps:
-        """The steps of a round."""
-        return self.steps
-
 
 class ForEach(Step):
     """`repeat` with `for_each`: its steps are read once for each value, which they name."""
@@ -156,11 +146,6 @@ class Try(Step):
         ),
     ]
 
-    @property
-    def inner_steps(self) -> Steps:
-        """The steps of both branches."""
-        return (*self.steps, *self.otherwise)
-
 
 class Together(Step):
     """`together`: all steps side by side; done when enough of them are, then the others are stopped."""
@@ -180,11 +165,6 @@ class Together(Step):
     done_when: Literal["all", "any"] | Count | None = Field(
         default=None, description="How many steps of `together` must be done: all of them unless said."
     )
-
-    @property
-    def inner_steps(self) -> Steps:
-        """The steps side by side."""
-        return self.steps
 
     @property
     def needed(self) -> int:
@@ -293,11 +273,6 @@ class Ask(Answering):
     def text(self) -> Template:
         """The question with its values. Raises ExpressionError."""
         return Template(self.ask)
-
-    @property
-    def inner_steps(self) -> Steps:
-        """The steps of all choices."""
-        return tuple(step for steps in (self.choices or {}).values() for step in steps)
 
     @property
     def words(self) -> str:

@@ -107,7 +107,7 @@ class PlantRobot(Robot, Protocol):
         """Have such a state, before it powers up."""
 
     def power_up(self, now_s: float) -> None:
-        """Begin anew where it stands: nobody has the lease, no command runs; take readings."""
+        """Begin again where it stands: nobody has the lease, no command runs; take readings."""
 
 
 @dataclass(frozen=True)

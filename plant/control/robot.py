@@ -225,7 +225,7 @@ class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
             self._arm.hold(self._joints())
 
     def power_up(self, now_s: float) -> None:
-        """Begin anew where it stands: nobody has the lease, no command runs; take readings."""
+        """Begin again where it stands: nobody has the lease, no command runs; take readings."""
         self._now_s = now_s
         self._commands, self._leases = CommandTable(), LeaseManager(self._name)
         self._sensors.power_up(now_s)

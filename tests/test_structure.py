@@ -14,10 +14,10 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2980,
+    "executive/words": 2945,
     "executive/language": 7880,
     "executive/speech": 1606,
-    "executive/mission": 1584,
+    "executive/mission": 1587,
     "executive/tree": 7452,
     "executive/run": 3130,
     "executive/record": 964,

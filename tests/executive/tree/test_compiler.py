@@ -283,7 +283,7 @@ def test_nodes_keep_their_line(knowledge, registry, tmp_path):
         knowledge=knowledge,
         registry=registry,
     )
-    assert {node.source for node in tree.mission.children[0].walk()} == {place.line}
+    assert {node.source for node in tree.mission.children[0].walk()} == {place.line()}
 
 
 def test_an_absent_skill_and_an_empty_mission_are_refused(knowledge, registry):

@@ -11,7 +11,7 @@ import numpy as np
 from skills.api import FLOOR, Cause, ObjectObservation, Succeeded, Surface
 from skills.approach.ports import ApproachInputs, ApproachPorts
 from skills.approach.standing import Standing, free_places, go_to_one, is_comfortable, reachable
-from skills.arm.arm_skill import ArmSkill
+from skills.arm.looking_skill import LookingSkill
 from skills.detect.ports import DetectInputs
 from skills.detect.skill import Detect
 from skills.grasp.reach import body_heights_m, observed_target, reach_check
@@ -41,7 +41,7 @@ class ApproachOptions:
     good_grasp: Margin = 0.1
 
 
-class Approach(ApproachPorts, ArmSkill[ApproachInputs]):
+class Approach(ApproachPorts, LookingSkill[ApproachInputs]):
     """The skill that `ApproachPorts` declares."""
 
     Options: ClassVar[type] = ApproachOptions
@@ -55,7 +55,7 @@ class Approach(ApproachPorts, ArmSkill[ApproachInputs]):
             raise SkillFailure(Cause.PLANNING, self._why_none(seen))
         if places[0].pose != self.context.pose():
             yield from self.stow()
-            yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
+            yield from self.stand_as_usual()
             tolerances = (self.options.position_tolerance_m, self.options.yaw_tolerance_rad, self.options.speed_m_s)
             goals = [NavigateInputs(place.pose, *tolerances) for place in places[: self.options.tries]]
             yield from go_to_one(self, goals)

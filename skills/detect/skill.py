@@ -21,7 +21,7 @@ from skills.api import (
     Surface,
     Thing,
 )
-from skills.arm.arm_skill import ArmSkill
+from skills.arm.looking_skill import LookingSkill
 from skills.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
 from skills.detect.messages import (
     coverage_message,
@@ -88,7 +88,7 @@ class DetectOptions:
     around_rad: tuple[Angle, ...] = (0.7, -0.7)
 
 
-class Detect(DetectPorts, ArmSkill[DetectInputs]):
+class Detect(DetectPorts, LookingSkill[DetectInputs]):
     """The skill that `DetectPorts` declares."""
 
     Options: ClassVar[type] = DetectOptions
@@ -188,7 +188,7 @@ class Detect(DetectPorts, ArmSkill[DetectInputs]):
             yield from self._look_and_confirm(inputs, p_BT, [], raised_m=raised_m)
             if self._has_enough(inputs):
                 return
-        yield from self.stand_at(capabilities.standing_height_m, "standing as usual")
+        yield from self.stand_as_usual()
 
     def _refresh(self, inputs: DetectInputs) -> Routine[None]:
         """Look once more at what was seen last, when that is a while ago: an answer rests on fresh pictures."""

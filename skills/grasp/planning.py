@@ -23,6 +23,7 @@ LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0
 """Ways to lift, up and back towards the shoulder, the best first."""
 _SLOW_POINTS, _OTHERS_TRIED, _ASKED, _OUT_OF_REACH = 3, 3, 40, "out of reach"
 _OFF_M, _LIFT_STEP_M, _LIFT_MARGIN_M = 0.015, 0.01, 0.002
+_LEVEL = 0.5
 _ALIKE_RAD = 0.3
 """What cannot be lifted from one posture of an arm with a joint to spare cannot be from one so near to it."""
 
@@ -239,3 +240,11 @@ def _lift(scene: ArmScene, q_rad: FloatArray, around: Surroundings, arm_planner:
             continue
         return lift_B
     raise PlanningError("the arm cannot lift the object from there")
+
+
+def pull_back_B(X_BH: RigidTransform, p_BS: FloatArray) -> FloatArray:
+    """The level direction out of a grasp: against the fingers, or towards the shoulder where they point down."""
+    against = -X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
+    if np.linalg.norm(against) < _LEVEL:
+        against = (p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
+    return np.asarray(against / np.linalg.norm(against))

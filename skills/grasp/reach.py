@@ -39,9 +39,10 @@ _SURFACE_AROUND_M, _SURFACE_BAND_M, _KNOWN_ABOVE_M = 0.2, 0.06, 0.34
 WIDE: Final = 0.9
 """How far the gripper is open, as a part of all that it opens, as it reaches for an object."""
 _NARROW: Final = 0.6
+"""The same among neighbours."""
 _WIDE_PARALLEL: Final = 0.98
 _LIFTS_FAR_M, _PARTS_OF_LIFT = 0.2, (0.25, 0.5, 0.75)
-"""The same among neighbours."""
+_GAP_BESIDE_M, _LESS_OPEN_RAD = 0.045, 0.2
 
 CandidatesOf = Callable[[Target], list[GraspCandidate]]
 
@@ -99,7 +100,7 @@ class ReachCheck:
         if X_WB is None or best is None:
             return np.empty((0, 3))
         model = self.scene.model
-        along_B = np.concatenate([_along(model.points_B(q)) for q in _postures(self.scene, best, _up_B(X_WB))])
+        along_B = np.concatenate([_along(model.points_B(q)) for q in _postures(self.scene, best, up_B(X_WB))])
         along_W = along_B @ X_WB.rotation().matrix().T + X_WB.translation()
         return np.concatenate([along_W, along_W + [0.0, 0.0, _ABOVE_ARM_M]])
 
@@ -117,7 +118,7 @@ class ReachCheck:
         for boxes, opening, extra in spaces:
             self.scene.set_boxes(boxes, X_WB.inverse() @ self.X_WB)
             self.scene.set_opening(opening * self.widest)
-            best = next((each for each in reached if _postures(self.scene, each, _up_B(X_WB))), None)
+            best = next((each for each in reached if _postures(self.scene, each, up_B(X_WB))), None)
             if best is not None:
                 return best, best.cost - least + extra
         return None, np.inf
@@ -131,11 +132,11 @@ def reached_grasps(
     Contact is not looked at.
     """
     candidates = candidates_of(observed_target(seen, X_WB))
-    reached = (each for each in candidates if within_reach(model, each, _up_B(X_WB), _MARGIN_RAD))
+    reached = (each for each in candidates if within_reach(model, each, up_B(X_WB), _MARGIN_RAD))
     return list(islice(reached, _LOOKED_AT)), candidates[0].cost if candidates else np.inf
 
 
-def _up_B(X_WB: RigidTransform) -> FloatArray:
+def up_B(X_WB: RigidTransform) -> FloatArray:
     """Up in the body frame."""
     return np.asarray(X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))
 
@@ -162,6 +163,16 @@ def _along(points_B: FloatArray) -> FloatArray:
 def wide_share(gripper: GripperCapabilities) -> float:
     """How far a gripper is open, as a part of all that it opens, as it reaches for an object."""
     return WIDE if gripper.kind is GripperKind.HINGED else _WIDE_PARALLEL
+
+
+def openings(candidates: Sequence[GraspCandidate], gripper: GripperCapabilities) -> tuple[float, ...]:
+    """Openings of the gripper for the approach: wide and, as neighbours may leave no room for it, as far as needed.
+
+    The opening is about proportional to the finger's angle.
+    """
+    wide = wide_share(gripper) * gripper.widest
+    narrow = gripper.opening_for(min(each.width_m for each in candidates) + _GAP_BESIDE_M)
+    return (wide, narrow) if narrow < wide - gripper.like_turn(_LESS_OPEN_RAD) else (wide,)
 
 
 def body_heights_m(base_m: float, capabilities: Capabilities) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ is nearer than the camera's least depth has no depth, and counts as part of what
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
+from skills.arm.collision import ArmScene
 from skills.arm.kinematics import ArmModel
 from skills.grasp.candidates import Target
+from skills.grasp.planning import GraspPlan
 from skills.robot import ArmTrajectory, FloatArray, Image, Intrinsics
 
 SEARCHED_M: Final = 0.06
@@ -27,6 +29,7 @@ _BEHIND_M, _NEAREST_M = 0.03, 0.22
 _OF_HEIGHT, _LEAST_HEIGHT_M, _WINDOW_PX = 0.3, 0.004, 9
 _LOOKS_DOWN, _PER_M = 0.5, 0.5
 """A camera whose axis is as far below level sees shifts in both level directions, else only those across."""
+_AIMED_M, _FAR_OFF_M, _LEAST_OVERLAP = 0.003, 0.05, 0.5
 
 Mask = NDArray[np.bool_]
 
@@ -55,6 +58,29 @@ def seen_shift(target: Target, image: Image, X_BC: RigidTransform) -> SeenShift 
             if overlap - _PER_M * _length(middle_B + offset_B) > best.overlap - _PER_M * _length(best.offset_B):
                 best = SeenShift(middle_B + offset_B, overlap)
     return best
+
+
+Aim = tuple[FloatArray, tuple[ArmTrajectory, ArmTrajectory] | None]
+"""The offset (3,) in B by which to shift the hand, and the approach from there, or None where that is not free."""
+
+
+def aimed_approach(
+    found: SeenShift | None, plan: GraspPlan, model: ArmModel, scene_now: Callable[[], ArmScene]
+) -> Aim | None:
+    """Aims a grasp across the fingers at where the object was seen now; None when the object is not there any more."""
+    if found is None:
+        return np.zeros(3), None
+    if found.overlap < _LEAST_OVERLAP or np.linalg.norm(found.offset_B) > _FAR_OFF_M:
+        return None
+    closing_B = plan.candidate.X_BH.rotation().col(2)
+    offset_B = (found.offset_B @ closing_B) * closing_B * [1.0, 1.0, 0.0]
+    if np.linalg.norm(offset_B) < _AIMED_M:
+        return np.zeros(3), None
+    approach = [shifted(model, each, offset_B) for each in (plan.to_grasp, plan.last_bit)]
+    scene = scene_now()
+    scene.set_padding(0.0)
+    free = [each for each in approach if each is not None and scene.path_free(each.positions_rad)]
+    return offset_B, (free[0], free[1]) if len(free) == len(approach) else None
 
 
 def shifted(model: ArmModel, trajectory: ArmTrajectory, offset_B: FloatArray) -> ArmTrajectory | None:

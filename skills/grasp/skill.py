@@ -11,8 +11,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, ObjectObservation, PlanningError, Succeeded
-from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
+from skills.arm.arm_skill import GRIPPER_FORCE_N
 from skills.arm.collision import ArmScene, box_corners
+from skills.arm.looking_skill import LookingSkill
 from skills.arm.poses import (
     carry_configuration,
     close_viewpoints,
@@ -24,17 +25,17 @@ from skills.grasp.candidates import THIN_M, GraspCandidate
 from skills.grasp.close_view import LOOK_HALF_SIDE_M, SURFACE_AROUND_M, CloseView, examine, square
 from skills.grasp.in_hand import held_box, turned_in_hand
 from skills.grasp.memory import others_first, tried_grasp
-from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
+from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, pull_back_B
 from skills.grasp.ports import GraspInputs, GraspPorts, TriedGrasp
-from skills.grasp.reach import WIDE, body_heights_m, reach_check, space_about, wide_share
+from skills.grasp.reach import WIDE, body_heights_m, openings, reach_check, space_about, up_B
 from skills.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
-from skills.grasp.servo import seen_shift, shifted
+from skills.grasp.servo import Aim, aimed_approach, seen_shift
 from skills.grasp.unseen import look_into_unseen
 from skills.perception.class_forms import THING
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
 from skills.quantities import Force, Length, Margin, Turn
-from skills.robot import ArmTrajectory, FloatArray, GripperKind
+from skills.robot import FloatArray, GripperKind
 from skills.routine import Routine, SkillFailure
 from skills.world_model import IN_THE_WAY
 
@@ -43,12 +44,11 @@ _PER_KG_N, _PER_LEVER_N_M, _MOST_OF_FORCE = 12.0, 400.0, 0.95
 _RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.014, 0.12, 0.8
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
 _FEEL_S = 0.4
-_AIM_LATENCY_S, _AIMED_M, _FAR_OFF_M, _LEAST_OVERLAP = 0.1, 0.003, 0.05, 0.5
+_AIM_LATENCY_S = 0.1
 _AT_THING_M = 0.4
 _CARRY_RAD_S, _GENTLY_RAD_S, _LONG_LEVER_M = 0.9, 0.45, 0.05
 _HEIGHTS_TRIED = 2
-_GAP_BESIDE_M, _LESS_OPEN_RAD = 0.045, 0.2
-_LEVEL, _PULL_BACK_UP_M = 0.5, (0.02, 0.0)
+_PULL_BACK_UP_M = (0.02, 0.0)
 _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
 
@@ -66,7 +66,7 @@ class GraspOptions:
     pull_back_m: Margin = 0.12
 
 
-class Grasp(GraspPorts, ArmSkill[GraspInputs]):
+class Grasp(GraspPorts, LookingSkill[GraspInputs]):
     """The skill that `GraspPorts` declares."""
 
     Options: ClassVar[type] = GraspOptions
@@ -90,7 +90,7 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
             raise self._telling(failure) from failure
         try:
             yield from self._carry(plan.candidate, str(thing), view.target.height_m < THIN_M)
-            yield from self.stand_at(self.context.robot.capabilities().standing_height_m, f"carrying the {thing}")
+            yield from self.stand_as_usual(f"carrying the {thing}")
         except SkillFailure as failure:
             raise self._telling(failure) from failure
         return Succeeded(f"holding the {thing}", self._learnt())
@@ -131,23 +131,11 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
             return view, plan
         image = yield from self.picture(message, settle_s=0.0)
         X_BC = image.frames.pose("body").inverse() @ image.frames.pose(image.camera_frame)
-        scene_now, closing_B = self.scene_now([*view.boxes, *self.seen_boxes()]), plan.candidate.X_BH.rotation().col(2)
+        scene_now = self.scene_now([*view.boxes, *self.seen_boxes()])
 
-        def aim() -> tuple[FloatArray, tuple[ArmTrajectory, ArmTrajectory] | None] | None:
-            """How far to shift the hand, with the approach from there; without it where that is not free."""
+        def aim() -> Aim | None:
             found = seen_shift(view.target, image, X_BC)
-            if found is None:
-                return np.zeros(3), None
-            if found.overlap < _LEAST_OVERLAP or np.linalg.norm(found.offset_B) > _FAR_OFF_M:
-                return None
-            offset_B = (found.offset_B @ closing_B) * closing_B * [1.0, 1.0, 0.0]
-            if np.linalg.norm(offset_B) < _AIMED_M:
-                return np.zeros(3), None
-            approach = [shifted(self.model, each, offset_B) for each in (plan.to_grasp, plan.last_bit)]
-            scene = scene_now()
-            scene.set_padding(0.0)
-            free = [each for each in approach if each is not None and scene.path_free(each.positions_rad)]
-            return offset_B, (free[0], free[1]) if len(free) == len(approach) else None
+            return aimed_approach(found, plan, self.model, scene_now)
 
         aimed = yield from self.compute(aim, latency_s=_AIM_LATENCY_S, name="aim", message=message)
         if aimed is None:
@@ -240,19 +228,13 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
         message, opening = f"carrying the {seen.thing}", self._check_held(str(seen.thing), None)
         R_BH = self.model.X_BH(self.q_rad()).rotation()
         if at_thing:
-            yield from self._lift_again(f"lifting the {seen.thing}")
+            yield from self._lifted((), f"lifting the {seen.thing}")
             yield from self.try_shift_hand(-self.options.pull_back_m * R_BH.matrix()[:, 0] * [1.0, 1.0, 0.0], message)
         arm = self.arm
         yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q), message, speed_rad_s=0.9)
         yield from self.pause(0.2, message)
         self._check_held(str(seen.thing), opening)
-        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, message)
-
-    def _lift_again(self, message: str) -> Routine[None]:
-        """Lift what the gripper grips in the first way that the arm finds; where it finds none, it is carried low."""
-        for way_B in lifts(self.model, self.model.X_BH(self.q_rad()), self._up_B()):
-            if (yield from self.try_shift_hand(way_B, message)):
-                return
+        yield from self.stand_as_usual(message)
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
         """A view of the object from 0.4 m, from aside where something hides a part of it; what is around comes with it.
@@ -307,17 +289,16 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
 
     def _plan(self, view: CloseView, thing: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
         self.boxes = view.boxes
-        up_B = view.X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
         candidates = self.context.stack.grasp_planner.candidates(view.target, self.model.p_BS, self.gripper)
         candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
             raise SkillFailure(Cause.PLANNING, without_grasp(view.target, self.model.p_BS, self.gripper, thing))
-        openings_rad = self._openings_rad(candidates)
+        openings_rad = openings(candidates, self.gripper)
         scene_now, q, stack, seen = self.scene_now(), self.q_rad(), self.context.stack, self.seen_boxes()
         arm = self.context.robot.capabilities().arm
         reach_m = np.inf if arm is None else arm.max_reach_m
 
-        around = Surroundings((*view.boxes, *seen), view.target_box, up_B, view.others, thing, reach_m)
+        around = Surroundings((*view.boxes, *seen), view.target_box, up_B(view.X_WB), view.others, thing, reach_m)
 
         def planned(scene: ArmScene, opening: float, space: Surroundings) -> tuple[GraspPlan, float]:
             """A plan for a gripper that is open so far, and that opening."""
@@ -337,16 +318,6 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
         )
         yield from self.move_gripper(opening, GRIPPER_FORCE_N, "opening the gripper")
         return found
-
-    def _openings_rad(self, candidates: Sequence[GraspCandidate]) -> tuple[float, ...]:
-        """How far the gripper is open as it reaches: wide or, where neighbours leave no room for it, as far as needed.
-
-        The opening is about proportional to the finger's angle.
-        """
-        gap_m = min(each.width_m for each in candidates) + _GAP_BESIDE_M
-        wide_rad = wide_share(self.gripper) * self.widest
-        narrow_rad = self.gripper.opening_for(gap_m)
-        return (wide_rad, narrow_rad) if narrow_rad < wide_rad - self.gripper.like_turn(_LESS_OPEN_RAD) else (wide_rad,)
 
     def _take(self, view: CloseView, plan: GraspPlan, seen: ObjectObservation) -> Routine[None]:
         """Go on from the pre-grasp: close as firmly as its least mass needs, lift, weigh, close as firmly as it needs.
@@ -372,7 +343,8 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
         self.context.payload.corners_H = box_corners(self.held[0])
         self.context.payload.R_BH = X_BH.rotation()
         self._watch = self.hold_watch()
-        yield from self._lift(plan.lift_B, f"lifting the {thing}")
+        if not (yield from self._lifted([plan.lift_B], f"lifting the {thing}")):
+            raise SkillFailure(Cause.PLANNING, "the arm cannot lift the object from where it has hold of it")
         self._watch = None
         p_HO = self.held[0].X_FG.translation()
         mass_kg = yield from self.weigh(p_HO, f"lifting the {thing}")
@@ -397,7 +369,7 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
         lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - lift_B)
         try:
             down = planner.timed(planner.line(self.model, self.q_rad(), lowered), speed_rad_s=_FEEL_RAD_S)
-            yield from self.follow(down, f"setting the {thing} down again", self.held_up(-self._up_B()))
+            yield from self.follow(down, f"setting the {thing} down again", self.held_up(-up_B(self.X_WB())))
         except PlanningError:
             pass
         most = f"the arm carries {arm.max_payload_kg:.1f} kg at most"
@@ -406,7 +378,7 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
     def _to_the_ground(self, ahead_B: FloatArray, touched: bool, relax_m: float, message: str) -> Routine[None]:
         """Fingers that point down go on until they touch the surface, whose height is known to a few mm only."""
         X_BH, planner = self.model.X_BH(self.q_rad()), self.context.stack.arm_planner
-        if not touched and ahead_B @ self._up_B() < -_DOWN:
+        if not touched and ahead_B @ up_B(self.X_WB()) < -_DOWN:
             deeper = RigidTransform(X_BH.rotation(), X_BH.translation() + _FEEL_M * ahead_B)
             try:
                 path = planner.line(self.model, self.q_rad(), deeper)
@@ -418,13 +390,12 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
         if touched:
             yield from self.try_shift_hand(-relax_m * ahead_B, message)
 
-    def _lift(self, planned_B: FloatArray, message: str) -> Routine[None]:
-        """Lift as planned or, where the hand came to stand otherwise, in another way. Raises SkillFailure."""
-        others = lifts(self.model, self.model.X_BH(self.q_rad()), self._up_B())
-        for lift_B in (planned_B, *others):
+    def _lifted(self, planned_B: Sequence[FloatArray], message: str) -> Routine[bool]:
+        """Lifts as planned or, where the hand stands otherwise by now, in another way; whether the arm found one."""
+        for lift_B in (*planned_B, *lifts(self.model, self.model.X_BH(self.q_rad()), up_B(self.X_WB()))):
             if (yield from self.try_shift_hand(lift_B, message)):
-                return
-        raise SkillFailure(Cause.PLANNING, "the arm cannot lift the object from where it has hold of it")
+                return True
+        return False
 
     def _check_held(self, thing: str, opening_before_rad: float | None) -> float:
         gripper = self.context.robot.gripper()
@@ -440,7 +411,7 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
         opening, self._watch = self._check_held(thing, None), self.hold_watch()
         message = f"carrying the {thing}"
         for up_m in _PULL_BACK_UP_M:
-            way_B = self.options.pull_back_m * self._back_B(grasp) + up_m * self._up_B()
+            way_B = self.options.pull_back_m * pull_back_B(grasp.X_BH, self.model.p_BS) + up_m * up_B(self.X_WB())
             if (yield from self.try_shift_hand(way_B, message, clear_of_boxes=True)):
                 break
         R_BH = self.model.X_BH(self.q_rad()).rotation()
@@ -450,18 +421,10 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
         yield from self.pause(0.2, message)
         self._check_held(thing, opening)
 
-    def _back_B(self, grasp: GraspCandidate) -> FloatArray:
-        """The level direction out of a grasp: against the fingers, or towards the shoulder where they point down."""
-        X_BH = grasp.X_BH
-        against = -X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
-        if np.linalg.norm(against) < _LEVEL:
-            against = (self.model.p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
-        return np.asarray(against / np.linalg.norm(against))
-
     def _let_go(self, draw_back: bool = True) -> Routine[None]:
         """On failure: open the gripper, draw back from the object, stow; what does not work is left out."""
         at_object = (self._open, self._draw_back) if draw_back else ()
-        for recovery in (*at_object, self.try_stow, self._stand_down):
+        for recovery in (*at_object, self.try_stow, self.stand_as_usual):
             try:
                 yield from recovery()
             except SkillFailure:
@@ -481,9 +444,3 @@ class Grasp(GraspPorts, ArmSkill[GraspInputs]):
             if (yield from self.try_shift_hand(-distance_m * ahead, message, clear_of_boxes=clear)):
                 break
         yield from self.move_gripper(0.0, GRIPPER_FORCE_N, "closing the empty gripper")
-
-    def _stand_down(self) -> Routine[None]:
-        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
-
-    def _up_B(self) -> FloatArray:
-        return np.asarray(self.X_WB().rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))

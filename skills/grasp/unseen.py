@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from skills.api import Cause, ObjectObservation
-from skills.arm.arm_skill import ArmSkill
 from skills.arm.kinematics import ArmModel
+from skills.arm.looking_skill import LookingSkill
 from skills.arm.solid_cells import never_seen
 from skills.robot import FloatArray
 from skills.routine import Routine, SkillFailure
@@ -21,7 +21,7 @@ _NEAR_M, _FURTHEST_M, _NEAREST_M = 0.3, 1.6, 0.4
 _FEWEST = 3
 
 
-def look_into_unseen(skill: ArmSkill[Any], seen: ObjectObservation, arm_W: FloatArray) -> Routine[bool]:
+def look_into_unseen(skill: LookingSkill[Any], seen: ObjectObservation, arm_W: FloatArray) -> Routine[bool]:
     """Look once at where the arm (points, world) would be near an object and no picture has looked; whether it did.
 
     It is not done where the object is too far to see what is about it, and where the arm finds no way to look.

@@ -11,8 +11,8 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, InputsT
-from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene, Box
+from skills.arm.looking_skill import LookingSkill
 from skills.arm.poses import UP_B, carry_configuration, overview_viewpoints, towards_shoulder
 from skills.back_off.ports import BackOffInputs
 from skills.back_off.skill import BackOff
@@ -38,7 +38,7 @@ _HIGHEST_CAMERA_M = 1.4
 _STILL_HELD, _LEAST_KG = 0.5, 0.06
 
 
-class HandOverVerification(ArmSkill[InputsT]):
+class HandOverVerification(LookingSkill[InputsT]):
     """Looks whether a person has what was let go of, at rest, and stows the arm around what bears it."""
 
     def hangs_on_hand(self, held_kg: float | None, message: str) -> Routine[bool]:

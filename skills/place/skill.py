@@ -14,8 +14,9 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.approach.standing import first_reachable_spot, free_places, go_to_one
-from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill, Goal
+from skills.arm.arm_skill import GRIPPER_FORCE_N, Goal
 from skills.arm.collision import ArmScene, Box, box_corners
+from skills.arm.looking_skill import PICTURE_LATENCY_S, LookingSkill
 from skills.arm.poses import carry_configuration, overview_viewpoints, tucked_configuration
 from skills.arm.solid_cells import CELL_M
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
@@ -73,7 +74,7 @@ class PlaceOptions:
     moves: Tries = 2
 
 
-class Place(PlacePorts, ArmSkill[PlaceInputs]):
+class Place(PlacePorts, LookingSkill[PlaceInputs]):
     """The skill that `PlacePorts` declares."""
 
     Options: ClassVar[type] = PlaceOptions
@@ -97,9 +98,9 @@ class Place(PlacePorts, ArmSkill[PlaceInputs]):
         try:
             yield from self._put_down(surface, held, carried)
         except SkillFailure:
-            yield from self._stand_as_usual()
+            yield from self.stand_as_usual()
             raise
-        yield from self._stand_as_usual()
+        yield from self.stand_as_usual()
         return Succeeded(f"put the object down on the {surface.name}")
 
     def _put_down(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[None]:
@@ -112,9 +113,6 @@ class Place(PlacePorts, ArmSkill[PlaceInputs]):
         yield from self._let_go()
         yield from self._check(surface, spot_W, [put_down])
         yield from self.stow()
-
-    def _stand_as_usual(self) -> Routine[None]:
-        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
 
     def run_again(self, inputs: PlaceInputs) -> Routine[Succeeded]:
         """With an empty gripper: draw the hand back, and look whether the object stands where it was to be put."""
@@ -133,7 +131,7 @@ class Place(PlacePorts, ArmSkill[PlaceInputs]):
             yield from self._let_go()
         yield from self._check(surface, spot_W[:2])
         yield from self.stow()
-        yield from self._stand_as_usual()
+        yield from self.stand_as_usual()
         return Succeeded(f"the object stood on the {surface.name} already")
 
     def _carried(self) -> RotationMatrix:
@@ -170,7 +168,7 @@ class Place(PlacePorts, ArmSkill[PlaceInputs]):
                 yield from self.move_to(
                     lambda scene, q: carry_configuration(scene, arm, carried, q), message, speed_rad_s=0.9
                 )
-            yield from self._stand_as_usual()
+            yield from self.stand_as_usual()
             spot_W = yield from self._go_before(spaced_spots(others)[:_OTHER_SPOTS], surface, held)
 
     _clear_of: tuple[tuple[float, float, float], ...] = ()

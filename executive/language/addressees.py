@@ -224,10 +224,17 @@ class _Parting:
             self._add(said)
             now = self.found[-1].who
             who = now if found.kind == "wait" or self.address is None else self.address
-            self.found.append(Saying(who, "", joint, behind=self._behind(found)))
+            behind = None if found.who.lower() in _SOMEBODY else self.calls.meant(found.who)
+            behind = behind or next((one.who for one in reversed(self.found) if one.who is not None), None)
+            if behind is None:
+                raise RefusalError(f"who is '{found.who}'? say the robot's name", [found.who])
+            self.found.append(Saying(who, "", joint, behind=behind))
             return
         who = self._who(found)
-        said, opener = (said, "") if found.kind == "past" else self._split_opener(said)
+        bare, opener = said.strip(" ,"), ""  # a condition at its end is for what follows: "if there is a coke,"
+        match = self.calls.forms.opener.search(bare) if found.kind != "past" else None
+        if match is not None and not self.calls.forms.opened.search(match[1]):
+            said, opener = bare[: match.start()], match[1]
         self._add(said)
         last = self.found[-1]
         begun = Saying(
@@ -242,14 +249,6 @@ class _Parting:
         self.found.append(begun)
         self.address = who if found.kind == "call" else self.address
 
-    def _split_opener(self, text: str) -> tuple[str, str]:
-        """The text, and the condition at its end that is for what follows: "if there is a coke,"."""
-        bare = text.strip(" ,")
-        match = self.calls.forms.opener.search(bare)
-        if match is None or self.calls.forms.opened.search(match[1]):
-            return text, ""
-        return bare[: match.start()], match[1]
-
     def _add(self, more: str) -> None:
         """Add to the text of the last part."""
         last = self.found[-1]
@@ -261,15 +260,6 @@ class _Parting:
         if found.who.lower() in _YOU:
             return self.calls.meant("the other robot", named) if self.address is None else self.address
         return self.calls.meant(found.who, self.address if isinstance(self.address, tuple) else named[-1:])
-
-    def _behind(self, found: _Found) -> Who:
-        """Whose parts are to be done before."""
-        if found.who.lower() not in _SOMEBODY:
-            return self.calls.meant(found.who)
-        last = next((one.who for one in reversed(self.found) if one.who is not None), None)
-        if last is None:
-            raise RefusalError(f"who is '{found.who}'? say the robot's name", [found.who])
-        return last
 
     def _sentences(self) -> Iterator[Saying]:
         """The parts that say something; a sentence behind a robot's part is again for the one that is spoken to."""

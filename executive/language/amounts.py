@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import cache
 from typing import Final
 
 from executive.language.lexicon import Patterns, any_of, lexicon
 
-
-@cache
-def _number_pattern() -> str:
-    words = any_of(word for word in lexicon().numbers if word not in ("couple", "dozen"))
-    return rf"(?:\d+(?:\.\d+)?|(?:{words})(?:[ -](?:{words}))?)"
-
-
-_FORMS: Final = Patterns("amounts.yaml", words={"number": _number_pattern()})
+_WORDS: Final = any_of(word for word in lexicon().numbers if word not in ("couple", "dozen"))
+_NUMBER: Final = rf"(?:\d+(?:\.\d+)?|(?:{_WORDS})(?:[ -](?:{_WORDS}))?)"
+_FORMS: Final = Patterns("amounts.yaml", words={"number": _NUMBER})
 AMOUNTS: Final = {name: _FORMS.text(name) for name in ("span", "times", "share")}
 """What stands for them in other tables."""
 _NAMED: Final = {"noon": 12, "midday": 12, "midnight": 0}
 _UNITS_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
+_SPANS_S: Final = {
+    **{"half hour": 1800.0, "hour": 3600.0, "minute": 60.0, "other minute": 120.0},
+    **{"quarter": 900.0, "three quarters of an hour": 2700.0},
+}
 
 
 @dataclass(frozen=True)
@@ -65,14 +63,9 @@ def times_of(text: str) -> int | None:
 
 def seconds_of(text: str) -> float | None:
     """How long a span is (s)."""
-    words = text.lower().strip()
-    fixed = {"half hour": 1800.0, "hour": 3600.0, "minute": 60.0, "other minute": 120.0}
-    if words in fixed:
-        return fixed[words]
-    if re.fullmatch(r"(?:a )?quarter(?: of an)? hour", words):
-        return 900.0
-    if words == "three quarters of an hour":
-        return 2700.0
+    words = re.sub(r"^(?:a )?quarter(?: of an)? hour$", "quarter", text.lower().strip())
+    if words in _SPANS_S:
+        return _SPANS_S[words]
     match = re.fullmatch(r"(half an?|a couple of|.+?) ?(and a half )?([smh])[a-z]*( and a half)?", words)
     if match is None:
         return None

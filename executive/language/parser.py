@@ -311,16 +311,12 @@ class WordRows(Mapping[int, int]):
         if key not in self._searched:
             if len(self._searched) >= _SEARCHES or key.bit_length() <= 32:  # short keys could be part of a longer one
                 return self._all.get(key)
-            self._searched[key] = self._found(key)
+            at = self._data.find(_KEY_OF_64_BITS + key.to_bytes(8, "big"))
+            first = self._data[at + 9]
+            more = self._data[at + 10 : at + 10 + first - 0xCB]  # 0xcc is followed by 1 byte, 0xcd by 2
+            row = first if first <= _LARGEST_IN_A_BYTE else int.from_bytes(more, "big")
+            self._searched[key] = row if at >= 0 else None
         return self._searched[key]
-
-    def _found(self, key: int) -> int | None:
-        at = self._data.find(_KEY_OF_64_BITS + key.to_bytes(8, "big"))
-        if at < 0:
-            return None
-        first = self._data[at + 9]
-        length = first - 0xCB  # 0xcc is followed by 1 byte, 0xcd by 2
-        return first if first <= _LARGEST_IN_A_BYTE else int.from_bytes(self._data[at + 10 : at + 10 + length], "big")
 
     def __iter__(self) -> Iterator[int]:
         return iter(self._all)

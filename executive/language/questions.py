@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import Enum
 from typing import Any, Final
 
@@ -44,13 +44,7 @@ class ClarifyingQuestion:
 
     def to_json(self) -> dict[str, Any]:
         """The question as JSON values."""
-        return {
-            "text": self.text,
-            "slot": self.slot.value,
-            "candidates": list(self.candidates),
-            "default": self.default,
-            "heard": self.heard,
-        }
+        return {**asdict(self), "slot": self.slot.value, "candidates": list(self.candidates)}
 
 
 Answerer = Callable[[ClarifyingQuestion], str | None]

@@ -146,9 +146,6 @@ class Steps:
         check_feasible(trace.resolved, self.knowledge)
         return trace
 
-    def _frame(self, trace: Trace) -> Trace:
-        return replace(trace, frames=command_frames(trace.resolved))
-
     def _command(self, trace: Trace) -> Trace:
         if self.knowledge is None:
             return replace(trace, commands=tuple(map(spoken_command, trace.frames)))
@@ -177,6 +174,6 @@ _STEPS: Final[dict[str, Callable[[Steps, Trace], Trace]]] = {
     "understanding": Steps._check,
     "reference": Steps._refer,
     "feasibility": Steps._check_feasible,
-    "command frames": Steps._frame,
+    "command frames": lambda _, trace: replace(trace, frames=command_frames(trace.resolved)),
     "grounding": Steps._command,
 }

@@ -80,7 +80,7 @@ def read_actions(
         before = [each for each in (clause.subject, clause.verb) if each is not None]
         gives = recipient is not None and not _says_to_whom(clause)
         for action in _actions(clause):
-            goal = recipient if gives and action.verb.split()[:1] and action.verb.split()[0] in _GIVING else action.goal
+            goal = recipient if gives and action.verb.partition(" ")[0] in _GIVING else action.goal
             action = replace(action, said=spoken_words([*before, *clause.items]), anew=anew, goal=goal)
             lacks = action.unknown == (action.verb,) and not action.objects and action.kind in _ELIDING
             if told and lacks and (goal is not None or action.kind is VerbKind.FIND):

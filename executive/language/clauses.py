@@ -100,20 +100,17 @@ def split(text: str, robots: tuple[str, ...] = ()) -> Split:
     Raises RefusalError: it is not clear which of the robots are meant, or it says what one is not to do.
     """
     listener, parts = addressees(robots).parts(text) if len(robots) > 1 else (None, (Saying(None, text),))
-    found = (replace(clause, part=part) for part in parts for clause in _by_cues(part.text))
+    found: list[Clause] = []
+    for part in parts:
+        said = smoothed(part.text)
+        for form, meant in read_table("structures.yaml")["reworded"]:
+            said = CLAUSES.compiled(form).sub(meant, said)
+        found += (replace(clause, part=part) for clause in cut(said))
     return Split(tuple(found), listener)
 
 
-def _by_cues(text: str) -> tuple[Clause, ...]:
-    """The clauses of a text for one addressee, by the words that join them and their cues."""
-    text = smoothed(text)
-    for said, meant in read_table("structures.yaml")["reworded"]:
-        text = CLAUSES.compiled(said).sub(meant, text)
-    return cut(text)
-
-
 def cut(text: str) -> tuple[Clause, ...]:
-    """The same of a text as it stands."""
+    """The clauses of a text for one addressee as it stands, by the words that join them and their cues."""
     cuts = list(_cuts(text))
     ends = [*(start for start, _ in cuts[1:]), len(text)]
     found = [_clause(text, joint, end) for joint, end in zip(cuts, ends, strict=True)]
@@ -157,11 +154,8 @@ def _kind(text: str) -> tuple[Cue, str] | None:
 
 def cue_behind(text: str) -> Behind | None:
     """The first thing that stands behind what is to be done in a clause, so that it decides or repeats that."""
-    found = [
-        (match.start(), Cue(kind), match)
-        for kind, each in CLAUSES.mapping("behind")
-        for match in each.finditer(text, 1)
-    ]
+    forms = CLAUSES.mapping("behind")
+    found = [(match.start(), Cue(kind), match) for kind, form in forms for match in form.finditer(text, 1)]
     found = [one for one in found if one[1] is not Cue.IF or not CLAUSES.asks_before.search(text[: one[0]])]
     if not found:
         return None

@@ -161,7 +161,6 @@ def _branches(head: TokenRow, tokens: Sequence[TokenRow], indent: str) -> Iterat
 
 def explanation_lines(explained: Explanation) -> Iterator[str]:
     """All steps as lines, a heading before each; steps that were not reached are left out."""
-    refused = "" if explained.refused_at is None else f"refused at {explained.refused_at!r}"
     sections: dict[str, Sequence[str]] = {
         "heard": [explained.text],
         "in plain words": [explained.plain] if explained.plain else [],
@@ -175,7 +174,7 @@ def explanation_lines(explained: Explanation) -> Iterator[str]:
         "notes": explained.notes,
         "commands": explained.commands,
         "mission": explained.mission,
-        refused: [explained.reason or ""] if refused else [],
+        f"refused at {explained.refused_at!r}": [] if explained.refused_at is None else [explained.reason or ""],
     }
     for title, lines in sections.items():
         yield from (f"{title}:", *(f"  {line}" for line in lines)) if lines else ()

@@ -106,7 +106,9 @@ class _Reader:
                 part = replace(part, text=f"{told[0].part.text.rstrip(' .')}. {part.text}")
                 clauses = (*told, replace(clauses[0], joint=". "), *clauses[1:])
             one = self._read(part, clauses, read, memory)
-            if one.meaning.refused_as is RefusalKind.NOTHING_TO_DO and number < len(parts) - 1:
+            refusal = None if one.meaning.trace is None else one.meaning.trace.refusal
+            tells_only = refusal is not None and refusal.kind is RefusalKind.NOTHING_TO_DO
+            if tells_only and number < len(parts) - 1:
                 told = (replace(clauses[0], part=part), *clauses[1:])
                 continue
             self._refuse_as_person(one.part.text)
@@ -124,7 +126,9 @@ class _Reader:
         changes_hands = bool(before) and before[-1].part.who != part.who
         if part.otherwise and changes_hands:
             raise RefusalError("what one robot finds cannot decide what another does; say it as two requests")
-        memory = _memory_to_hand_on(before[-1].meaning) if changes_hands else memory
+        if changes_hands:  # things are where they were put, or looked for
+            memory, place = before[-1].meaning.memory, _where(before[-1].meaning)
+            memory = memory if memory is None or place is None else replace(memory, where=place, place=place)
         if changes_hands and re.search(_IT, part.text):
             part = replace(part, text=re.sub(_FROM_THERE, "", part.text))
             clauses = [replace(clause, text=re.sub(_FROM_THERE, "", clause.text)) for clause in clauses]
@@ -222,12 +226,6 @@ def _share(one: Who | None, other: Who) -> bool:
     if isinstance(one, tuple) and isinstance(other, tuple):
         return bool(set(one) & set(other))
     return one is not None
-
-
-def _memory_to_hand_on(meant: Understanding) -> Memory | None:
-    """What was spoken of, for another robot: things are where they were put, or looked for."""
-    memory, place = meant.memory, _where(meant)
-    return memory if memory is None or place is None else replace(memory, where=place, place=place)
 
 
 def _moved(before: Understanding, meant: Understanding) -> Location | None:

@@ -71,6 +71,10 @@ class Reader:
         strange = tuple(name for name in spoken if known and not _knows(known, name))
         return Reading(meant, fits=not strange, suspects=strange)
 
+    def calls(self, text: str) -> bool:
+        """Whether a robot is called in `text`."""
+        return self.read(text).meaning.addressed
+
     def _called(self, text: str) -> Address:
         """Which robot is called in `text`, its name perhaps misspelled, and the rest of the text."""
         for name in self.robots:

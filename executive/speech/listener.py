@@ -85,8 +85,7 @@ class Listener:
             return None
         text, meant = best.text, best.meaning
         if meant.addressed:
-            calls = lambda said: self.reader.read(said).meaning.addressed  # noqa: E731
-            text = opening_as_heard(recognition, text, self.reader.robots, calls)
+            text = opening_as_heard(recognition, text, self.reader.robots, self.reader.calls)
             meant = meant if text == best.text else self.reader.read(text).meaning
         return HeardUtterance(utterance.start_s, utterance.end_s, text, meant)
 

@@ -9,12 +9,13 @@ from typing import Final
 
 from executive.language.amounts import AMOUNTS, seconds_of, share_of, time_of
 from executive.language.clauses import CLAUSES
-from executive.language.items import Chunk, verb
+from executive.language.indirect import OBJECTS
+from executive.language.items import Adverb, Chunk, Whether, verb
 from executive.language.lexicon import Patterns, any_of
 from executive.language.questions import RefusalError, RefusalKind, Slot, which
 from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
-from executive.language.structure.plain import PlainReader, State, Supposed, behind_preposition
+from executive.language.structure.plain import IS, IT, PlainReader, State, Supposed, behind_preposition
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
@@ -194,7 +195,8 @@ def _look(words: str, state: State, reader: PlainReader) -> Supposed:
     match = _P.fullness.fullmatch(re.sub(r"n't\b", " not", words))
     if match is None:
         return reader.check(words, state)
-    found = reader.anything_on(match["on"] or match["what"], words, state)
+    place = behind_preposition(reader.items_of(match["on"] or match["what"]), "on")
+    found = reader.look_by_items((verb("find"), Chunk(OBJECTS), *place), words, state)
     empty = (match["how"] or "").lower() in ("empty", "free", "bare", "clear")
     return found.denied(words) if empty != bool(match["not"]) else found
 
@@ -208,7 +210,7 @@ def _seen(match: re.Match[str], words: str, state: State, reader: PlainReader) -
     elif looks and state.at is not None and reader.is_somebody(match["what"], state):
         found = reader.look(match["what"], state.at, words, state)
     elif re.fullmatch(r"it there", what, re.IGNORECASE):
-        found = reader.it_is_there(words, state)
+        found = reader.look_by_items((verb("check"), Whether(), IT, IS, Adverb(here=False)), words, state)
     else:
         found = reader.exists(what, words, state)
     return found.denied(words) if match["not"] else found

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.language.actions import Action
-from executive.language.indirect import OBJECTS
 from executive.language.items import Adverb, Being, Chunk, Item, Whether, verb
 from executive.language.lexicon import PrepositionRole, lexicon
 from executive.language.nouns import NounKind
@@ -104,7 +103,7 @@ def behind_preposition(items: Sequence[Item], preposition: str) -> tuple[Item, .
 
 
 IT: Final = Chunk(Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),)))
-_IS: Final = Being("is", existential=False, asked=False)
+IS: Final = Being("is", existential=False, asked=False)
 _THERE_IS: Final = Being("there is", existential=True, asked=False)
 
 
@@ -170,20 +169,10 @@ class PlainReader:
         """Whether there is what is named, or is not ("no beer in the hall"); `text` says it."""
         return self.check(what, state, (_THERE_IS,), said=text)
 
-    def it_is_there(self, text: str, state: State) -> Supposed:
-        """Whether a thing that was spoken of is where that was."""
-        return self.look_by_items((verb("check"), Whether(), IT, _IS, Adverb(here=False)), text, state)
-
-    def anything_on(self, place: str, text: str, state: State) -> Supposed:
-        """Whether anything lies in a place."""
-        return self.look_by_items(
-            (verb("find"), Chunk(OBJECTS), *behind_preposition(self.items_of(place), "on")), text, state
-        )
-
     def look(self, who: str, room: str, text: str, state: State) -> Supposed:
         """Whether somebody is in a room."""
         where = Chunk(phrase_of_name(room, NounKind.PLACE), "in", PrepositionRole.AT)
-        return self.look_by_items((verb("check"), Whether(), *self.items_of(who), _IS, where), text, state)
+        return self.look_by_items((verb("check"), Whether(), *self.items_of(who), IS, where), text, state)
 
     def look_by_items(self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()) -> Supposed:
         """The condition that the looks of some items make; `text` says it."""

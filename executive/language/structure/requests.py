@@ -163,8 +163,7 @@ def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser
 
 def speech_to(who: str, text: str, knowledge: Knowledge) -> Said:
     """Telling somebody something. Raises RefusalError: nobody of that name is known, or it cannot be said for them."""
-    match = _of_world(knowledge).who.fullmatch(who)
-    if match is None:
+    if (match := _of_world(knowledge).who.fullmatch(who)) is None:
         raise RefusalError(f"I do not know to whom to say it: '{who}'", [who])
     return Said(_told(text), _listener(match))
 
@@ -265,11 +264,6 @@ def _what(match: re.Match[str], text: str, knowledge: Knowledge) -> Asked:
     return Asked(spoken, _listener(match), tuple(f"a {name}" for name in names))
 
 
-def without_article(choice: str) -> str:
-    """The choice without its article."""
-    return re.sub(r"^(?:a|an|some|the|any|another) ", "", choice, flags=re.IGNORECASE)
-
-
 def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, State] | None:
     """A step for each person to whom something is brought; None where it is brought to nobody of that kind.
 
@@ -300,14 +294,8 @@ def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, S
     return tuple(steps), begun
 
 
-def search_everywhere(text: str, state: State, reader: PlainReader) -> PlainReading | None:
-    """A look over all rooms; None where the text asks for none. Raises RefusalError: for what is unclear."""
-    match = next((found for form in ACTS.each("looks") if (found := form.fullmatch(text)) is not None), None)
-    return None if match is None else search_for(match["what"], state, reader)
-
-
 def search_for(what: str, state: State, reader: PlainReader) -> PlainReading:
-    """Looking for something or somebody wherever they may be. Raises RefusalError."""
+    """Looking for something or somebody in all rooms. Raises RefusalError: for what is unclear."""
     reading = reader.commands_of(what, state, (verb("find"),))
     finds = [command for command in reading.commands if command.task is Task.FIND]
     if len(finds) != len(reading.commands) or re.search(r"\b(?:in|on|at|near)\b", what):

@@ -9,7 +9,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.clauses import ACTS, Behind, Clause, Cue, cue_behind, cut, split
+from executive.language.clauses import ACTS, Clause, Cue, cue_behind, cut, split
 from executive.language.items import Adverb, Chunk, verb
 from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
@@ -27,13 +27,11 @@ from executive.language.structure.requests import (
     charging_in,
     for_everyone,
     question_in,
-    search_everywhere,
     search_for,
     speech_in,
     speech_to,
     template,
     wait_in,
-    without_article,
 )
 from executive.language.structure.row import (
     ATTACHED,
@@ -145,9 +143,11 @@ class Builder(Branches):
             self._in_each(row, replace(clause, joint="", text=everywhere_said[1]))
             return at + 1
         found = cue_behind(clause.text)
-        if found is not None and not _spoken_of(found):
-            self.modified(row, clause, found)
-            return at + 1
+        if found is not None:  # unless it is a part of what is said
+            counts = found.kind in (Cue.TIMES, Cue.EVERY) and found.text
+            if not counts or re.match(r"for|until|every", found.text):
+                self.modified(row, clause, found)
+                return at + 1
         said = speech_in(clause.text, self.reader)
         if said is None:
             return None
@@ -220,7 +220,8 @@ class Builder(Branches):
 
     def _chosen(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
         """What is done for each of the choices: it is brought, where that was said."""
-        names = [without_article(choice) for choice in asked.choices]
+        article = r"^(?:a|an|some|the|any|another) "
+        names = [re.sub(article, "", choice, flags=re.IGNORECASE) for choice in asked.choices]
         if at >= len(clauses) or clauses[at].kind is not None or not ACTS.brings.match(clauses[at].text):
             return dict.fromkeys(names, ()), at
         chosen = (self._choosing(asked, n, state) for n in range(len(names)))
@@ -275,12 +276,14 @@ class Builder(Branches):
         text = clauses[at].text
         if not ACTS.every_room.search(text):
             return None
-        reading, end = search_everywhere(text, self._known(row), self.reader), at + 1
+        state, end = self._known(row), at + 1
+        looks = next((found for form in ACTS.each("looks") if (found := form.fullmatch(text))), None)
+        reading = None if looks is None else search_for(looks["what"], state, self.reader)
         follow = clauses[at + 1].text if at + 1 < len(clauses) and clauses[at + 1].kind is None else ""
         if reading is None and ACTS.goes_everywhere.fullmatch(text) is not None:
             if (match := ACTS.what_there.fullmatch(follow)) is not None:
                 what = next(filter(None, match.groups()))
-                reading, end = search_for(what, self._known(row), self.reader), at + 2
+                reading, end = search_for(what, state, self.reader), at + 2
             elif ACTS.speaks.match(follow) and cue_behind(follow) is None:
                 self._in_each(row, replace(clauses[at + 1], joint=""))
                 return at + 2
@@ -299,11 +302,6 @@ class Builder(Branches):
             reading = self.reader.commands_of_items((verb("go"), there), replace(row.state, goal=None))
             said, state = self.sequence([says], reading.state)
             self.put_done(row, ((*steps_of_commands(reading.commands), *said), state, ()))
-
-
-def _spoken_of(found: Behind) -> bool:
-    """Whether what would stand behind a clause is a part of what is said."""
-    return found.kind in (Cue.TIMES, Cue.EVERY) and bool(found.text) and not re.match(r"for|until|every", found.text)
 
 
 MOST_NESTED: Final = 2

@@ -165,7 +165,7 @@ class Remark(enum.Enum):
 def remark_of(text: str) -> Remark | None:
     """The remark that a whole sentence is; None when it is something else, such as a request."""
     words = " ".join(re.sub(r"[^\w\s']", " ", text[:_MOST_LETTERS].lower().replace("’", "'")).split())
-    return _remarks().get(words) or _remarks().get(_POLITE.sub("", words).strip())
+    return _remarks().get(words) or _remarks().get(_FORMS.polite.sub("", words).strip())
 
 
 @cache
@@ -175,8 +175,3 @@ def _remarks() -> Mapping[str, Remark]:
 
 
 _MOST_LETTERS: Final = 200
-_POLITE: Final = re.compile(
-    r"^(?:(?:please|ok|okay|hey|now|so|well|and|but|no|oh|right|just|robot|can you|could you|would you|will you"
-    r"|can you tell me|could you tell me|i want you to|i'd like you to|tell me|say)\b\s*)+(?=\w)"
-    r"|\s+(?:please|now|robot|then|again|for now|right now|at once|immediately|thank you|thanks|for a moment)$"
-)

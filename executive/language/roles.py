@@ -62,10 +62,6 @@ class Location:
         return f"{self.name} {self.within.preposition} {self.within.text}"
 
 
-_RELATIVE: Final = frozenset(
-    """that is|which is|that are|which are|that 's|which 's|who is|who are|who 's|which it is|that it is|lying|laying
-    |standing|sitting|hanging|located|situated|resting|stored""".replace("\n    ", "").split("|")
-)
 _JOINTS: Final = frozenset({",", ";", "and", "or", "then", "also", "plus", "second", "but"})
 _CLOSER: Final = (PrepositionRole.AT, PrepositionRole.BESIDE)
 _EVERYONE: Final = frozenset({"everyone", "everybody", "anyone", "anybody"})
@@ -191,7 +187,7 @@ def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Placed]:
             yield _Placed(before, joint)
         elif isinstance(item, Unknown | Whether):
             roles.unknown.append(item.word if isinstance(item, Unknown) else "if")
-        relative = isinstance(item, Separator) and (item.word in _RELATIVE or (relative and item.word == ""))
+        relative = isinstance(item, Separator) and (item.word in lexicon().relative or (relative and item.word == ""))
         joint = "" if not isinstance(item, Separator) else item.word if item.word in _JOINTS else joint
 
 

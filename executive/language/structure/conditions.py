@@ -179,13 +179,8 @@ def meeting(
     if room is None:
         raise RefusalError(f"in which room is '{words}' to be seen? Name it", [words])
     nobody = _P.nobody.fullmatch(who) is not None
-    look = reader.look("anybody" if nobody or who.lower() in _ANY else who, room, words, state)
+    look = reader.look("anybody" if nobody or _P.anybody.fullmatch(who) else who, room, words, state)
     return replace(look, condition=Not(part=look.condition) if gone != nobody else look.condition)
-
-
-_ANY: Final = frozenset(
-    {"somebody", "someone", "anyone", "anybody", "a person", "people", "any person", "they", "a guest"}
-)
 
 
 def _look(words: str, state: State, reader: PlainReader) -> Supposed:

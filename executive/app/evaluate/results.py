@@ -67,7 +67,7 @@ class Evaluation:
 
 
 class Standing(enum.Enum):
-    """The claim of a run against the referee's verdict in words, and as the head of a column; the gravest first."""
+    """The claim of a run against the referee's verdict in words and as a column; after the first, the gravest first."""
 
     FULFILLED = "claimed and fulfilled", "fulfilled"
     FALSE_CLAIM = "claimed, not fulfilled: FALSE CLAIM", "false claims"

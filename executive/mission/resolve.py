@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -15,8 +15,7 @@ from executive.language.questions import Answerer, answer_by
 from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
 from executive.mission.load import load_mission, locate
 from executive.mission.parameters import round_source
-from executive.mission.world_names import in_world_names, unknown_names
-from executive.words.command import START, Command, Task
+from executive.words.command import START, TIME_UNITS_S, Command, Task
 from executive.words.condition import CONDITIONS, RANGES, Condition, DoorOpen, Look, LookFor, Question, ValueIs
 from executive.words.expression import Expression, ExpressionError, Value, literal
 from executive.words.forms import Strict
@@ -26,6 +25,7 @@ from executive.words.mission import Mission, Parameter, QuestionPolicy
 from executive.words.policy import Policy
 from executive.words.step import Step
 from executive.words.steps import ForEach, Group, Steps
+from skills.api import Thing
 from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.files.outside import is_file
 from skills.files.schema import validate
@@ -111,7 +111,10 @@ class _Resolver:
         scope, problems = _Scope(file, chain), Problems()
         for name, value in (file.variables or {}).items():
             with problems:
-                _refuse_large(file, name, value)
+                try:
+                    literal(value)
+                except ExpressionError as fault:
+                    raise file.error(("variables", name), fault.message, fault.hint) from fault
         for name, parameter in (file.parameters or {}).items():
             with problems:
                 self._refuse_unknown(file, name, parameter)
@@ -121,7 +124,8 @@ class _Resolver:
                 alias = name.removesuffix("_")
                 resolved[name] = self._part(scope, file.error, getattr(file, name), (alias,))
         problems.raise_any()
-        return file.model_copy(update=resolved).with_notes(self._notes())
+        notes = dict.fromkeys(note for meant in self.understood.values() for note in meant.notes)
+        return file.model_copy(update=resolved).with_notes(tuple(notes))
 
     def _steps(self, scope: _Scope, steps: Steps) -> Steps:
         """Steps in a row. Raises InputError: all that is wrong with them."""
@@ -226,10 +230,10 @@ class _Resolver:
         except ValueError as fault:
             raise error(path, str(fault), "write names in plain words") from fault
         problems = Problems()
-        for key, what, hint in unknown_names(command, self.knowledge):
+        for key, what, hint in _unknown_names(command, self.knowledge):
             problems.add(error((*path, key), what, hint))
         problems.raise_any()
-        return in_world_names(command, self.knowledge)
+        return _in_world_names(command, self.knowledge)
 
     def _person(self, error: _Error, name: str, path: KeyPath) -> str:
         """The person who is meant, perhaps anybody."""
@@ -282,9 +286,6 @@ class _Resolver:
             raise error(path, (meant.reason or _NOT_UNDERSTOOD)[:REASON_LETTERS], hint)
         return meant
 
-    def _notes(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(note for meant in self.understood.values() for note in meant.notes))
-
     def _rounds(self, scope: _Scope, step: ForEach) -> Steps:
         """One group for each value. Raises InputError."""
         place, name = step.place, step.loop.name
@@ -327,7 +328,7 @@ class _Resolver:
             return tuple(facts.surfaces) if place is None else facts.surfaces_in(place)
         inside = {place, facts.room(place)} if place is not None else set()
         people = facts.people.items()
-        return tuple(name for name, who in people if place is None or inside & {who.at, _room(who.at, facts)})
+        return tuple(name for name, who in people if place is None or inside & {who.at, facts.room(who.at)})
 
     def _refuse_unknown(self, file: Mission, name: str, parameter: Parameter) -> None:
         """Refuse a parameter that names no place, object or person of the world."""
@@ -369,14 +370,6 @@ def _group(step: Step, steps: Steps, name: str) -> Group:
     return Group.model_construct(steps=steps, name=name, **policy).with_place(step.place)
 
 
-def _refuse_large(file: Mission, name: str, value: Value) -> None:
-    """Refuse a value that is too long or too large."""
-    try:
-        literal(value)
-    except ExpressionError as fault:
-        raise file.error(("variables", name), fault.message, fault.hint) from fault
-
-
 def _refuse_decided(error: _Error, expression: str | Expression, path: KeyPath) -> None:
     """Refuse an expression that cannot be read, or compares what it reads with a value out of its range."""
     try:
@@ -384,11 +377,6 @@ def _refuse_decided(error: _Error, expression: str | Expression, path: KeyPath) 
         refuse_certain_comparisons(read, RANGES)
     except ExpressionError as fault:
         raise error(path, fault.message, fault.hint) from fault
-
-
-def _room(place: str, knowledge: Knowledge) -> str | None:
-    known = knowledge.place(place)
-    return None if known is None else knowledge.room(known)
 
 
 def _found(scope: _Scope, step: UseMission) -> Path:
@@ -416,3 +404,43 @@ def _refuse_top_keys(used: Mission, user: Mission) -> None:
         if key in used.model_fields_set and said is not None and said != getattr(user, key):
             hint = "remove it there, or say the same in both"
             raise used.error((key,), f"'{key}' of a file that is used cannot differ from that of its user", hint)
+
+
+def _unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
+    """The names that a world does not have: the key, a sentence and a hint for each."""
+
+    def unknown(kind: str, name: str, known: Sequence[str]) -> tuple[str, str]:
+        return f"unknown {kind} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
+
+    waits = command.task is Task.WAIT and command.object is not None and command.object.name in TIME_UNITS_S
+    for key, thing in (("take", command.item), ("object", None if waits else command.object)):
+        person = command.task is Task.FIND and thing is not None and knowledge.somebody(thing.name) is not None
+        if thing is not None and knowledge.thing(thing.name) is None and not person:
+            yield key, *unknown("object", thing.name, knowledge.thing_names())
+    goals = (*knowledge.place_names(), *knowledge.people, START)
+    if command.goal is not None and _goal(command.goal, knowledge) is None:
+        yield "to", *unknown("place or person", command.goal, goals)
+    if command.goal_at is not None and knowledge.place(command.goal_at) is None:
+        yield "to", *unknown("place", command.goal_at, knowledge.place_names())
+
+
+def _in_world_names(command: Command, knowledge: Knowledge) -> Command:
+    """The command in the world's own names."""
+
+    def named(thing: Thing | None) -> Thing | None:
+        known = thing and (knowledge.thing(thing.name) or knowledge.somebody(thing.name))
+        return thing and Thing(known or thing.name, thing.attributes)
+
+    return Command(
+        item=named(command.item),
+        goal=command.goal and _goal(command.goal, knowledge),
+        goal_at=command.goal_at and knowledge.place(command.goal_at),
+        task=command.task,
+        object=named(command.object),
+        item_count=command.item_count,
+        object_count=command.object_count,
+    )
+
+
+def _goal(name: str, knowledge: Knowledge) -> str | None:
+    return START if name == START else knowledge.place(name) or knowledge.person(name)

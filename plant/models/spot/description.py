@@ -46,7 +46,7 @@ def spot_urdf(*, visuals: bool = False) -> str:
     for part in facts["arm"]:
         _add_link(robot, part["link"], part, visuals=visuals)
         urdf.add_joint(robot, part["link"], parent, part["link"], part)
-        parent = "arm_wr1" if part["link"] == "arm_wr1" else part["link"]
+        parent = part["link"]
     _add_lidar(robot, facts["lidar"])
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")

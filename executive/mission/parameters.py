@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 import yaml
 
 from executive.words.expression import Value
+from executive.words.mission import Parameter
 from skills.files.errors import InputError, did_you_mean, listing, suggestion
 from skills.files.texts import json_object, plain_text
 from skills.files.yaml_scalars import scalar_of
@@ -112,27 +113,18 @@ def with_parameters(source: YamlSource, given: Given) -> YamlSource:
     return replace(source, data=data)
 
 
-@dataclass(frozen=True)
-class _Parameter:
-    """A parameter as it is declared; without a `kind` any plain value will do."""
-
-    kind: str | None
-    default: Any
-    choices: tuple[Any, ...] = ()
-
-
-def _fitting(parameter: _Parameter, value: Any, name: str, source: YamlSource, *, is_given: bool) -> Any:
+def _fitting(parameter: Parameter, value: Any, name: str, source: YamlSource, *, is_given: bool) -> Any:
     """The value as the parameter's type. Raises InputError: it is of another type, or none of the choices."""
     if value is None:
         return None
-    if parameter.kind in _TEXTS and isinstance(value, int | float) and not isinstance(value, bool):
+    if parameter.type in _TEXTS and isinstance(value, int | float) and not isinstance(value, bool):
         value = str(value)
     here = () if is_given else (DECLARED, name)
-    kind = _TYPES.get(parameter.kind or "", _SCALARS)
+    kind = _TYPES.get(parameter.type or "", _SCALARS)
     fits = isinstance(value, kind) and (bool in kind or not isinstance(value, bool))
     if not fits:
-        what = f"parameter '{name}' is a {parameter.kind}, and {str(value)[:60]!r} is none"
-        raise source.error(here, what, _number_hint(value) if kind == (int, float) else f"give it a {parameter.kind}")
+        what = f"parameter '{name}' is a {parameter.type}, and {str(value)[:60]!r} is none"
+        raise source.error(here, what, _number_hint(value) if kind == (int, float) else f"give it a {parameter.type}")
     if parameter.choices and value not in parameter.choices:
         what = f"parameter '{name}' cannot be {str(value)[:60]!r}"
         raise source.error(here, what, f"it is one of {listing(map(str, parameter.choices), last='or')}")
@@ -157,8 +149,8 @@ def round_source(source: YamlSource, steps: KeyPath, data: Any, name: str, value
     return replace(below, data=_put_in(below.data, {name: value}, below, ()))
 
 
-def _declared(source: YamlSource) -> dict[str, _Parameter]:
-    """The parameters; what is no mapping is left to the schema to refuse."""
+def _declared(source: YamlSource) -> dict[str, Parameter]:
+    """The parameters, without a type where any plain value will do; what is no mapping is left to the schema to refuse."""
     declared = source.data.get(DECLARED)
     if not isinstance(declared, dict):
         return {}
@@ -172,13 +164,13 @@ def _declared(source: YamlSource) -> dict[str, _Parameter]:
             if kind not in _TYPES:
                 hint = f"its type is one of {listing(_TYPES, last='or')}"
                 raise source.error((DECLARED, name), f"parameter '{name}' has no type", hint)
-            listed = tuple(choices) if isinstance(choices, list) else ()
-            found[name] = _Parameter(str(kind), default.get("default"), listed)
+            listed = tuple(choices) if isinstance(choices, list) else None
+            found[name] = Parameter.model_construct(type=kind, default=default.get("default"), choices=listed)
             continue
         if default is not None and not isinstance(default, _SCALARS):
             hint = "give it a text, a number, true or false, or {type: .., default: ..}"
             raise source.error((DECLARED, name), f"parameter '{name}' cannot hold {shown(default)}", hint)
-        found[name] = _Parameter(_kind(default), default)
+        found[name] = Parameter.model_construct(type=_kind(default), default=default)
     return found
 
 

@@ -17,7 +17,7 @@ LINES = {
     "executive/words": 2945,
     "executive/language": 7799,
     "executive/speech": 1609,
-    "executive/mission": 1587,
+    "executive/mission": 1550,
     "executive/tree": 7452,
     "executive/run": 3130,
     "executive/record": 964,
@@ -30,7 +30,7 @@ LINES = {
     "skills": 25284,
     "plant": 11959,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 496, 87, 27
+MODULES, ONE_IMPORTER, SAME_NAME = 495, 86, 27
 """All modules; those that one other imports; file names that stand more than once."""
 
 

@@ -21,6 +21,8 @@ from skills.quantities import bounds, likely, range_text
 
 Ranges = Mapping[str, Any]
 """The quantities of names that have one."""
+Decided = Callable[[Mapping[str, Any]], bool]
+"""The answer of a condition by the values that it reads."""
 MOST_CASES: Final = 4096
 _DAY_MIN: Final = 24 * 60
 
@@ -101,7 +103,7 @@ class _Cases:
     turns: dict[str, set[Fraction]] = field(default_factory=dict)
     part: int = 0
 
-    def of(self, condition: Condition) -> Callable[[Mapping[str, Any]], bool]:
+    def of(self, condition: Condition) -> Decided:
         """The answer of a condition by the values that it reads."""
         match condition:
             case AllOf(parts=parts):
@@ -116,7 +118,7 @@ class _Cases:
                 return self._node(expression.tree)
         return self._free()
 
-    def _node(self, node: ast.expr) -> Callable[[Mapping[str, Any]], bool]:
+    def _node(self, node: ast.expr) -> Decided:
         match node:
             case ast.BoolOp(op, values):
                 return _joined(all if isinstance(op, ast.And) else any, [self._node(each) for each in values])
@@ -124,47 +126,38 @@ class _Cases:
                 below = self._node(operand)
                 return lambda case: not below(case)
             case ast.Name(name) if name not in ("true", "false"):
-                return self._truth(name)
+                return self._read(name, [False, True], bool)
             case ast.Compare():
                 return _joined(all, [self._pair(pair) for pair in _pairs(node)])
         return self._free()
 
-    def _pair(self, pair: ast.Compare) -> Callable[[Mapping[str, Any]], bool]:
+    def _pair(self, pair: ast.Compare) -> Decided:
         """The answer of one comparison."""
-        line = _line(pair)
+        line, words = _line(pair), _words(pair)
         if line is not None and line.name is not None and line.turn is not None:
-            key = f"{line.name} {self.part}"
-            self.reads = True
-            turns = self.turns.setdefault(key, set())
+            turns = self.turns.setdefault(f"{line.name} {self.part}", set())
             turns.add(line.turn)
-            self.points[key] = _samples(turns, *_limits(line.name, self.ranges))
-            return lambda case: line.holds(case[key])
-        words = _words(pair)
+            return self._read(line.name, _samples(turns, *_limits(line.name, self.ranges)), line.holds)
         if words is not None:
             name, text, is_equal = words
-            key = f"{name} {self.part}"
-            self.reads = True
-            known = self.points.setdefault(key, ["\0"])
-            known += [] if text in known else [text]
-            return lambda case: (case[key] == text) is is_equal
+            texts = dict.fromkeys([*self.points.get(f"{name} {self.part}", ["\0"]), text])
+            return self._read(name, [*texts], lambda value: (value == text) is is_equal)
         return self._free()
 
-    def _truth(self, name: str) -> Callable[[Mapping[str, Any]], bool]:
+    def _read(self, name: str, values: list[Any], test: Callable[[Any], bool]) -> Decided:
+        """The answer of a test of what is read under a name, which may have any of these values."""
         key = f"{name} {self.part}"
-        self.reads = True
-        self.points[key] = [False, True]
-        return lambda case: bool(case[key])
+        self.reads, self.points[key] = True, values
+        return lambda case: test(case[key])
 
-    def _free(self) -> Callable[[Mapping[str, Any]], bool]:
+    def _free(self) -> Decided:
         """What may be true or false."""
         key = f" {len(self.points)}"
         self.points[key] = [False, True]
         return lambda case: bool(case[key])
 
 
-def _joined(
-    every: Callable[[Iterator[bool]], bool], parts: Sequence[Callable[[Mapping[str, Any]], bool]]
-) -> Callable[[Mapping[str, Any]], bool]:
+def _joined(every: Callable[[Iterator[bool]], bool], parts: Sequence[Decided]) -> Decided:
     return lambda case: every(part(case) for part in parts)
 
 

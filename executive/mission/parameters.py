@@ -150,7 +150,7 @@ def round_source(source: YamlSource, steps: KeyPath, data: Any, name: str, value
 
 
 def _declared(source: YamlSource) -> dict[str, Parameter]:
-    """The parameters, without a type where any plain value will do; what is no mapping is left to the schema to refuse."""
+    """The parameters; one has no type where any plain value will do. What is no mapping is left to the schema."""
     declared = source.data.get(DECLARED)
     if not isinstance(declared, dict):
         return {}

@@ -1,30 +1,21 @@
-"""Subtrees of handling objects, with the recovery that fits each cause.
+"""Taking hold of an object: stand before it, grasp it, draw the arm in, and what is done when one of these fails.
 
-| what failed | cause | what is done before the next attempt |
-|---|---|---|
-| going somewhere | PLANNING, EXECUTION | see anew what blocks the path; back off; another pose nearby |
-| finding | not seen | from aside; where such objects usually are; other surfaces (`search`) |
-| standing before it | PLANNING | see anew what stands around; back off |
-| standing before it | others | look again |
-| grasping | POSTCONDITION (slipped) | look again, take another grasp |
-| grasping | PLANNING | look again; back off and stand anew |
-| grasping | PLANNING, behind another object | move that one aside, where the mission allows it (`aside`) |
-| grasping | PRECONDITION, EXECUTION | look again |
-| grasping | any, with the object in the gripper | draw it in: it is had |
-| tucking the arm in | the object was lost | look again, on the floor as well |
-| carrying | the object was lost | see `executive.tree.nodes.fallen` |
+Going there has its own recoveries (`PlanBuilder.navigate`), so has looking for it (`executive.tree.nodes.search`), and
+what falls on the way is picked up again (`executive.tree.nodes.fallen`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
 from executive.tree.board import BesideBoard, FromBoard, FromBoardOr, pose_beside
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import can_move_aside, move_aside_plan
 from executive.tree.nodes.guard import Holds
-from executive.tree.nodes.recovery import Recovery
-from executive.tree.plan import PlanBuilder, after
+from executive.tree.nodes.recovery import Recovery, Trigger
+from executive.tree.plan import PlanBuilder
 from executive.words.geometry import inside
 from skills.api import Cause, Surface, Thing
 from skills.robot import Pose2D
@@ -33,8 +24,25 @@ ATTEMPTS: Final = 4
 LOOK_AGAIN_S: Final = 0.5
 NEARBY_M: Final = ((-0.5, 0.0), (0.0, 0.6), (0.0, -0.6))
 """Poses near a goal that will do as well, forward and left of it (m)."""
-_ANY: Final = tuple(cause for cause in Cause if cause is not Cause.ERROR)
-_NOT_PLANNING: Final = (Cause.PRECONDITION, Cause.EXECUTION, Cause.POSTCONDITION)
+_ANY: Final = frozenset(Cause) - {Cause.ERROR}
+_PLANNING: Final = frozenset({Cause.PLANNING})
+_OTHERS: Final = frozenset({Cause.PRECONDITION, Cause.EXECUTION, Cause.POSTCONDITION})
+_LOST: Final = Trigger(frozenset({Cause.PRECONDITION, Cause.EXECUTION}), "tuck", own=True)
+RECOVERIES: Final[Mapping[str, Recovery]] = {
+    "have it": Recovery((Trigger(_ANY, "grasp"),), uses=ATTEMPTS, completes=True),
+    "move aside": Recovery((Trigger(_PLANNING, "grasp"),), final=True),
+    "search": Recovery(
+        (Trigger(_OTHERS, "grasp"), Trigger(_OTHERS, "approach"), _LOST, Trigger(_PLANNING, "grasp")), 3
+    ),
+    "look again": Recovery((Trigger(_OTHERS, "grasp"), Trigger(_OTHERS, "approach"), _LOST), uses=2),
+    "plan again": Recovery((Trigger(_PLANNING, "grasp"),)),
+    "see what is around": Recovery((Trigger(_PLANNING, "approach"),)),
+    "back off": Recovery((Trigger(_PLANNING, "grasp"), Trigger(_PLANNING, "approach"))),
+}
+"""What is done before the next attempt: the first that fits the failure of a step, the object in the gripper first.
+
+A lost object is searched where one was just seen, else looked for again, on the floor as well.
+"""
 
 
 def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> NodeSpec:
@@ -84,26 +92,28 @@ def pick_up_plan(
     tuck = _tucked(builder, thing)
     steps = (approach, grasp, tuck) if seen else (search, approach, grasp, tuck)
     attempt = builder.at("pick-up").sequence(f"pick up {thing}", *steps)
-    around = builder.at("around")
-    closed_on_it = Recovery((after(*_ANY, of=grasp),), uses=ATTEMPTS, completes=True)
-    unplanned, untaken = after(Cause.PLANNING, of=approach), after(Cause.PLANNING, of=grasp)
-    lost = after(Cause.PRECONDITION, Cause.EXECUTION, of=tuck, own=True)
-    missed = (after(*_NOT_PLANNING, of=grasp), after(*_NOT_PLANNING, of=approach), lost)
-    look_again = (
-        (builder.pause("look-again", "look again", LOOK_AGAIN_S), Recovery(missed, uses=2)),
-        (builder.pause("plan-again", "look and plan again", LOOK_AGAIN_S), Recovery((untaken,))),
-    )
-    clear = Recovery((untaken,), uses=builder.move_aside, given=blocking, final=True)
-    beside = builder.at("aside")
+    around, beside = builder.at("around"), builder.at("aside")
+    work = {
+        "have it": known_held_plan(builder.at("in-hand"), thing),
+        "see what is around": around.skill("clear_costmap"),
+        "back off": around.skill("back_off"),
+    }
+    if aside:
+        work["move aside"] = move_aside_plan(beside, thing, near, blocking, surfaces, tuck_plan(beside))
+    if seen:
+        work["search"] = search
+    else:
+        work["look again"] = builder.pause("look-again", "look again", LOOK_AGAIN_S)
+        work["plan again"] = builder.pause("plan-again", "look and plan again", LOOK_AGAIN_S)
+    paths = {"approach": approach.path_id, "grasp": grasp.path_id, "tuck": tuck.path_id}
+    rules = {name: rule.of(paths) for name, rule in RECOVERIES.items() if name in work}
+    if aside:
+        rules["move aside"] = replace(rules["move aside"], uses=builder.move_aside, given=blocking)
     most = ATTEMPTS + builder.move_aside if aside else ATTEMPTS
     attempts = builder.recover(
         f"up to {most} attempts",
         attempt,
-        (known_held_plan(builder.at("in-hand"), thing), closed_on_it),
-        *(((move_aside_plan(beside, thing, near, blocking, surfaces, tuck_plan(beside)), clear),) if aside else ()),
-        *(((search, Recovery((*missed, untaken), uses=3)),) if seen else look_again),
-        (around.skill("clear_costmap"), Recovery((unplanned,))),
-        (around.skill("back_off"), Recovery((untaken, unplanned))),
+        *((work[name], rule) for name, rule in rules.items()),
         attempts=most,
         part="attempts",
         forgets=(near, tried) if seen else (key, near, tried, blocking),

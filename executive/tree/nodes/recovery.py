@@ -7,7 +7,7 @@ the attempts share on purpose.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from py_trees.behaviour import Behaviour
@@ -59,6 +59,10 @@ class Recovery:
     given: str | None = None
     final: bool = False
     completes: bool = False
+
+    def of(self, paths: Mapping[str, str]) -> Recovery:
+        """The same for nodes with these path ids, by the names that stand in its triggers."""
+        return replace(self, triggers=tuple(replace(each, node=paths[each.node or ""]) for each in self.triggers))
 
     def fits(self, attempt: Behaviour, board: Board) -> bool:
         """Whether it is for the failure of an attempt."""

@@ -21,16 +21,6 @@ def leaf_seed(run_seed: int, path_id: str) -> int:
     return int.from_bytes(digest[:4], "big")
 
 
-def never_pressed() -> str | None:
-    """The answer where there is no stop button."""
-    return None
-
-
-def no_presses() -> Mapping[str, int]:
-    """How often each button was pressed where there are none."""
-    return {}
-
-
 class Endings:
     """What a mission is to do in the end whatever happened, and could not do where it stands in the tree.
 
@@ -88,8 +78,8 @@ class RunContext(SkillContext):
     """
 
     board: Board
-    stop_pressed: Callable[[], str | None] = never_pressed
-    presses: Callable[[], Mapping[str, int]] = no_presses
+    stop_pressed: Callable[[], str | None] = lambda: None
+    presses: Callable[[], Mapping[str, int]] = dict
     day_began_s: float = 0.0
     endings: Endings = field(default_factory=Endings)
     arm_order: ArmOrder = field(default_factory=ArmOrder)

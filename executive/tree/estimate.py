@@ -128,12 +128,13 @@ class _Walk:
     warnings: list[InputError] = field(default_factory=list)
     drawn: float = 0.0
 
-    def draw(self, node: NodeSpec, charge: float) -> None:
-        """A skill draws this share of a full battery, or charges it; the one that empties it is warned of."""
-        before, self.drawn = self.drawn, 0.0 if node.name == CHARGE else self.drawn + charge
+    def draw(self, node: NodeSpec, taken: Estimate) -> Estimate:
+        """A skill draws so much of a full battery, or charges it; the one that empties it is warned of."""
+        before, self.drawn = self.drawn, 0.0 if node.name == CHARGE else self.drawn + taken.charge
         if before <= 1.0 < self.drawn:
             hint = f"charge before it (`skill: {CHARGE}`) or split the mission, or it is interrupted for the dock"
             self.warnings.append(InputError.at(node.source, "a full battery does not last until here", hint=hint))
+        return taken
 
 
 def estimate_tree(
@@ -216,17 +217,11 @@ def _remember(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
 
 
 def _skill(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    taken = _skill_alone(node, walk)
-    walk.draw(node, taken.charge)
-    return taken
-
-
-def _skill_alone(node: NodeSpec, walk: _Walk) -> Estimate:
     goal = _goal(node, walk)
     walk.written.update(node.options["outputs"].values())
     if goal is None:
         duration_s = walk.estimates.skills.get(node.name, walk.estimates.other_skill_s)
-        return Estimate(duration_s, 0.0, duration_s * walk.estimates.battery.standing_per_s)
+        return walk.draw(node, Estimate(duration_s, 0.0, duration_s * walk.estimates.battery.standing_per_s))
     try:
         route = walk.planner.route(walk.pose, goal)
     except ValueError as error:
@@ -235,7 +230,8 @@ def _skill_alone(node: NodeSpec, walk: _Walk) -> Estimate:
     walk.pose = goal
     drive = walk.estimates.drive
     duration_s = drive.overhead_s + drive.per_metre_s * route.progress_m
-    return Estimate(duration_s, route.length_m, duration_s * walk.estimates.battery.driving_per_s)
+    charge = duration_s * walk.estimates.battery.driving_per_s
+    return walk.draw(node, Estimate(duration_s, route.length_m, charge))
 
 
 def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:
@@ -311,11 +307,6 @@ def _repeated(node: NodeSpec, walk: _Walk, first: bool, begun: Estimate, times: 
     return rounds + Estimate(pauses_s, 0.0, pauses_s * walk.estimates.battery.standing_per_s)
 
 
-def _wait_until(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """Until a time of day: how long that is depends on when the mission comes to it."""
-    return Estimate().up_to(DAY_S, f"until {node.options['words']}")
-
-
 def _wait_for(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     """Until something holds: nobody knows when."""
     return _all_of(node, walk, first).up_to(math.inf, f"until {node.options['words']}")
@@ -338,19 +329,14 @@ _VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
     "choose": _one_of,
     "together": _together,
     "repeat": _rounds,
-    "wait until": _wait_until,
+    "wait until": lambda node, walk, first: Estimate().up_to(DAY_S, f"until {node.options['words']}"),
     "wait for": _wait_for,
     "timeout": _in_time,
 }
 
 
-def _begun_with_empty_hand(node: NodeSpec) -> tuple[NodeSpec, ...]:
-    """The branches of a selector, but those for what a broken grasp has left in the gripper."""
-    return tuple(child for child in node.children if child.options.get("known_as") is None)
-
-
 _EXPECTED: Final[Mapping[str, Callable[[NodeSpec], tuple[NodeSpec, ...]]]] = {
-    "selector": _begun_with_empty_hand,
+    "selector": lambda node: tuple(child for child in node.children if child.options.get("known_as") is None),
     "recover": lambda node: node.children[:1],
     "go back": lambda node: node.children[:1],
     "afterwards": lambda node: node.children[:1] if node.options["only_after_failure"] else node.children,

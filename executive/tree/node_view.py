@@ -26,14 +26,12 @@ class Port:
     on_board: bool = False
 
 
-def ports_of(spec: NodeSpec) -> tuple[Port, ...]:
+def _ports_of(spec: NodeSpec) -> Iterator[Port]:
     """The ports of a skill, or the options of any other node."""
-    if spec.kind == "skill":
-        return tuple(_skill_ports(spec.options))
-    return tuple(Port(name, plain(value)) for name, value in spec.options.items())
-
-
-def _skill_ports(options: Mapping[str, Any]) -> Iterator[Port]:
+    options = spec.options
+    if spec.kind != "skill":
+        yield from (Port(name, plain(value)) for name, value in options.items())
+        return
     skill, bound = options["skill"], options.get("inputs", {})
     types = field_types(skill.Inputs)
     for port in fields(skill.Inputs):
@@ -140,7 +138,7 @@ def node_view(spec: NodeSpec, states: Mapping[str, NodeState] | None = None) -> 
         state=known.get(spec.path_id, NodeState()),
         source=spec.source,
         children=tuple(node_view(child, known) for child in spec.children),
-        ports=ports_of(spec),
+        ports=tuple(_ports_of(spec)),
     )
 
 

@@ -29,7 +29,10 @@ def carry_plan(builder: PlanBuilder) -> NodeSpec:
     person = builder.knowledge.person(goal)
     if person is not None:
         return _hand_over_plan(builder, item, person_pose(builder, person, command.goal_at), person)
-    return _put_down_plan(builder, item, builder.place(goal))
+    place = builder.place(goal)
+    put, guards = put_down_plan(builder, item, place)
+    skills = tuple(guard.children[0] for guard in guards if guard.children[0].kind == "skill")
+    return unless_fallen(builder.at("carry-on"), item, f"to the {place}", put, guards, skills)
 
 
 def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
@@ -41,13 +44,6 @@ def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard,
     give = _holding(builder.at("give"), item, f"to {to}", hand_over, until_put_down=True)
     bring = builder.at("bring").sequence(f"bring it to {person}", way, give)
     return unless_fallen(builder.at("carry-on"), item, f"to {to}", bring, (way, give), (hand_over,))
-
-
-def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:
-    """Put down in a place; what is dropped on the way is picked up again."""
-    put, guards = put_down_plan(builder, item, place)
-    skills = tuple(guard.children[0] for guard in guards if guard.children[0].kind == "skill")
-    return unless_fallen(builder.at("carry-on"), item, f"to the {place}", put, guards, skills)
 
 
 def put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> tuple[NodeSpec, tuple[NodeSpec, ...]]:

@@ -99,7 +99,9 @@ class ForEachFound(MemoryComposite):
     def _action_ended(self, action: Behaviour) -> None:
         """Note what became of the object, and look anew."""
         seen: ObjectObservation = self.board.get(self.key)
-        elsewhere = tuple(each for each in self._noted(self.missed) if _apart_m(each, seen) > SAME_PLACE_M)
+        x, y, _ = seen.position_W
+        missed = self._noted(self.missed)
+        elsewhere = tuple(each for each in missed if math.dist(each.position_W[:2], (x, y)) > SAME_PLACE_M)
         if action.status == Status.SUCCESS:
             self.board.put(self.missed, elsewhere)
             self.board.put(self.done, (*(each for each in self._noted(self.done) if each != seen), seen))
@@ -136,11 +138,6 @@ class ForEachFound(MemoryComposite):
     def _noted(self, key: str) -> Seen:
         noted: Seen = self.board.get(key) if key in self.board else ()
         return noted
-
-
-def _apart_m(one: ObjectObservation, other: ObjectObservation) -> float:
-    """Level distance."""
-    return math.dist(one.position_W[:2], other.position_W[:2])
 
 
 def is_clearing(get: Command, bring: Command | None) -> bool:

@@ -103,7 +103,11 @@ class Interrupt(ExplainedDecorator):
         verdict = self.condition.violated(self.context)
         if isinstance(verdict, Waiting):
             self.waiting = verdict.message
-        if not isinstance(verdict, Failed) or (self._spared(mission) and not self._urgent()):
+        if not isinstance(verdict, Failed):
+            return False
+        running = (n for n in mission.iterate() if isinstance(n, SkillLeaf) and n.status == Status.RUNNING)
+        spared = any(leaf.skill_name in self.spares for leaf in running)
+        if spared and not (self.urgent and isinstance(self.urgent.violated(self.context), Failed)):
             return False
         self._why = verdict.message
         return True
@@ -123,13 +127,6 @@ class Interrupt(ExplainedDecorator):
         status = self.pass_on()
         self.message = f"{self._why}: {self.message}"
         return status
-
-    def _urgent(self) -> bool:
-        return self.urgent is not None and isinstance(self.urgent.violated(self.context), Failed)
-
-    def _spared(self, mission: Behaviour) -> bool:
-        running = (n for n in mission.iterate() if isinstance(n, SkillLeaf) and n.status == Status.RUNNING)
-        return any(leaf.skill_name in self.spares for leaf in running)
 
 
 class Interrupts(MemoryComposite):

@@ -121,11 +121,8 @@ class Answer(ExplainedDecorator):
 
 def _looked(leaves: Sequence[str], nodes: Mapping[str, Explained]) -> bool:
     """True when each of the leaves took a look, whether it saw something or nothing."""
-    return all(leaf in nodes and _took_a_look(nodes[leaf]) for leaf in leaves)
-
-
-def _took_a_look(leaf: Explained) -> bool:
-    return leaf.status == Status.SUCCESS or leaf.cause == Cause.POSTCONDITION
+    looks = [nodes.get(leaf) for leaf in leaves]
+    return all(look and (look.status == Status.SUCCESS or look.cause == Cause.POSTCONDITION) for look in looks)
 
 
 def _obstacle(nodes: Mapping[str, Explained]) -> Cause:

@@ -148,14 +148,11 @@ class SkillLeaf(ExplainedLeaf):
         values = {port: binding.read(board) for port, binding in self.inputs.items()}
         self._skill = self.skill(self.context.for_skill(self.path_id))
         self._values = self.skill.Inputs(**values)
-        if self.first is not None and self.context.arm_order.anywhere and self._has_arm():
+        if self.first is not None and self.context.arm_order.anywhere and self.context.robot.capabilities().arm:
             self._first = self.first(self.context.for_skill(f"{self.path_id}/first"))
             self._first.begin(self.first.Inputs())
         else:
             self._skill.begin(self._values)
-
-    def _has_arm(self) -> bool:
-        return self.context.robot.capabilities().arm is not None
 
     def _go_on(self) -> None:
         """The first tick after a suspension; a defect is kept, as in `initialise`."""
@@ -223,17 +220,12 @@ class SkillLeaf(ExplainedLeaf):
         try:
             return call()
         except BaseException as defect:
-            if _stops_run(defect):
-                raise
+            if type(defect) is KeyboardInterrupt or getattr(defect, "stops_run", False):
+                raise  # a robot or a tick hangs, or Ctrl-C: no defect of a skill
             trace = traceback.format_exc()
             self.context.publish(ERROR_TOPIC, {"node": self.path_id, "traceback": trace})
             text = str(defect.args[0]) if isinstance(defect, KeyError) and defect.args else str(defect)
             return Failed(Cause.ERROR, f"{self.name} raised {type(defect).__name__}: {text}")
-
-
-def _stops_run(defect: BaseException) -> bool:
-    """Whether it ends the whole run, and is no defect of a skill: Ctrl-C, or a robot or a tick that hangs."""
-    return type(defect) is KeyboardInterrupt or bool(getattr(defect, "stops_run", False))
 
 
 def refuse_stale(skill: type[Skill[Any]], success: Succeeded, context: RunContext) -> Succeeded | Failed:

@@ -88,17 +88,12 @@ def _refuse_collisions(branches: Sequence[NodeSpec], builder: PlanBuilder) -> No
     """Refuse branches that use the same part of the robot. Raises InputError."""
     users: dict[Part, int] = {}
     for number, branch in enumerate(branches, start=1):
-        for part in sorted(_used_parts(branch), key=lambda each: each.value):
+        skills = (node.options["skill"] for node in branch.walk() if node.kind == "skill")
+        for part in sorted({part for skill in skills for part in skill.uses}, key=lambda each: each.value):
             if users.setdefault(part, number) != number:
                 what = f"steps {users[part]} and {number} both use the {part.value}"
                 hint = "do them one after the other"
                 raise InputError.at(branch.source or builder.source, f"{what}, and cannot go together", hint=hint)
-
-
-def _used_parts(branch: NodeSpec) -> frozenset[Part]:
-    """The parts of the robot that skills below a node use."""
-    skills = (node.options["skill"] for node in branch.walk() if node.kind == "skill")
-    return frozenset(part for skill in skills for part in skill.uses)
 
 
 PLANS: Final[StepPlans] = {model.Together: _plan}

@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 7799,
     "executive/speech": 1609,
     "executive/mission": 1550,
-    "executive/tree": 7452,
+    "executive/tree": 7414,
     "executive/run": 3130,
     "executive/record": 964,
     "executive/store": 1684,

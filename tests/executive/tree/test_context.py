@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from executive.tree.context import leaf_seed
 from skills.detection import NoDetector, NoDetectorError
 
 
@@ -25,3 +26,8 @@ def test_without_a_detector_nothing_is_known_and_use_is_an_error(context):
     assert detector.class_names == ()
     with pytest.raises(NoDetectorError, match="field 'detector'"):
         detector.detect([])
+
+
+def test_leaf_seeds_differ_by_path_and_run_and_stay():
+    assert leaf_seed(1, "alice/a") == leaf_seed(1, "alice/a") == 885863618
+    assert len({leaf_seed(1, "alice/a"), leaf_seed(2, "alice/a"), leaf_seed(1, "alice/b")}) == 3

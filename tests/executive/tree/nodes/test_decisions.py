@@ -10,7 +10,7 @@ from executive.tree.nodes.decisions import Check, Decide, Decision, MustHold, Mu
 from executive.tree.nodes.guard import Waiting
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.tree.nodes.values import SetValues
-from executive.tree.nodes.wait import WaitFor, WaitUntilClock
+from executive.tree.nodes.wait import Pause, WaitFor, WaitUntilClock
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Look, Not, ValueIs
 from executive.words.expression import Expression, Template
 from skills.api import Cause, Failed
@@ -411,3 +411,14 @@ def test_must_not_begin_is_called_once_by_each_press(run_context, pressed):
         if found[-1]:
             watch.called()
     assert found == [False, True, False, True, False]
+
+
+def test_a_pause_lasts_on_the_robots_clock(context, clock):
+    # time  0.0 RUNNING   0.4 RUNNING   0.5 SUCCESS
+    leaf = Pause(path_id="alice/p", name="p", duration_s=0.5, clock=context.clock)
+    said = []
+    for step_s in (0.4, 0.1, 0.0):
+        leaf.tick_once()
+        said.append(leaf.status)
+        clock.advance(step_s)
+    assert said == [Status.RUNNING, Status.RUNNING, Status.SUCCESS]

@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import replace
+from types import MappingProxyType
 
 import pytest
 from py_trees.common import Status
 
-from executive.tree.nodes.fallen import Fallen
-from skills.api import Surface
+from executive.tree.nodes.fallen import Fallen, SurfacesNear
+from skills.api import Cause, Surface
 from skills.robot import Pose2D
 from skills.testing.blocks import Block
 from skills.testing.estimators import BlockCostmap
@@ -104,3 +105,37 @@ def test_it_is_set_down_where_nothing_stands_as_straight_ahead_as_may_be(
     middle = [sum(axis) / 4 for axis in zip(*context.board.get("alice/set_down").polygon_W, strict=True)]
     turn = math.radians(turn_deg)
     assert middle == pytest.approx([1.15 * math.cos(turn), 1.15 * math.sin(turn)])
+
+
+def near_plan(context, within_m, rooms=MappingProxyType({})):
+    tops = [
+        Surface("far", ((3.0, 0.0), (4.0, 0.0), (4.0, 1.0)), 0.9),
+        Surface("near", ((1.0, -1.0), (2.0, 0.0), (1.0, 1.0)), 0.9),
+    ]
+    return SurfacesNear(
+        path_id="alice/n", name="n", surfaces=tops, within_m=within_m, key="alice/near", otherwise="so what",
+        context=context, rooms=rooms,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("within_m", "names"), [(2.0, ["near"]), (5.0, ["near", "far"])])
+def test_surfaces_near_are_written_the_nearest_first(context, within_m, names):
+    leaf = near_plan(context, within_m)
+    leaf.tick_once()
+    assert leaf.status == Status.SUCCESS
+    assert [surface.name for surface in context.board.get("alice/near")] == names
+
+
+@pytest.mark.parametrize(("here", "names"), [("far", ["far"]), ("neither", ["near", "far"])])
+def test_of_a_room_with_the_robot_only_its_surfaces_are_near(context, here, names):
+    around, away = ((-1.0, -1.0), (1.0, -1.0), (0.0, 1.0)), ((8.0, 8.0), (9.0, 8.0), (9.0, 9.0))
+    leaf = near_plan(context, 5.0, {name: around if name == here else away for name in ("near", "far")})
+    leaf.tick_once()
+    assert [surface.name for surface in context.board.get("alice/near")] == names
+
+
+def test_no_surface_near_says_what_that_means(context):
+    leaf = near_plan(context, 0.5)
+    leaf.tick_once()
+    assert (leaf.status, leaf.cause) == (Status.FAILURE, Cause.POSTCONDITION)
+    assert leaf.message == "there is no surface within 0.5 m of (0.00, 0.00) m; so what"

@@ -6,6 +6,7 @@ import pytest
 from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
+from executive.tree.behaviour import Explained
 from executive.tree.nodes.guard import (
     BatteryAtLeast,
     BatteryForWork,
@@ -19,7 +20,7 @@ from executive.tree.nodes.guard import (
     Waiting,
 )
 from executive.words.policy import StaleData
-from skills.api import Cause, Failed
+from skills.api import Cause, Failed, Thing
 from skills.robot import Lease, Pose2D
 
 R, S, F = Status.RUNNING, Status.SUCCESS, Status.FAILURE
@@ -203,3 +204,132 @@ def test_the_mission_stands_while_another_holds_the_lease(context, robot):
     assert OwnLease().violated(context) is None
     robot.lease = Lease("Alice", "the tablet", 6)
     assert OwnLease().violated(context) == Waiting("the tablet holds the lease of Alice")
+
+
+R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
+
+
+class Queue(Explained, StatusQueue):
+    """A scripted leaf that says why it fails."""
+
+    def __init__(self, *statuses: Status, cause: Cause = Cause.EXECUTION) -> None:
+        super().__init__(name="queue", queue=list(statuses), eventually=S)
+        self.path_id, self.fails_with, self.stopped = "a/queue", cause, 0
+        self.clear_explanation()
+
+    def update(self) -> Status:
+        status = super().update()
+        self.cause, self.message = (self.fails_with, "slipped") if status == F else (None, "goes on")
+        return status
+
+    def terminate(self, new_status: Status) -> None:
+        self.stopped += new_status == N and self.status == R
+
+
+def ticked(root, clock, times: int, dt_s: float = 1.0) -> list[Status]:
+    statuses = []
+    for _ in range(times):
+        clock.advance(dt_s)
+        root.tick_once()
+        statuses.append(root.status)
+    return statuses
+
+
+class Flag:
+    """A condition that the test switches."""
+
+    def __init__(self) -> None:
+        self.bad = False
+        self.begun = 0
+
+    def for_run(self, context):
+        return self
+
+    def begin(self, context) -> None:
+        self.begun += 1
+
+    def violated(self, context):
+        return Failed(Cause.EXECUTION, "the flag fell") if self.bad else None
+
+
+def test_guard_halts_its_child_when_the_condition_breaks(context, clock):
+    flag, child = Flag(), Queue(R, R, R, S)
+    root = Guard(path_id="a/g", name="g", child=child, condition=flag, context=context)
+    assert ticked(root, clock, 2) == [R, R]
+    flag.bad = True
+    assert ticked(root, clock, 1) == [F]
+    assert (root.cause, root.message, child.stopped, flag.begun) == (Cause.EXECUTION, "the flag fell", 1, 1)
+
+
+def test_guard_does_not_begin_its_child_when_the_condition_is_broken_before(context, clock):
+    flag, child = Flag(), Queue(S)
+    flag.bad = True
+    root = Guard(path_id="a/g", name="g", child=child, condition=flag, context=context)
+    assert ticked(root, clock, 1) == [F]
+    assert child.status == N
+
+
+def test_guard_passes_its_child_on(context, clock):
+    root = Guard(path_id="a/g", name="g", child=Queue(R, F), condition=Flag(), context=context)
+    assert ticked(root, clock, 2) == [R, F]
+    assert (root.cause, root.message) == (Cause.EXECUTION, "slipped")
+
+
+def test_holding_lets_short_losses_pass_and_tells_long_ones(context, clock, robot):
+    # time  0.0   0.05       0.1        0.7 0.75
+    # held  yes   no         yes        no  no
+    condition = Holds("coke")
+    condition.begin(context)
+    robot.holding = True
+    assert condition.violated(context) is None
+    for dt_s, held in ((0.05, False), (0.05, True), (0.6, False)):
+        clock.advance(dt_s)
+        robot.holding = held
+        assert condition.violated(context) is None
+    clock.advance(0.05)
+    failure = condition.violated(context)
+    assert failure is not None
+    assert (failure.cause, failure.message) == (Cause.EXECUTION, "the coke was lost on the way")
+
+
+def test_holding_nothing_at_the_start_is_a_precondition(context, robot):
+    condition = Holds("coke")
+    condition.begin(context)
+    failure = condition.violated(context)
+    assert failure is not None
+    assert failure.cause is Cause.PRECONDITION
+
+
+@pytest.mark.parametrize(("until_put_down", "status"), [(False, F), (True, S)])
+def test_a_guard_contradicts_a_success_when_the_gripper_is_empty_then(context, clock, robot, until_put_down, status):
+    robot.holding = True
+    child = Queue(R, S)
+    root = Guard(path_id="a/g", name="g", child=child, condition=Holds("coke", "home", until_put_down), context=context)
+    assert ticked(root, clock, 1) == [R]
+    child.update = lambda: (setattr(robot, "holding", False), S)[1]  # it falls in the tick in which the drive ends
+    assert ticked(root, clock, 1) == [status]
+    assert root.cause is (None if until_put_down else Cause.EXECUTION)
+
+
+# Whether it is offered when it is gone from the closed gripper -> whether the guard breaks
+@pytest.mark.parametrize(("offered", "breaks"), [(False, True), (True, False)])
+def test_the_guard_leaves_an_offered_object_to_the_skill_that_offers_it(context, clock, robot, offered, breaks):
+    robot.holding = True
+    condition = Holds("coke", "home", until_put_down=True)
+    root = Guard(path_id="a/g", name="g", child=Queue(*[R] * 20), condition=condition, context=context)
+    assert ticked(root, clock, 1) == [R]
+    robot.holding, context.payload.offered = False, offered
+    assert (F in ticked(root, clock, 12)) is breaks
+
+
+def test_a_guard_takes_another_object_in_the_gripper_for_what_it_is(context, clock, robot):
+    robot.holding, context.payload.thing = True, Thing("hammer")
+    root = Guard(
+        path_id="a/g",
+        name="g",
+        child=Queue(S),
+        condition=Holds("beer", "to Robin", known_as=("beer",)),
+        context=context,
+    )
+    assert ticked(root, clock, 1) == [F]
+    assert (root.cause, root.message) == (Cause.PRECONDITION, "the gripper holds the hammer, not the beer")

@@ -7,8 +7,10 @@ from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
 from executive.tree.behaviour import Explained
-from executive.tree.nodes.policies import AskOperator, GoBack, Skip, Summary
+from executive.tree.nodes.composites import MemorySequence
+from executive.tree.nodes.policies import AskOperator, GoBack, RememberPose, Retry, Skip, Summary, Timeout
 from skills.api import Cause
+from skills.robot import Pose2D
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
 
@@ -18,13 +20,16 @@ class Queue(Explained, StatusQueue):
 
     def __init__(self, *statuses: Status, name: str = "action", cause: Cause = Cause.EXECUTION) -> None:
         super().__init__(name=name, queue=list(statuses), eventually=S)
-        self.path_id, self.fails_with = f"a/{name}", cause
+        self.path_id, self.fails_with, self.stopped = f"a/{name}", cause, 0
         self.clear_explanation()
 
     def update(self) -> Status:
         status = super().update()
         self.cause, self.message = (self.fails_with, "slipped") if status == F else (None, "goes on")
         return status
+
+    def terminate(self, new_status: Status) -> None:
+        self.stopped += new_status == N and self.status == R
 
 
 class Operator:
@@ -170,3 +175,110 @@ def test_the_summary_names_what_was_skipped(first, steps, status, says):
     root = Summary(path_id="a/summary", name="summary", child=skip(Queue(first)), steps=steps)
     assert ticked(root, 1) == [status]
     assert says in root.message
+
+
+def test_remember_pose_writes_the_pose(context):
+    leaf = RememberPose(path_id="alice/m/start", name="start", key="alice/m/pose", context=context)
+    leaf.tick_once()
+    assert leaf.status == Status.SUCCESS
+    assert context.board.get("alice/m/pose") == Pose2D(0.0, 0.0, 0.0)
+
+
+def test_remember_pose_waits_until_localised_and_gives_up(context, clock):
+    context.localiser.localised = False
+    leaf = RememberPose(path_id="alice/m/start", name="start", key="alice/m/pose", context=context, patience_s=1.0)
+    leaf.tick_once()
+    assert leaf.status == Status.RUNNING
+    clock.advance(1.1)
+    leaf.tick_once()
+    assert (leaf.status, leaf.cause) == (Status.FAILURE, Cause.PRECONDITION)
+
+
+def ticked_each_second(root, clock, times: int, dt_s: float = 1.0) -> list[Status]:
+    statuses = []
+    for _ in range(times):
+        clock.advance(dt_s)
+        root.tick_once()
+        statuses.append(root.status)
+    return statuses
+
+
+def timeout(child, clock, limit_s=1.5):
+    return Timeout(path_id="a/t", name="t", child=child, limit_s=limit_s, clock=clock)
+
+
+def retry(child, attempts=3, causes=frozenset({Cause.EXECUTION})):
+    return Retry(path_id="a/r", name="r", child=child, attempts=attempts, causes=causes)
+
+
+@pytest.mark.parametrize("last", [R, S])
+def test_timeout_fails_on_the_robots_clock_even_when_success_comes_late(clock, last):
+    # time     1   2   3      limit 1.5 s after 1 s
+    # child    R   R   R or S
+    # timeout  R   R   F
+    child = Queue(R, R, last, R)
+    root = timeout(child, clock)
+    assert ticked_each_second(root, clock, 3) == [R, R, F]
+    assert root.cause is Cause.TIMEOUT
+    assert child.status != R
+
+
+def test_timeout_stops_a_running_child(clock):
+    child = Queue(R, R, R, R)
+    ticked_each_second(timeout(child, clock), clock, 3)
+    assert child.stopped == 1
+
+
+def test_timeout_lets_success_in_time_and_failure_pass(clock):
+    assert ticked_each_second(timeout(Queue(R, S), clock), clock, 2) == [R, S]
+    root = timeout(Queue(R, R, F), clock)
+    assert ticked_each_second(root, clock, 3) == [R, R, F]
+    assert root.cause is Cause.EXECUTION
+
+
+def test_timeout_starts_anew_after_an_end(clock):
+    root = timeout(Queue(R, R, R, R, S), clock)
+    assert ticked_each_second(root, clock, 3) == [R, R, F]
+    assert ticked_each_second(root, clock, 2) == [R, S]
+
+
+def test_retry_tries_again_one_tick_later_until_it_works(clock):
+    # child  F  F  S
+    # retry  R  R  S
+    root = retry(Queue(F, F, S))
+    assert ticked_each_second(root, clock, 2) == [R, R]
+    assert "attempt 3 of 3, since slipped" in root.message
+    assert ticked_each_second(root, clock, 1) == [S]
+
+
+def test_retry_is_bounded_and_says_how_often(clock):
+    root = retry(Queue(F, F, F))
+    assert ticked_each_second(root, clock, 3) == [R, R, F]
+    assert (root.cause, root.message) == (Cause.EXECUTION, "slipped (after 3 attempts)")
+
+
+@pytest.mark.parametrize("cause", [Cause.TIMEOUT, Cause.ERROR, Cause.PRECONDITION])
+def test_retry_leaves_other_causes_alone(clock, cause):
+    root = retry(Queue(F, S, cause=cause))
+    assert ticked_each_second(root, clock, 1) == [F]
+    assert root.cause is cause
+
+
+def test_retry_begins_a_sequence_at_its_first_step(clock):
+    first, second = Queue(S, R, S), Queue(F, S)
+    root = retry(MemorySequence(path_id="a/s", name="s", children=[first, second]))
+    assert ticked_each_second(root, clock, 3) == [R, R, S]
+    assert first.status == S
+
+
+def test_retry_counts_from_one_after_an_end(clock):
+    root = retry(Queue(F, F, F, F, F, S))
+    assert ticked_each_second(root, clock, 3) == [R, R, F]
+    assert ticked_each_second(root, clock, 3) == [R, R, S]
+
+
+def test_interrupted_decorators_say_so(context, clock):
+    for root in (timeout(Queue(R, R), clock), retry(Queue(R, R))):
+        ticked_each_second(root, clock, 1)
+        root.stop(N)
+        assert (root.cause, root.children[0].status) == (Cause.CANCELLED, N)

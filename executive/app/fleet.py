@@ -63,18 +63,6 @@ class FleetMission:
     tried: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class RobotNow:
-    """A robot as the auction sees it: where it is free next (world frame), with which charge, its mission to `dock`
-    (None: it cannot), below which charge it is `low`, and what plans its routes."""
-
-    pose: Pose2D
-    charge: float
-    low: float
-    planner: RoutePlanner
-    dock: Prepared | None = None
-
-
 def fleet_mission(
     stored: StoredMission,
     *,
@@ -164,23 +152,25 @@ def charging_missions(world: World, knowledge: Knowledge, robots: Mapping[str, P
     }
 
 
-def bid_for(mission: FleetMission, robot: str, now: RobotNow) -> Bid:
-    """What a robot offers for a mission: it can do it, how long that takes from where it is, and the battery."""
+def bid_for(mission: FleetMission, now: FleetRobot, low: float) -> Bid:
+    """What a robot offers for a mission from where it is, when it is free: whether it can do it, how long that takes,
+    and what is left of its battery, which is not to come below `low`."""
+    robot, planner = now.placed.name, now.routes(mission)
     prepared = mission.options.get(robot)
     if prepared is None:
         other = next(iter(mission.options))
         return Bid(mission.stored.id, robot, 0.0, 0.0, problems=(f"it is for {other}",))
-    checked = _checked_from(now.pose, prepared, now.planner)
+    checked = _checked_from(now.pose, prepared, planner)
     taken, left = checked.estimate, now.charge - checked.estimate.charge
-    problems = (*(error.message for error in checked.errors), *_out_of_reach(prepared, now))
+    problems = (*(error.message for error in checked.errors), *_out_of_reach(prepared, now.pose, planner))
     bid = Bid(mission.stored.id, robot, 0.0, taken.duration_s, left, problems=problems)
-    if left >= now.low or problems:
+    if left >= low or problems:
         return bid
     charged = prepared.knowledge.battery.charged
-    if now.dock is None or now.dock.world.dock is None or charged - taken.charge < now.low:
+    if now.dock is None or now.dock.world.dock is None or charged - taken.charge < low:
         return replace(bid, problems=(f"its battery has {now.charge:.0%}, and {taken.charge:.0%} would be used",))
-    to_dock = _checked_from(now.pose, now.dock, now.planner)
-    again = _checked_from(now.dock.world.dock, prepared, now.planner)
+    to_dock = _checked_from(now.pose, now.dock, planner)
+    again = _checked_from(now.dock.world.dock, prepared, planner)
     problems = tuple(error.message for error in (*to_dock.errors, *again.errors))
     full_s = charging_time_s(now.charge, charged)
     duration_s = to_dock.estimate.duration_s + full_s + again.estimate.duration_s
@@ -196,7 +186,7 @@ def _checked_from(pose: Pose2D, prepared: Prepared, planner: RoutePlanner) -> Ch
     return check_prepared(replace(prepared, world=replace(prepared.world, start=pose)), planner)
 
 
-def _out_of_reach(prepared: Prepared, now: RobotNow) -> Iterator[str]:
+def _out_of_reach(prepared: Prepared, pose: Pose2D, planner: RoutePlanner) -> Iterator[str]:
     """What a robot is to take from where it cannot come. Alone it would look elsewhere; of a fleet another one can."""
     knowledge = prepared.knowledge
     for command in prepared.tree.commands:
@@ -206,7 +196,7 @@ def _out_of_reach(prepared: Prepared, now: RobotNow) -> Iterator[str]:
         usual = knowledge.usual_surfaces(command.object.name) if place is None else (place,)
         surfaces = [name for spot in usual for name in knowledge.surfaces_in(spot)]
         views = [view for name in surfaces for view in knowledge.surfaces[name].viewpoints]
-        if surfaces and not any(is_way(now.planner, now.pose, Pose2D(each.x, each.y, each.yaw)) for each in views):
+        if surfaces and not any(is_way(planner, pose, Pose2D(each.x, each.y, each.yaw)) for each in views):
             yield f"there is no way to the {place or surfaces[0]}, where the {command.object} is to be taken"
 
 
@@ -311,6 +301,13 @@ class FleetRobot:
         left_s = self.free_at_s - now_s
         return abs(left_s) if busy else max(0.0, left_s)
 
+    def routes(self, mission: FleetMission) -> RoutePlanner:
+        """What plans its routes in the world of its missions."""
+        if self.planner is None:
+            world = next(iter(mission.options.values())).world
+            self.planner = route_planner_of(world, self.placed, kept=False)
+        return self.planner
+
     @property
     def progress(self) -> MissionProgress:
         """How far the mission is that it has."""
@@ -326,7 +323,7 @@ class Offers:
         battery: BatteryFacts,
         now: Callable[[], float],
         auction: Auction,
-        bid: Callable[[FleetMission, str, RobotNow], Bid] = bid_for,
+        bid: Callable[[FleetMission, FleetRobot, float], Bid] = bid_for,
     ) -> None:
         """`now` is the robots' clock (s); `bid` is what a robot offers, but for when it is free."""
         self._robots, self._battery, self._now, self._auction, self._bid = robots, battery, now, auction, bid
@@ -345,13 +342,10 @@ class Offers:
     def new(self, wanted: FleetMission, name: str) -> Bid:
         """What a robot offers from where it is free next; one that charges from its dock."""
         robot = self._robots[name]
-        if robot.planner is None:
-            some = wanted.options.get(name, next(iter(wanted.options.values())))
-            robot.planner = route_planner_of(some.world, robot.placed, kept=False)
-        now = RobotNow(robot.pose, robot.charge, self._battery.low, robot.planner, robot.dock)
+        robot.routes(wanted)
         if name in self._auction.resting and robot.dock is not None:
-            now = replace(now, pose=robot.dock.world.dock or robot.pose, charge=self._battery.charged)
-        return replace(self._bid(wanted, name, now), ready_s=self._ready_s(name))
+            robot = replace(robot, pose=robot.dock.world.dock or robot.pose, charge=self._battery.charged)
+        return replace(self._bid(wanted, robot, self._battery.low), ready_s=self._ready_s(name))
 
     def _ready_s(self, name: str) -> float:
         """In how long a robot is free (s); one that charges is as busy as one that has a mission."""

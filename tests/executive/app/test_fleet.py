@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from executive.app.auction import Auction
-from executive.app.fleet import FleetMission, FleetRobot, Offers, RobotNow, bid_for
+from executive.app.fleet import FleetMission, FleetRobot, Offers, bid_for
 from executive.app.prepare import prepare
 from executive.mission.request import Request
 from executive.tree.estimate import Route
@@ -35,6 +35,10 @@ def prepared(*lines):
     return prepare(Request(commands=lines, world="flat", name="work", robot="Alice"), ask=None)
 
 
+def robot(name, charge, planner, dock=None):
+    return FleetRobot(SimpleNamespace(name=name), HERE, charge, planner=planner, dock=dock)
+
+
 @pytest.fixture(scope="module")
 def mission():
     return FleetMission(SimpleNamespace(id=1), {"Alice": prepared(TAKE, PUT)})
@@ -46,32 +50,32 @@ def dock():
 
 
 def test_a_robot_that_can_do_it_offers_its_time_and_what_is_left_of_its_battery(mission):
-    bid = bid_for(mission, "Alice", RobotNow(HERE, 0.9, 0.15, Routes()))
+    bid = bid_for(mission, robot("Alice", 0.9, Routes()), 0.15)
     assert bid.problems == ()
     assert bid.duration_s > 30.0
     assert 0.8 < bid.charge < 0.9
 
 
 def test_a_robot_does_not_offer_to_take_something_from_where_it_cannot_come(mission):
-    bid = bid_for(mission, "Alice", RobotNow(HERE, 0.9, 0.15, Routes(closed=True)))
+    bid = bid_for(mission, robot("Alice", 0.9, Routes(closed=True)), 0.15)
     assert "there is no way to the kitchen table, where the coke is to be taken" in bid.problems
 
 
 def test_a_robot_that_would_be_low_adds_the_time_to_charge(mission, dock):
-    full = bid_for(mission, "Alice", RobotNow(HERE, 0.9, 0.15, Routes(), dock))
-    low = bid_for(mission, "Alice", RobotNow(HERE, 0.15, 0.15, Routes(), dock))
+    full = bid_for(mission, robot("Alice", 0.9, Routes(), dock), 0.15)
+    low = bid_for(mission, robot("Alice", 0.15, Routes(), dock), 0.15)
     assert (full.charges, low.charges, low.problems) == (False, True, ())
     assert low.duration_s > full.duration_s + 0.6 * 300.0
     assert low.charge > 0.7
 
 
 def test_a_robot_that_would_be_low_and_cannot_charge_offers_nothing(mission):
-    bid = bid_for(mission, "Alice", RobotNow(HERE, 0.15, 0.15, Routes()))
+    bid = bid_for(mission, robot("Alice", 0.15, Routes()), 0.15)
     assert bid.problems[0].startswith("its battery has 15%, and ")
 
 
 def test_a_mission_for_another_robot_is_not_bid_for(mission):
-    assert bid_for(mission, "Bob", RobotNow(HERE, 0.9, 0.15, Routes())).problems == ("it is for Alice",)
+    assert bid_for(mission, robot("Bob", 0.9, Routes()), 0.15).problems == ("it is for Alice",)
 
 
 TABLE = SurfaceFacts.model_validate(
@@ -97,12 +101,12 @@ class EastOf:
 
 @pytest.mark.parametrize(("x_m", "reached"), [(9.5, True), (10.6, False)])
 def test_a_robot_takes_over_only_what_it_can_come_near_to(clock, x_m, reached):
-    robot = FleetRobot(SimpleNamespace(kind="spot"), Pose2D(11.0, 2.0, 0.0), planner=EastOf(x_m))
-    offers = Offers({"Bob": robot}, BatteryFacts(), clock.now, Auction((), ["Bob"]))
+    bob = FleetRobot(SimpleNamespace(kind="spot"), Pose2D(11.0, 2.0, 0.0), planner=EastOf(x_m))
+    offers = Offers({"Bob": bob}, BatteryFacts(), clock.now, Auction((), ["Bob"]))
     assert offers.takes_from("Bob", TABLE) is reached
 
 
 @pytest.mark.parametrize(("now_s", "busy", "ready_s"), [(20.0, True, 80.0), (150.0, True, 50.0), (150.0, False, 0.0)])
 def test_a_robot_that_is_late_is_expected_to_be_as_late_again(now_s, busy, ready_s):
-    robot = FleetRobot(SimpleNamespace(kind="spot"), Pose2D(11.0, 2.0, 0.0), free_at_s=100.0)
-    assert robot.ready_s(now_s, busy=busy) == ready_s
+    late = FleetRobot(SimpleNamespace(kind="spot"), Pose2D(11.0, 2.0, 0.0), free_at_s=100.0)
+    assert late.ready_s(now_s, busy=busy) == ready_s

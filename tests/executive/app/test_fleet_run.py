@@ -81,7 +81,8 @@ class Fleet:
     def entry(self, tree, durable):
         return RunEntry(tree, self.robots[tree.robot_name], self.make.StillLocaliser(), self.make.EmptyCostmap())
 
-    def bid(self, mission, name, now):
+    def bid(self, mission, now, low):
+        name = now.placed.name
         prepared = mission.options.get(name)
         commands = () if prepared is None else prepared.tree.commands
         unable = name in self.unable or any(self.cannot(name, command) for command in commands)

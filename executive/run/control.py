@@ -21,7 +21,7 @@ import functools
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Concatenate, Final, ParamSpec, TypeVar
+from typing import Any, Final
 
 from executive.run.control_state import (
     ControlRequests,
@@ -38,17 +38,15 @@ from skills.files.errors import InputError
 from skills.files.texts import LONGEST_ANSWER, plain_text
 from skills.robot import Clock
 
-P = ParamSpec("P")
-ResultT = TypeVar("ResultT")
 _REASONS: Final = (Mode.STOPPED, Mode.LEASE_LOST, Mode.PAUSED)
 """The reasons not to move, the strongest first."""
 
 
-def _locked(method: Callable[Concatenate[Control, P], ResultT]) -> Callable[Concatenate[Control, P], ResultT]:
+def _locked(method: Callable[..., Any]) -> Callable[..., Any]:
     """The method, called while no other thread changes the control."""
 
     @functools.wraps(method)
-    def locked(self: Control, /, *arguments: P.args, **options: P.kwargs) -> ResultT:
+    def locked(self: Control, *arguments: Any, **options: Any) -> Any:
         """The method under the control's lock."""
         with self._changed:
             return method(self, *arguments, **options)
@@ -56,6 +54,15 @@ def _locked(method: Callable[Concatenate[Control, P], ResultT]) -> Callable[Conc
     return locked
 
 
+def _for_any_thread(control: type[Control]) -> type[Control]:
+    """The class, each of whose public methods and properties holds its lock."""
+    for name, member in [each for each in vars(control).items() if not each[0].startswith("_")]:
+        is_property = isinstance(member, property)
+        setattr(control, name, property(_locked(member.fget)) if is_property else _locked(member))
+    return control
+
+
+@_for_any_thread
 class Control:
     """The control of one run. `attended` says that somebody is there to answer questions.
 
@@ -80,7 +87,6 @@ class Control:
         self._buttons: tuple[str, ...] = ()
 
     @property
-    @_locked
     def state(self) -> ControlState:
         """The present state."""
         present = self._mode()
@@ -96,13 +102,11 @@ class Control:
             {robot: self._mode(robot) for robot in self._missions},
         )
 
-    @_locked
     def wait(self, version: int, timeout_s: float | None = None) -> ControlState:
         """Block (on the wall's clock) until the state is newer than `version`, or time is over; the state then."""
         self._changed.wait_for(lambda: self._version > version, timeout_s)
         return self.state
 
-    @_locked
     def pause(self, reason: str = "paused by the operator", *, robot: str | None = None) -> None:
         """Hold all robots still, or one of them; the trees keep their state. Idempotent.
 
@@ -112,14 +116,12 @@ class Control:
             self._stride = None
         self._hold(robot, Mode.PAUSED, "pause", reason)
 
-    @_locked
     def resume(self, *, robot: str | None = None) -> None:
         """Continue after a pause, a breakpoint or steps, or after one robot's own pause; the stop button stays."""
         if robot is None:
             self._at = self._stride = None
         self._let_go(robot, Mode.PAUSED, "resume", "the mission goes on")
 
-    @_locked
     def toggle_pause(self) -> None:
         """Pause, or resume when paused."""
         if (None, Mode.PAUSED) not in self._holds:
@@ -127,7 +129,6 @@ class Control:
         else:
             self.resume()
 
-    @_locked
     def step(self, ticks: int | None = None) -> None:
         """Go on until a node changes its status, or for some ticks, and pause again.
 
@@ -140,7 +141,6 @@ class Control:
         self._stride, self._at = ticks or 0, None
         self._note("step", "until a node changes" if ticks is None else f"for {ticks} ticks")
 
-    @_locked
     def cancel(self, reason: str = "cancelled by the operator", *, robot: str | None = None) -> None:
         """End the run, or one robot's mission; the first reason stays. Once more: at once, without what missions always
         do in the end. Raises ValueError: no such robot in the run.
@@ -156,7 +156,6 @@ class Control:
             self._ask_for(insists=True)
             self._note("cancel", f"once more: {reason}")
 
-    @_locked
     def press(self, button: str) -> None:
         """Press a button that missions wait for or decide by. Raises ValueError: no mission of the run has it."""
         if self._begun and button not in self._buttons:
@@ -166,12 +165,10 @@ class Control:
         self._note("button", button)
 
     @property
-    @_locked
     def presses(self) -> Mapping[str, int]:
         """How often each button was pressed."""
         return self._presses
 
-    @_locked
     def stop_button(self, reason: str = "the stop button is pressed", *, robot: str | None = None) -> None:
         """Stop all robots, or one, until `release_stop_button`, whatever else is asked for.
 
@@ -179,31 +176,26 @@ class Control:
         """
         self._hold(robot, Mode.STOPPED, "stop button", reason)
 
-    @_locked
     def release_stop_button(self, *, robot: str | None = None) -> None:
         """Continue as it was when the button was pressed, for all robots or for one."""
         self._let_go(robot, Mode.STOPPED, "stop button released", "the stop button is released")
 
-    @_locked
     def stop_pressed(self, robot: str) -> str | None:
         """Why the stop button is pressed for a robot; None when it is not."""
         return self._holds.get((None, Mode.STOPPED)) or self._holds.get((robot, Mode.STOPPED))
 
-    @_locked
     def set_breakpoint(self, path_id: str) -> None:
         """Pause before the node begins, each time. Raises ValueError for a node that the run does not have."""
         self._refuse_unknown(path_id)
         self._ask_for(breakpoints=self._requests.breakpoints | {path_id})
         self._note("breakpoint set", path_id)
 
-    @_locked
     def clear_breakpoint(self, path_id: str) -> None:
         """Remove a breakpoint; does nothing when there is none."""
         if path_id in self._requests.breakpoints:
             self._ask_for(breakpoints=self._requests.breakpoints - {path_id})
             self._note("breakpoint cleared", path_id)
 
-    @_locked
     def preempt(self, tree: CompiledTree) -> None:
         """Do another mission first; the one under way is suspended and taken up again afterwards.
 
@@ -213,14 +205,12 @@ class Control:
         self._ask_for(preempts=(*self._requests.preempts, tree))
         self._note("preempt", f"first '{tree.mission_name}'")
 
-    @_locked
     def then(self, tree: CompiledTree) -> None:
         """Do another mission when the one that the robot began with is done. Raises ValueError as `preempt`."""
         self._refuse_mission(tree)
         self._ask_for(later=(*self._requests.later, tree))
         self._note("then", f"afterwards '{tree.mission_name}'")
 
-    @_locked
     def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
         """Do another mission instead of the one under way, which is given up.
 
@@ -231,7 +221,6 @@ class Control:
         self._ask_for(instead=(*self._requests.instead, Replacement(tree, instead_of)))
         self._note("replace", f"instead '{tree.mission_name}'")
 
-    @_locked
     def answer(self, question_id: str, text: str) -> None:
         """Answer an open question. Raises ValueError when it is not open or `text` is none of its options."""
         pending = self._questions.get(question_id)
@@ -247,7 +236,6 @@ class Control:
             raise ValueError(f"'{said}' is no answer to '{question_id}'; choose one of: {', '.join(options)}")
         self._close_question(pending, said, "answer", text)
 
-    @_locked
     def begin(self, missions: Mapping[str, CompiledTree]) -> None:
         """The run begins. Raises ValueError for a breakpoint at a node that it does not have, or at a second run."""
         if self._begun:
@@ -258,7 +246,6 @@ class Control:
         for path_id in self._requests.breakpoints:
             self._refuse_unknown(path_id)
 
-    @_locked
     def mission_begun(self, robot_name: str, tree: CompiledTree) -> None:
         """A mission begins, on top of those that a robot has begun. Idempotent."""
         before = self._missions.get(robot_name, ())
@@ -269,13 +256,11 @@ class Control:
         self._missions[robot_name] = (*before, tree.mission_name)
         self._bump()
 
-    @_locked
     def mission_ended(self, robot_name: str) -> None:
         """A robot's topmost mission is over."""
         self._missions[robot_name] = self._missions.get(robot_name, ())[:-1]
         self._bump()
 
-    @_locked
     def poll(self) -> ControlRequests:
         """What is asked for now; new missions and events are handed out once."""
         if self._requests is self._lasting and not self._holds:
@@ -288,7 +273,6 @@ class Control:
         self._requests = self._lasting
         return requests
 
-    @_locked
     def ticked(self, *, changed: bool) -> None:
         """The trees were ticked; `changed` says whether a node changed its status. Ends a step that is done."""
         if self._stride is None or (self._stride == 0 and not changed):
@@ -297,14 +281,12 @@ class Control:
         if self._stride is None:
             self._bump()
 
-    @_locked
     def arrived_at(self, path_id: str) -> None:
         """The run stands at a breakpoint."""
         self._holds[None, Mode.PAUSED] = why = f"at the breakpoint {path_id}"
         self._at, self._stride = path_id, None
         self._note("breakpoint", why)
 
-    @_locked
     def lease_lost(self, robot_name: str, why: str | None) -> None:
         """A robot's lease was lost (why), or is there again (None)."""
         self._holds.pop((robot_name, Mode.LEASE_LOST), None)
@@ -312,7 +294,6 @@ class Control:
             self._holds[robot_name, Mode.LEASE_LOST] = why
         self._note("lease lost" if why else "lease back", why or f"{robot_name} has its lease again")
 
-    @_locked
     def ask(self, question: Question, clock: Clock, robot: str = "") -> Asked:
         """Put a robot's question to the operator. Raises ValueError when one of that id is open already."""
         if question.id in self._questions:
@@ -322,37 +303,33 @@ class Control:
         self._note("question", f"{question.id}: {question.text}")
         return asked
 
-    @_locked
     def _take_default(self, pending: PendingAnswer, why: str) -> None:
-        """Nobody answers a question, for a reason: its default is the answer."""
-        if pending.answer is None:
-            self._close_question(pending, pending.open.question.default, "question over", why)
+        """Nobody answers a question, for a reason: its default is the answer. From any thread."""
+        with self._changed:
+            if pending.answer is None:
+                self._close_question(pending, pending.open.question.default, "question over", why)
 
     def _close_question(self, pending: PendingAnswer, answer: str, what: str, message: str) -> None:
         pending.answer = answer
         self._questions.pop(pending.open.id, None)
         self._note(what, f"{pending.open.id}: {message}")
 
-    @_locked
     def held(self, duration_s: float) -> None:
         """The run was held so long (robot's clock); that does not count against the time of questions."""
         for pending in self._questions.values():
             pending.open = replace(pending.open, until_s=pending.open.until_s + duration_s)
 
-    @_locked
     def rest(self, duration_s: float) -> None:
         """Let the wall's clock run on, less long when something is asked for meanwhile."""
         seen = self._version
         self._changed.wait_for(lambda: self._version > seen, duration_s)
 
     @property
-    @_locked
     def slow(self) -> bool:
         """True while simulated time should not run ahead of the people who watch."""
         held = self._mode().mode is not Mode.RUNNING or bool(self._holds)
         return held or (self.attended and bool(self._questions))
 
-    @_locked
     def end(self) -> tuple[Event, ...]:
         """The run is over; the events that were not handed out yet."""
         self._ended = True

@@ -73,7 +73,9 @@ class Dispatch(Assigner):
 
     def __post_init__(self) -> None:
         self._given = GivenMissions(self.store)
-        self._auction = Auction((), self.robots, self._surfaces)
+        self._auction = Auction(
+            (), self.robots, lambda number: surfaces_of(next(iter(self.missions[number].options.values())))
+        )
         self._parts = {number: each for number, each in self._given.all().items() if each.part_of is not None}
         for number in self.missions:
             follows = self._parts[number].follows if number in self._parts else None
@@ -283,10 +285,6 @@ class Dispatch(Assigner):
     @property
     def _now_s(self) -> float:
         return self.backend.clock.now()
-
-    def _surfaces(self, number: int) -> frozenset[str]:
-        """Where a mission puts something down, or takes it from by name."""
-        return surfaces_of(next(iter(self.missions[number].options.values())))
 
     def _dock_entry(self, name: str) -> RunEntry:
         """A robot goes to its dock and charges."""

@@ -124,7 +124,8 @@ class EndedTree:
 
     def steps(self, events: Sequence[Event]) -> tuple[StepRow, ...]:
         """The steps of the mission, with their times from the events of a log."""
-        mission = _below(self.view, self.tree.mission.path_id) or self.view
+        below = (one for _, one in self.view.walk() if one.path_id == self.tree.mission.path_id)
+        mission = next(below, self.view)
         return tuple(step_rows(mission, frozenset(part.path_id for part in self.tree.parts), _spans(events)))
 
 
@@ -140,13 +141,14 @@ def write_report(
     `ended` are the robots' trees, `events` are those of the run's log, `artifacts` has the run's pictures.
     """
     out, several = prepared.request.out, prepared.several
-    names = tuple(prepared.robots)
+    names, request = tuple(prepared.robots), prepared.request
+    asked = "commands" if request.file is None else f"mission file {request.file.name}"
     parts = [part_of(each, names, artifacts, events) for each in ended]
     for each, part in zip(ended, parts, strict=True):
         (out / f"{file_name(TREE, each.tree.robot_name, names)}.svg").write_text(part.tree_svg, encoding="utf-8")
     page = ReportPage(
         title=", ".join(names) if several else prepared.mission.name,
-        request=_request(prepared),
+        request=asked if request.sentence is None else f"“{request.sentence}”",
         facts=_facts(report, "" if several else ended[0].tree.robot_name),
         alone=None if several else parts[0],
         parts=parts if several else (),
@@ -240,17 +242,6 @@ def _spans(events: Sequence[Event]) -> dict[str, tuple[float, float]]:
             t_s, path_id = float(event.data.get("t", event.stamp_s)), str(event.data["node"])
             spans[path_id] = (spans.get(path_id, (t_s, t_s))[0], t_s)
     return spans
-
-
-def _below(node: NodeView, path_id: str) -> NodeView | None:
-    return next((one for _, one in node.walk() if one.path_id == path_id), None)
-
-
-def _request(prepared: Prepared) -> str:
-    request = prepared.request
-    if request.sentence is not None:
-        return f"“{request.sentence}”"
-    return f"mission file {request.file.name}" if request.file is not None else "commands"
 
 
 def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:

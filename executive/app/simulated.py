@@ -148,15 +148,11 @@ def compile_first(cache: Path | None = None) -> None:
 
     `cache` is numba's folder for the planner's search unless another is given.
     """
-    if any((cache or _kernel_cache()).glob("lattice.search-*.nbi")):
+    kept = cache or Path(search.machine_code.stats.cache_path)  # type: ignore[attr-defined]
+    if any(kept.glob("lattice.search-*.nbi")):
         return
     _LOG.warning("errand: compiles its numeric code for this machine, once; that takes about half a minute")
     subprocess.run([sys.executable, "-m", "executive.cli", "warm-up"], stdout=subprocess.DEVNULL, check=False)
-
-
-def _kernel_cache() -> Path:
-    """Where numba keeps the planner's search."""
-    return Path(search.machine_code.stats.cache_path)  # type: ignore[attr-defined]
 
 
 def simulate(

@@ -189,7 +189,13 @@ class Findings:
         """Take note of a message of the mission; an answer gets its time and the robot's name."""
         if topic == ANSWER_TOPIC:
             message = {**message, "robot": self._robot_name, "t": round(self._clock.now(), 6)}
-            self._add(_finding(message))
+            finding = _finding(message)
+            again = frozenset(self._kept(self._keys.answered_before))
+            if finding.path_id in again:
+                self._board.put(self._keys.answered_before, again - {finding.path_id})
+            before = next((one for one in reversed(self.findings) if one.path_id == finding.path_id), None)
+            if finding.path_id not in again or before is None or before.answer != finding.answer:
+                self._board.put(self._keys.findings, (*self.findings, finding))
         elif topic == SPEECH:
             now_s = round(self._clock.now(), 6)
             said = Said(now_s, str(message.get("text", "")), bool(message.get("asked", False)))
@@ -205,15 +211,6 @@ class Findings:
     def said(self) -> tuple[Said, ...]:
         """What was said so far."""
         return self._kept(self._keys.said)
-
-    def _add(self, finding: Finding) -> None:
-        again = frozenset(self._kept(self._keys.answered_before))
-        if finding.path_id in again:
-            self._board.put(self._keys.answered_before, again - {finding.path_id})
-            before = next((one for one in reversed(self.findings) if one.path_id == finding.path_id), None)
-            if before is not None and before.answer == finding.answer:
-                return
-        self._board.put(self._keys.findings, (*self.findings, finding))
 
     def _kept(self, key: str) -> tuple[Any, ...]:
         kept: tuple[Any, ...] = self._board.get(key) if key in self._board else ()

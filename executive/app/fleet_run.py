@@ -17,7 +17,7 @@ from executive.app.fleet import (
     missions_json,
     missions_message,
 )
-from executive.app.mission_run import log_map, run_watched
+from executive.app.mission_run import log_map
 from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.report import VERDICTS
@@ -28,7 +28,10 @@ from executive.app.simulated import SimulatedBackend, compile_first
 from executive.app.worlds import knowledge_of, open_world
 from executive.record.event_log import EventLog
 from executive.record.history import Event, read_events
+from executive.run.control import Control
+from executive.run.runner import run
 from executive.run.visitor import RunSettings
+from executive.run.worker import LockStepWorker
 from executive.store.given import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.words.robots import RobotConfig
@@ -61,13 +64,15 @@ def run_fleet(
             page.serve(log, backend.show_live())
         if first is not None:
             log_map(log, first.world, first.knowledge)
-        with ended_by_signals(dispatch.stop):
-            result = run_watched(
+        control = Control(pace=None) if page is None else page.control
+        with ended_by_signals(dispatch.stop), ended_by_signals(control.cancel), LockStepWorker(backend.clock) as worker:
+            result = run(
                 dispatch,
-                backend,
-                (artifacts, log, *([] if page is None else [page])),
+                clock=backend.clock,
+                worker=worker,
+                visitors=(artifacts, log, *([] if page is None else [page])),
                 settings=RunSettings(seed=seed, time_limit_s=limit_s),
-                control=None if page is None else page.control,
+                control=control,
                 spare=dispatch.spare(),
             )
         dispatch.close()

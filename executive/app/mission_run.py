@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import gc
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,7 +31,7 @@ from executive.record.work import CountedDetector, Profile
 from executive.run.control import Control
 from executive.run.outcome import RobotResult, RunResult
 from executive.run.runner import run
-from executive.run.visitor import Assigner, Progress, RunEntry, RunSettings, RunVisitor
+from executive.run.visitor import Progress, RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.tree.context import RunContext
 from executive.tree.node_view import NodeView, node_view
@@ -78,31 +78,34 @@ def run_request(
     out, world, kinds = request.out, prepared.world, {name: robot.kind for name, robot in prepared.robots.items()}
     backend = backend or _in_the_plant(prepared)
     entries = [entry_for(each, backend, durable) for each in prepared.all]
-    idle = kinds.keys() - {entry.tree.robot_name for entry in entries}
-    spare = [backend.entry(replace(prepared.tree, robot_name=name), None) for name in kinds if name in idle]
+    idle = [name for name in kinds if all(name != entry.tree.robot_name for entry in entries)]
+    spare = [backend.entry(replace(prepared.tree, robot_name=name), None) for name in idle]
     path, artifacts = out / ("log.mcap" if durable is None else durable.log), Artifacts()
-    with closing(EventLog(path, backend.clock, apart=prepared.several)) as log:
+    clock = backend.clock
+    with closing(EventLog(path, clock, apart=prepared.several)) as log:
         if page is not None:
             page.serve(log, backend.show_live())
         log_map(log, world, prepared.knowledge)
+        facts: dict[str, Any] = {"world": world.name, "seed": request.seed, "scenario": scenario.lines()}
         for each in prepared.all:
-            announce(
-                log,
-                backend.clock,
-                each.tree,
-                each.knowledge,
-                world=world.name,
-                seed=request.seed,
-                scenario=scenario.lines(),
-                robots=kinds if prepared.several else {},
-            )
+            announce(log, clock, each.tree, each.knowledge, **facts, robots=kinds if prepared.several else {})
         journals = () if durable is None else durable.journals.values()
         watching = [artifacts, log, *journals, *visitors, *([] if page is None else [page])]
         if scenario:
             watching.append(DisturbanceLog(log, entries[0].robot, backend.happened))
         if profile is not None:
             watching.append(RunProfile(profile, backend, (artifacts, log), journals))
-        result = run_watched(entries, backend, watching, settings=settings, control=control, spare=spare)
+        control = control or Control(pace=None)
+        with ended_by_signals(control.cancel), LockStepWorker(clock) as worker:
+            result = run(
+                entries,
+                clock=clock,
+                worker=worker,
+                visitors=watching,
+                settings=settings,
+                control=control,
+                spare=spare,
+            )
         if durable is not None:  # the next mission begins in the world that this one leaves
             next(iter(durable.journals.values())).keep_world()
             for trouble in durable.troubles:
@@ -110,16 +113,29 @@ def run_request(
                 log(ERROR_TOPIC, error)
         counts = dict(sorted(Counter({**result.work, **backend.work(), "bytes_logged": log.bytes}).items()))
         log(WORK, counts)
-    events = mission_events(path)
+    finished, recording = _concluded(prepared, backend, result, log, artifacts, counts)
+    if page is not None:
+        page.offer(recording)
+    return finished
+
+
+def _concluded(
+    prepared: Prepared,
+    backend: Backend,
+    result: RunResult,
+    log: EventLog,
+    artifacts: Artifacts,
+    counts: Mapping[str, int],
+) -> tuple[Finished, Path | None]:
+    """The report of a run, written into its folder with what was recorded; the path of the recording."""
+    out, events = prepared.request.out, mission_events(log.path)
     artifacts.recall(events)
     finished, ended = _judged(prepared, backend, result, log)
     report = with_findings(replace(finished.report, work=counts), prepared.knowledge, result, artifacts, events)
     draw_answer(artifacts, out)
     recording = backend.leave(artifacts, out)
     write_report(prepared, report, ended, artifacts, events)
-    if page is not None:
-        page.offer(recording)
-    return replace(finished, report=report)
+    return replace(finished, report=report), recording
 
 
 def _in_the_plant(prepared: Prepared) -> Backend:
@@ -146,29 +162,6 @@ def spoken_classes(prepared: Prepared) -> frozenset[str]:
 def log_map(log: EventLog, world: World, knowledge: Knowledge) -> None:
     """Write the map into the log, so that the log stands alone."""
     log(MAP, map_message(load_grid_map(world.scan_map_path), knowledge, world=world.name))
-
-
-def run_watched(
-    missions: Sequence[RunEntry] | Assigner,
-    backend: Backend,
-    visitors: Sequence[RunVisitor],
-    *,
-    settings: RunSettings,
-    control: Control | None,
-    spare: Sequence[RunEntry],
-) -> RunResult:
-    """Run missions, or all that an assigner gives, on a backend's clock; signals of the process cancel them."""
-    control = control or Control(pace=None)
-    with ended_by_signals(control.cancel), LockStepWorker(backend.clock) as worker:
-        return run(
-            missions,
-            clock=backend.clock,
-            worker=worker,
-            visitors=visitors,
-            settings=settings,
-            control=control,
-            spare=spare,
-        )
 
 
 def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> RunEntry:

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from wheeled_toy import TOY
 
+from executive.testing.skill_suite import PARTS, SuiteCase
 from executive.testing.skill_test import bench_of_setup, carry_out, load_skill_tests, scripted_maker
-from executive.testing.suite import PARTS, SuiteCase
 from executive.tree.registry import built_in_skills
 from skills.faults.kinds import STANDARD_FAULTS
 from skills.robot import BaseKind

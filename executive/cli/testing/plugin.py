@@ -17,7 +17,7 @@ import pytest
 
 if TYPE_CHECKING:
     from executive.testing.bench import SkillBench
-    from executive.testing.suite import SkillTestSettings
+    from executive.testing.skill_suite import SkillTestSettings
     from plant.simulation import Simulation
     from plant.worlds.world import World
     from skills.api import SkillContext
@@ -37,8 +37,8 @@ class Hooks:
     def pytest_errand_skill_tests(settings: Any) -> None:
         """Change what all skill tests of the session share, before the first is collected.
 
-        `settings` is an `executive.testing.suite.SkillTestSettings`: append to `fault_kinds`, add to `skills`, put
-        other benches into `makers`.
+        `settings` is an `executive.testing.skill_suite.SkillTestSettings`: append to `fault_kinds`, add to `skills`,
+        put other benches into `makers`.
         """
 
 
@@ -51,7 +51,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     """Collect the tests of a `*.skilltest.yaml` file."""
     if not file_path.name.endswith(SUFFIX):
         return None
-    from executive.testing.suite import SkillTestModule
+    from executive.testing.skill_suite import SkillTestModule
 
     module: SkillTestModule = SkillTestModule.from_parent(parent, path=file_path)
     module.settings = _settings(parent.config)
@@ -61,8 +61,8 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 def _settings(config: pytest.Config) -> SkillTestSettings:
     """What the session's skill tests share, made when the first is collected."""
     if _SETTINGS not in config.stash:
+        from executive.testing.skill_suite import SkillTestSettings
         from executive.testing.skill_test import scripted_maker
-        from executive.testing.suite import SkillTestSettings
         from executive.tree.registry import installed_skills
         from skills.files.errors import InputError
 

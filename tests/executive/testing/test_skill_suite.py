@@ -8,7 +8,7 @@ from typing import ClassVar
 import pytest
 
 from executive.testing.bench import scripted_bench
-from executive.testing.suite import (
+from executive.testing.skill_suite import (
     PARTS,
     SkillSuite,
     SuiteCase,

@@ -175,24 +175,10 @@ def load_english(folder: Path) -> tuple[Language, WordRows]:
     return pipeline, rows
 
 
-class _Affix:
-    """A regular expression that is compiled once a word needs it: in letters, or a blank, it finds nothing."""
-
-    def __init__(self, pattern: str) -> None:
-        self._pattern = pattern
-
-    @cached_property
-    def _compiled(self) -> re.Pattern[str]:
-        return re.compile(self._pattern)
-
-    def search(self, word: str) -> re.Match[str] | None:
-        return None if _is_plain(word) else self._compiled.search(word)
-
-    def finditer(self, word: str) -> Iterator[re.Match[str]]:
-        return iter(()) if _is_plain(word) else self._compiled.finditer(word)
-
-    def match(self, word: str) -> re.Match[str] | None:
-        return None if _is_plain(word) else self._compiled.match(word)
+def _affix(find: Callable[[re.Pattern[str], str], Any], pattern: str, nothing: Any = None) -> Callable[[str], Any]:
+    """Finds a pattern, which is compiled once a word needs it: in letters, or a blank, there is nothing to find."""
+    compiled = cache(lambda: re.compile(pattern))
+    return lambda word: nothing if _is_plain(word) else find(compiled(), word)
 
 
 def _is_plain(word: str) -> bool:
@@ -215,10 +201,10 @@ class RuleTokenizer:
         stored = srsly.read_msgpack(file)
         tokenizer = Tokenizer(
             pipeline.vocab,
-            prefix_search=_Affix(stored["prefix_search"]).search,
-            suffix_search=_Affix(stored["suffix_search"]).search,
-            infix_finditer=_Affix(stored["infix_finditer"]).finditer,
-            url_match=_Affix(stored["url_match"]).match,
+            prefix_search=_affix(re.Pattern.search, stored["prefix_search"]),
+            suffix_search=_affix(re.Pattern.search, stored["suffix_search"]),
+            infix_finditer=_affix(re.Pattern.finditer, stored["infix_finditer"], ()),
+            url_match=_affix(re.Pattern.match, stored["url_match"]),
             faster_heuristics=stored["faster_heuristics"],
         )
         return cls(tokenizer, stored["exceptions"])

@@ -92,11 +92,8 @@ class Phrase:
     @property
     def pronoun(self) -> bool:
         """Whether it stands for something said before ("it", "one", "two of them")."""
-        return (
-            self.head.word in lexicon().pronouns
-            and all(map(_is_determiner, self.tokens[:-1]))
-            and (len(self.tokens) == 1 or self.head.word not in _ONE)
-        )
+        word = self.head.word in lexicon().pronouns and not self.stands_for_one
+        return word and all(map(_is_determiner, self.tokens[:-1]))
 
     @property
     def stands_for_one(self) -> bool:
@@ -218,11 +215,8 @@ class Phrase:
 
     def _measures(self, at: int) -> bool:
         """Whether the number there belongs to a unit of measure."""
-        return (
-            at + 2 < len(self.tokens)
-            and _number(self.tokens[at]) is not None
-            and self.tokens[at + 1].word in lexicon().units
-        )
+        unit = at + 2 < len(self.tokens) and self.tokens[at + 1].word in lexicon().units
+        return unit and _number(self.tokens[at]) is not None
 
 
 _ENDS: Final = frozenset({"end", "start", "beginning", "middle"})

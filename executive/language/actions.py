@@ -16,7 +16,7 @@ from executive.language.items import (
     Separator,
     Unknown,
     Verb,
-    requested,
+    requested_predicates,
     spoken_words,
 )
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
@@ -76,7 +76,7 @@ def read_actions(
     """
     found: list[Action] = []
     anew = False
-    for clause in requested(clauses):
+    for clause in requested_predicates(clauses):
         before = [each for each in (clause.subject, clause.verb) if each is not None]
         gives = recipient is not None and not _says_to_whom(clause)
         for action in _actions(clause):

@@ -13,7 +13,7 @@ from executive.language.addressees import Saying, Who, addressees
 from executive.language.amounts import AMOUNTS
 from executive.language.items import Item
 from executive.language.lexicon import Patterns, any_of, lexicon, read_table
-from executive.language.tokens import smoothed
+from executive.language.tokens import smooth
 
 CLAUSES: Final = Patterns("structures.yaml", words=AMOUNTS)
 ACTS: Final = Patterns("structures.yaml", "acts", AMOUNTS)
@@ -102,7 +102,7 @@ def split(text: str, robots: tuple[str, ...] = ()) -> Split:
     listener, parts = addressees(robots).parts(text) if len(robots) > 1 else (None, (Saying(None, text),))
     found: list[Clause] = []
     for part in parts:
-        said = smoothed(part.text)
+        said = smooth(part.text)
         for form, meant in read_table("structures.yaml")["reworded"]:
             said = CLAUSES.compiled(form).sub(meant, said)
         found += (replace(clause, part=part) for clause in cut(said))

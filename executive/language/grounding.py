@@ -6,7 +6,7 @@ or only looks or sounds like something known, makes a question.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final
@@ -16,7 +16,7 @@ from executive.language.lexicon import lexicon
 from executive.language.limits import check_relation
 from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase
-from executive.language.questions import ABLE, ClarifyingQuestion, RefusalError, Slot, perhaps, which
+from executive.language.questions import ABLE, ClarifyingQuestion, RefusalError, Slot, perhaps_question, which_question
 from executive.language.roles import HERE, Location
 from executive.language.spelling import look_alikes, synonyms_of, words_for
 from executive.language.tokens import Token
@@ -137,7 +137,7 @@ class _Grounder:
         if len(phrase.content) == 1 and not phrase.extra and phrase.head.word in lexicon().any_person:
             return ANYBODY
         if phrase.named_person:
-            raise self._unknown(Slot.PERSON, (phrase.text,), _spellings(self.knowledge, tuple(self.knowledge.people)))
+            raise self._unknown(Slot.PERSON, (phrase.text,), self._known(self.knowledge.people))
         somebody = phrase.person or phrase.stands_for_somebody or phrase.head.word in lexicon().anyone
         if somebody and self.knowledge.thing(phrase.text) is None:
             what = f"I see whether anybody is there, but not whether it is {phrase.spoken!r}"
@@ -166,7 +166,7 @@ class _Grounder:
 
     def thing(self, phrase: Phrase) -> Thing:
         """The known thing or category, with the adjectives before it."""
-        known = _spellings(self.knowledge, self.knowledge.thing_names())
+        known = self._known(self.knowledge.thing_names())
         for attributes, form in _readings(phrase):
             if (name := self.knowledge.thing(form)) is not None:
                 return Thing(name, attributes)
@@ -188,7 +188,7 @@ class _Grounder:
         if location.phrase.said_count not in (None, 1) or location.every_room:
             said = location.phrase.spoken
             raise RefusalError(f"I go to one place at a time, not to {said!r}", [said])
-        known = _spellings(self.knowledge, self.knowledge.place_names())
+        known = self._known(self.knowledge.place_names())
         room = self._room(location)
         candidates = self._places(location.phrase, room, known)
         fitting = (name for name in candidates if room in (None, name, self.knowledge.room(name)))
@@ -203,7 +203,7 @@ class _Grounder:
         around = " ".join(extra[1:]) if extra[:1] == ("of",) else None
         around = around if location.within is None else location.within.text
         if around is not None:
-            known = _spellings(self.knowledge, self.knowledge.place_names())
+            known = self._known(self.knowledge.place_names())
             found = self.knowledge.place(around) or next(iter(synonyms_of(around, known)), None)
             if found is None:
                 raise self._unknown(Slot.PLACE, (around,), known)
@@ -247,19 +247,23 @@ class _Grounder:
             return name
         people = tuple(self.knowledge.people)
         if people and not phrase.named_person:
-            raise _asking(which(Slot.PERSON, phrase.text, people))
-        raise self._unknown(Slot.PERSON, (phrase.text,), _spellings(self.knowledge, people))
+            raise _asking(which_question(Slot.PERSON, phrase.text, people))
+        raise self._unknown(Slot.PERSON, (phrase.text,), self._known(people))
 
     def _only(self, candidates: Sequence[str], slot: Slot, heard: str) -> str:
         """The only candidate; several make a question."""
         if len(candidates) > 1:
-            raise _asking(which(slot, heard, tuple(candidates)))
+            raise _asking(which_question(slot, heard, tuple(candidates)))
         if slot is not Slot.PLACE:
             self._note(heard, candidates[0])
         return candidates[0]
 
     def _note(self, heard: str, *names: str) -> None:
         self.notes += [f"I take '{heard}' to be {name}" for name in names if heard.lower() != name.lower()]
+
+    def _known(self, names: Iterable[str]) -> Mapping[str, str]:
+        """The names by each of their spellings in lower case."""
+        return {word.lower(): name for name in names for word in self.knowledge.spellings([name])}
 
     def _unknown(self, slot: Slot, forms: Sequence[str], known: Mapping[str, str]) -> RefusalError:
         """A question where something known looks, sounds or means alike; else a refusal."""
@@ -268,7 +272,7 @@ class _Grounder:
         near = (name for form in forms for name in look_alikes(form, known, self.parser))
         candidates = tuple(dict.fromkeys([*ends, *near]))
         if candidates:
-            return _asking(perhaps(slot, heard, candidates))
+            return _asking(perhaps_question(slot, heard, candidates))
         return RefusalError(f"I know no {slot.value} {heard!r}; {known_names(heard, known.values())}", [heard])
 
 
@@ -294,11 +298,6 @@ def _readings(phrase: Phrase) -> Iterator[tuple[tuple[str, ...], str]]:
 
 def _forms(head: Token) -> tuple[str, ...]:
     return tuple(dict.fromkeys((head.word, head.lemma)))
-
-
-def _spellings(knowledge: Knowledge, names: Sequence[str]) -> Mapping[str, str]:
-    """The names by each of their spellings in lower case."""
-    return {word.lower(): name for name in names for word in knowledge.spellings([name])}
 
 
 def _last(name: str) -> str:

@@ -151,7 +151,7 @@ def _subject(items: Sequence[Item]) -> tuple[int, Chunk | None]:
     return at, subject if isinstance(subject, Chunk) and subject.role is None else None
 
 
-def needed(row: Row, items: list[Item]) -> Item | None:
+def stated_need(row: Row, items: list[Item]) -> Item | None:
     """ "The patient in room four needs a blanket" asks to bring somebody something."""
     found, (at, who) = row.match(lexicon().needs), _subject(items)
     behind = row.tokens[row.at + len(found or ()) :][:1]
@@ -166,7 +166,7 @@ def needed(row: Row, items: list[Item]) -> Item | None:
     return Separator("")
 
 
-def belongs(row: Row, items: list[Item]) -> Item | None:
+def belonging(row: Row, items: list[Item]) -> Item | None:
     """ "The plates go in the cupboard" asks to put them there."""
     (at, thing), behind = _subject(items), row.ahead()
     if row.tokens[row.at].word not in _BELONGS or not behind or behind[0].word not in _WHERE or thing is None:
@@ -181,7 +181,7 @@ def belongs(row: Row, items: list[Item]) -> Item | None:
     return Separator("")
 
 
-def goes_on(row: Row, items: list[Item]) -> Item | None:
+def ongoing_event(row: Row, items: list[Item]) -> Item | None:
     """ "My back hurts", which is no request by itself."""
     token, subject = row.tokens[row.at], items[-1] if items else None
     if token.tag != "VBZ" or token.pos != "VERB" or token.lemma in _WANTS or token.lemma in lexicon().asks:
@@ -194,7 +194,7 @@ def goes_on(row: Row, items: list[Item]) -> Item | None:
     return Being(row.take(1), existential=True, asked=False, narrated=True, topic=subject.phrase)
 
 
-def narrated(row: Row, items: list[Item]) -> Item | None:
+def narration(row: Row, items: list[Item]) -> Item | None:
     """ "Somebody spilled milk", "I can't reach the jar", "Kim is waiting for the books": a reason for what is asked."""
     last = items[-1] if len(items) > 1 else None
     at = len(items) - 1 - (isinstance(last, Separator) and last.word.isalpha() and last.word != "and")
@@ -232,9 +232,9 @@ INDIRECT: Final = (
     what_is,
     do_we_have,
     reported_speech,
-    narrated,
-    needed,
-    belongs,
-    goes_on,
+    narration,
+    stated_need,
+    belonging,
+    ongoing_event,
 )
 """The ways of reading, in the order of trying."""

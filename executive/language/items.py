@@ -262,7 +262,7 @@ def without_name(clauses: Sequence[Predicate]) -> tuple[Predicate, ...]:
     return tuple(rest if called and not {"and", "or"} & {*words} else clauses)
 
 
-def requested(predicates: Sequence[Predicate]) -> list[Predicate]:
+def requested_predicates(predicates: Sequence[Predicate]) -> list[Predicate]:
     """The predicates as they are meant: a place before the first verb behind it, reasons and "check if" left out."""
     return list(_without_checks(_without_reasons(_with_fronted(_with_verb(predicates)))))
 

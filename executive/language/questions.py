@@ -60,26 +60,26 @@ def answer_by(policy: QuestionPolicy, person: Answerer | None = None) -> Answere
     return lambda question: None
 
 
-def which(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQuestion:
+def which_question(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQuestion:
     """Which of several that one name could mean."""
     text = f"Which {heard}: {listing(candidates, last='or')}?"
     return ClarifyingQuestion(text, slot, candidates, candidates[0], heard)
 
 
-def perhaps(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQuestion:
+def perhaps_question(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQuestion:
     """Whether an unknown name stands for a known one."""
     quoted = listing((f"'{name}'" for name in candidates), last="or")
     text = f"I know no {slot.value} '{heard}'; did you mean {quoted}?"
     return ClarifyingQuestion(text, slot, candidates, candidates[0], heard)
 
 
-def left_open(reason: str, heard: str | None) -> ClarifyingQuestion:
+def open_question(reason: str, heard: str | None) -> ClarifyingQuestion:
     """What the sentence does not say at all: where to, or what "it" and "there" stand for."""
     slot = Slot.GOAL if heard is None else Slot.PLACE if heard in _PLACE_WORDS else Slot.THING
     return ClarifyingQuestion(f"{reason[:1].upper()}{reason[1:]}", slot, heard=heard)
 
 
-def chosen(question: ClarifyingQuestion, answer: str) -> str | None:
+def chosen_candidate(question: ClarifyingQuestion, answer: str) -> str | None:
     """The candidate that an answer means: by its number, its name, a word of it, or nearly so; None when unclear."""
     words = _FILLERS.sub("", answer.lower()).strip(" ,.!?")
     said = re.sub(r"\s+(?:one|please)$", "", _LEADING.sub("", words)).strip(" ,.!?")
@@ -100,7 +100,7 @@ def chosen(question: ClarifyingQuestion, answer: str) -> str | None:
 
 def with_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> str:
     """The sentence with the answer in its place: the candidate that it means, else the answer's own words."""
-    value = chosen(question, answer) or _FILLERS.sub("", answer).strip(" ,.!?")
+    value = chosen_candidate(question, answer) or _FILLERS.sub("", answer).strip(" ,.!?")
     if question.heard is None:
         return f"{sentence.rstrip(' .,!?')} {_whereto(value)}"
     place_word = question.heard.lower() in _PLACE_WORDS
@@ -173,4 +173,6 @@ class RefusalError(Exception):
         self.reason = _LONG_WORD.sub(r"\1…", reason)
         super().__init__(self.reason)
         self.unknown = tuple(dict.fromkeys(_LONG_WORD.sub(r"\1…", word) for word in unknown))
-        self.question = left_open(self.reason, next(iter(self.unknown), None)) if question is True else question or None
+        self.question = (
+            open_question(self.reason, next(iter(self.unknown), None)) if question is True else question or None
+        )

@@ -16,11 +16,11 @@ from executive.language.limits import check_feasible, check_ways_and_speaker, no
 from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase, noun_phrases
-from executive.language.questions import ABLE, RefusalError, RefusalKind, Slot, which
+from executive.language.questions import ABLE, RefusalError, RefusalKind, Slot, which_question
 from executive.language.reading import split_items
 from executive.language.reference import Memory, resolve
 from executive.language.roles import Location
-from executive.language.tokens import Affirmed, Token, affirmed, name_table, parse_with_names, rephrased
+from executive.language.tokens import Affirmed, Token, affirmation, name_table, parse_with_names, rephrase
 from executive.words.command import Command, is_attribute
 from executive.words.knowledge import Knowledge
 from executive.words.step import Step
@@ -95,7 +95,7 @@ class Steps:
         if len(trace.text) > _MOST_CHARACTERS:
             what = f"{len(trace.text)} characters are too many for one sentence; {_MOST_CHARACTERS} at most"
             raise RefusalError(what)
-        return replace(trace, opened=rephrased(trace.text))
+        return replace(trace, opened=rephrase(trace.text))
 
     def _parse(self, trace: Trace) -> Trace:
         table = None if self.knowledge is None else name_table(self.knowledge)
@@ -103,7 +103,7 @@ class Steps:
 
     def _read(self, trace: Trace) -> Trace:
         there = any(isinstance(item, Being) and item.existential for item in trace.lead)
-        said = affirmed(trace.tokens, there=there) if trace.asked else Affirmed(trace.tokens)
+        said = affirmation(trace.tokens, there=there) if trace.asked else Affirmed(trace.tokens)
         items = split_items(said.tokens, noun_phrases(said.tokens), lead=trace.lead, silent=said.silent)
         read = replace(trace, tokens=said.tokens, affirmed=said)
         return replace(read, items=repair_disfluencies(items), unwanted=unwanted_things(items))
@@ -161,7 +161,7 @@ def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError
     slot = Slot.PLACE if place else Slot.PERSON if all(phrase.person for phrase in choice) else Slot.THING
     noun = choice[-1].head.text
     names = (f"{p.text} {noun}" if is_attribute(p.head.text) else p.text for p in choice)
-    question = which(slot, slot.value, tuple(dict.fromkeys(names)))
+    question = which_question(slot, slot.value, tuple(dict.fromkeys(names)))
     return RefusalError(question.text, (heard,), question=replace(question, heard=heard))
 
 

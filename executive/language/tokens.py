@@ -186,7 +186,7 @@ class Affirmed:
     denied: bool = False
 
 
-def affirmed(tokens: Sequence[Token], *, there: bool = False) -> Affirmed:
+def affirmation(tokens: Sequence[Token], *, there: bool = False) -> Affirmed:
     """What a statement says, or denies, to be somewhere; one that is denied in another way stays as it is.
 
     `there` says that "there is" stands before it.
@@ -243,7 +243,7 @@ _SMOOTHED: Final = "smoothed"
 _TABLES: Final = tuple("short_forms asides hesitations praises refusals searches requests counting openers".split())  # noqa: SIM905
 
 
-def rephrased(text: str) -> str:
+def rephrase(text: str) -> str:
     """The sentence as a plain command, in single blanks: "could you please get it" becomes "get it".
 
     Hesitations and words said twice are left out. Where a polite form stands inside the sentence, a comma takes its
@@ -254,7 +254,7 @@ def rephrased(text: str) -> str:
     return " ".join(text.split()).strip(" ,;:-.")
 
 
-def smoothed(text: str) -> str:
+def smooth(text: str) -> str:
     """The sentence in full forms, without hesitations, asides and words said twice; else as it was spoken."""
     for pattern, instead in _rules(_SMOOTHED):
         text = pattern.sub(instead, text)

@@ -12,7 +12,7 @@ from executive.language.clauses import CLAUSES
 from executive.language.indirect import OBJECTS
 from executive.language.items import Adverb, Chunk, Whether, verb
 from executive.language.lexicon import Patterns, any_of
-from executive.language.questions import RefusalError, RefusalKind, Slot, which
+from executive.language.questions import RefusalError, RefusalKind, Slot, which_question
 from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
 from executive.language.structure.plain import IS, IT, PlainReader, State, Supposed, behind_preposition
@@ -136,7 +136,7 @@ def _between(match: re.Match[str], knowledge: Knowledge) -> tuple[str, str]:
         what = f"I know no such door as '{match['door']}'; there are doors between {known}"
         raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
     if len(fitting) > 1:
-        question = which(Slot.PLACE, bare, tuple(f"door between {one} and {other}" for one, other in fitting))
+        question = which_question(Slot.PLACE, bare, tuple(f"door between {one} and {other}" for one, other in fitting))
         raise RefusalError(question.text, [bare], question=question)
     return fitting[0]
 

@@ -1,6 +1,6 @@
 import pytest
 
-from executive.language.questions import ClarifyingQuestion, Slot, answer_by, chosen, with_answer
+from executive.language.questions import ClarifyingQuestion, Slot, answer_by, chosen_candidate, with_answer
 from executive.language.understand import Status, understand
 from executive.words.mission import QuestionPolicy
 
@@ -36,12 +36,12 @@ CAKE = ClarifyingQuestion("I know no thing 'cake'; did you mean 'coke'?", Slot.T
     ],
 )
 def test_an_answer_means_one_of_the_candidates_or_is_unclear(answer, candidate):
-    assert chosen(TABLE, answer) == candidate
+    assert chosen_candidate(TABLE, answer) == candidate
 
 
 @pytest.mark.parametrize("answer", ["yes", "yes please", "Yeah", "coke", "the coke", "1"])
 def test_yes_is_enough_where_there_is_one_candidate(answer):
-    assert chosen(CAKE, answer) == "coke"
+    assert chosen_candidate(CAKE, answer) == "coke"
 
 
 @pytest.mark.parametrize(

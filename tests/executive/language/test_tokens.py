@@ -1,6 +1,6 @@
 import pytest
 
-from executive.language.tokens import name_table, parse_with_names, rephrased
+from executive.language.tokens import name_table, parse_with_names, rephrase
 
 
 @pytest.fixture(scope="module")
@@ -102,4 +102,4 @@ def test_every_word_still_hangs_on_a_root(parser, text):
     ],
 )
 def test_polite_forms_become_plain_commands(text, command):
-    assert rephrased(text) == command
+    assert rephrase(text) == command

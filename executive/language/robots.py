@@ -106,9 +106,7 @@ class _Reader:
                 part = replace(part, text=f"{told[0].part.text.rstrip(' .')}. {part.text}")
                 clauses = (*told, replace(clauses[0], joint=". "), *clauses[1:])
             one = self._read(part, clauses, read, memory)
-            refusal = None if one.meaning.trace is None else one.meaning.trace.refusal
-            tells_only = refusal is not None and refusal.kind is RefusalKind.NOTHING_TO_DO
-            if tells_only and number < len(parts) - 1:
+            if one.meaning.refused_as is RefusalKind.NOTHING_TO_DO and number < len(parts) - 1:
                 told = (replace(clauses[0], part=part), *clauses[1:])
                 continue
             self._refuse_as_person(one.part.text)

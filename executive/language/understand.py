@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from executive.language.cleaning import clean, foreign_reason, placeholder, strip_wake
 from executive.language.parser import DependencyParser
-from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, with_answer
+from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, with_answer
 from executive.language.reference import Memory
 from executive.language.spelling import Corrected, correct_spelling
 from executive.language.steps import Steps, Trace
@@ -61,6 +61,11 @@ class Understanding:
     def all_steps(self) -> tuple[Step, ...]:
         """What it asks for as steps: those that decide, repeat or wait, else its commands."""
         return self.steps or steps_of_commands(self.commands)
+
+    @property
+    def refused_as(self) -> RefusalKind | None:
+        """Why it became no commands; None where it did, or where it was not for this robot."""
+        return None if self.trace is None or self.trace.refusal is None else self.trace.refusal.kind
 
     def to_json(self) -> dict[str, Any]:
         """The answer as JSON values."""

@@ -19,7 +19,7 @@ from plant.kinds import RobotBody, SensorOptions
 from plant.people.receivers import Receivers
 from plant.people.walkers import Walkers
 from plant.sleeping import Sleepers
-from plant.worlds.placement import PointRoute, Receiving
+from plant.worlds.seeding import PointRoute, Receiving
 from plant.worlds.world import DoorRule
 from skills.robot import FloatArray, Pose2D, Robot
 

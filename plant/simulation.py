@@ -21,7 +21,7 @@ from plant.recording import LiveScene, Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.snapshot import SnapshotWriter, read_snapshot, restore
 from plant.worlds.lights import render_parameters
-from plant.worlds.placement import Placement, place_clutter, place_objects, place_people
+from plant.worlds.seeding import Placement, place_clutter, place_objects, place_people
 from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot
 

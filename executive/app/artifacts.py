@@ -21,7 +21,7 @@ from executive.store.resuming import told_before
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from executive.words.slug import slug
-from plant.pictures import (
+from plant.scene_pictures import (
     Bounds,
     best_view,
     draw_detection,

@@ -36,7 +36,7 @@ from executive.record.event_log import EventLog
 from executive.record.schemas import MISSIONS
 from executive.run.outcome import Outcome, RobotResult, RobotStatus
 from executive.run.visitor import Assigner, MissionEnd, Progress, RunEntry
-from executive.store.given import GivenMissions
+from executive.store.assignments import GivenMissions
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.node_view import node_view
 from executive.words.knowledge import BatteryFacts

@@ -21,7 +21,7 @@ from executive.language.addressees import Whom
 from executive.language.understand import Part
 from executive.mission.request import Request
 from executive.run.visitor import RunEntry, TickNote
-from executive.store.given import GivenMission, GivenMissions
+from executive.store.assignments import GivenMission, GivenMissions
 from executive.store.missions import MissionStore, StoredMission
 from executive.tree.check import Checked
 from executive.tree.compiler import CompiledTree

@@ -32,7 +32,7 @@ from executive.run.control import Control
 from executive.run.runner import run
 from executive.run.visitor import RunSettings
 from executive.run.worker import LockStepWorker
-from executive.store.given import GivenMissions
+from executive.store.assignments import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.words.robots import RobotConfig
 from plant.worlds.world import World

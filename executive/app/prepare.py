@@ -375,7 +375,7 @@ def _with_objects(loaded: Mission, world: World, knowledge: Knowledge) -> World:
 
 def _with_passers_by(world: World, request: Request) -> World:
     """The world with the people of the request's variation. Raises InputError: the world has no place for them."""
-    from plant.worlds.placement import with_passers_by
+    from plant.worlds.seeding import with_passers_by
 
     try:
         return with_passers_by(world, request.variation.people, request.seed)

@@ -26,8 +26,8 @@ from executive.view.html import render
 from executive.view.map_picture import map_picture
 from executive.view.styles import ROBOT_COLOURS, NodeStyle, Styles, style_of
 from executive.view.text import DRAWN_NODES, executed_tree, fold_to
-from executive.words.geometry import inside
 from executive.words.knowledge import Knowledge
+from executive.words.outlines import inside
 from skills.api import ObjectObservation
 from skills.files.errors import InputError
 

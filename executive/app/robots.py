@@ -120,7 +120,7 @@ def _free_start(world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2
 
     Raises InputError: there is none.
     """
-    from plant.worlds.placement import people_stand_W
+    from plant.worlds.seeding import people_stand_W
 
     reach_m, free = _reach_m(kind), _free_ground(world)
     places = free.centres(np.argwhere(free.distance > max(TURNING_M, reach_m)))
@@ -194,7 +194,7 @@ def stand_at(world: World, start: Start, seed: int) -> Pose2D:
     """
     if isinstance(start, Pose2D):
         return start
-    from plant.worlds.placement import place_people
+    from plant.worlds.seeding import place_people
 
     keepout = _free_ground(world)
     places = keepout.centres(np.argwhere(keepout.distance > TURNING_M))

@@ -22,8 +22,8 @@ from executive.run.control import Control
 from executive.run.visitor import RunVisitor
 from executive.store.database import STORE_FILE, StoreError
 from executive.store.journal import StoreJournal
-from executive.store.memory import Recollection
 from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.store.recollection import Recollection
 from executive.store.resuming import ended_tree, resumed_tree
 from executive.words.slug import slug
 from skills.files.errors import InputError, disk_is_full

@@ -12,7 +12,7 @@ from executive.app.report import VERDICTS
 from executive.cli.options import AS_JSON, QUIET, VIEW, VIEW_FOR, VIEW_PORT, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, show_table
 from executive.mission.request import Request
-from executive.store.given import GivenMissions
+from executive.store.assignments import GivenMissions
 from executive.store.missions import STORE as STORE_NAME
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.words.robots import robot_called

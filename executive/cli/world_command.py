@@ -87,7 +87,7 @@ def show(
     out: Annotated[Path, typer.Option("--out", help="The picture, PNG.")] = Path("world.png"),
 ) -> None:
     """Draw a world's plan: rooms, doors, walls, surfaces and the start."""
-    from plant.pictures import save_png
+    from plant.scene_pictures import save_png
     from plant.worlds.drawing import draw_world
 
     drawn = open_world(folder)

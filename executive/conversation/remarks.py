@@ -15,8 +15,8 @@ from executive.run.control import Control
 from executive.run.control_state import ControlState, Mode, RobotMode
 from executive.run.visitor import Progress
 from executive.tree.snapshot import NodeState, Snapshot
-from executive.words.geometry import distance_m
 from executive.words.knowledge import Knowledge
+from executive.words.outlines import distance_m
 from skills.robot import Pose2D
 
 NEAR_M: Final = 1.3

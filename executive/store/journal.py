@@ -14,7 +14,7 @@ from py_trees.common import Status
 from executive.mission.request import Request
 from executive.run.visitor import Progress, RunVisitor, TickNote
 from executive.store.database import form, transaction
-from executive.store.memory import Recollection, StepRecord
+from executive.store.recollection import Recollection, StepRecord
 from executive.tree.compiler import CompiledTree
 from executive.words.slug import slug
 from skills.files.kept_values import to_text

@@ -15,7 +15,7 @@ from pydantic import Json
 from executive.mission.request import Request
 from executive.store.database import STORE_FILE, Database, form
 from executive.store.journal import StoreJournal, of_robot, prefix_of
-from executive.store.memory import Memory, StepRecord
+from executive.store.recollection import Memory, StepRecord
 from skills.files.errors import InputError, listing
 from skills.files.kept_values import from_text
 from skills.robot import Pose2D

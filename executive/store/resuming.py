@@ -17,7 +17,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.run.mission_history import history_keys
-from executive.store.memory import Memory, Recollection, StepRecord
+from executive.store.recollection import Memory, Recollection, StepRecord
 from executive.tree.behaviour import Conditional, ExplainedDecorator, ExplainedNode, MemoryComposite
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import RunContext

@@ -12,8 +12,8 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, estimate_tree
 from executive.tree.plan import StepPart
 from executive.words.command import START, Task
-from executive.words.geometry import area_m2
 from executive.words.knowledge import Knowledge
+from executive.words.outlines import area_m2
 from skills.api import FreeSpace, PlanningError, Skill
 from skills.files.errors import InputError, listing, suggestion
 from skills.navigate.footprint import Footprint

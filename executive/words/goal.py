@@ -6,7 +6,7 @@ import enum
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from executive.words.geometry import inside
+from executive.words.outlines import inside
 
 
 class GoalKind(enum.Enum):

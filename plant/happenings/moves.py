@@ -13,7 +13,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from plant.kept import Kept
-from plant.worlds.placement import ATTEMPTS, Placement, candidates, outline_W, polygon_distance
+from plant.worlds.seeding import ATTEMPTS, Placement, candidates, outline_W, polygon_distance
 from plant.worlds.world import MoveRule, Point, SurfaceTop, World
 from skills.robot import FloatArray
 

@@ -18,7 +18,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
-from plant.pictures import look_at, render_view
+from plant.scene_pictures import look_at, render_view
 from plant.worlds.lights import lights
 from skills.robot import FloatArray, Picture
 

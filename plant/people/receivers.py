@@ -25,7 +25,7 @@ from pydrake.systems.framework import Context
 from plant.diagram import X_PT_HOME, WorldDiagram
 from plant.kept import Kept
 from plant.sensors.ray_shapes import ShapeKind, shape_row
-from plant.worlds.placement import Receiving
+from plant.worlds.seeding import Receiving
 from skills.robot import FloatArray
 
 LEAST_HEIGHT_M = 0.5

@@ -27,7 +27,7 @@ from plant.diagram import WorldDiagram
 from plant.happenings.doors import slide
 from plant.kept import Kept
 from plant.sensors.ray_shapes import ShapeKind, shape_row
-from plant.worlds.placement import PointRoute
+from plant.worlds.seeding import PointRoute
 from plant.worlds.world import Point, WorldError
 from skills.robot import FloatArray
 

@@ -13,7 +13,7 @@ from pydrake.multibody.tree import BodyIndex, RigidBody
 
 if TYPE_CHECKING:
     from plant.kinds import RobotKind
-    from plant.worlds.placement import Placement
+    from plant.worlds.seeding import Placement
 
 
 class Kind(enum.Enum):

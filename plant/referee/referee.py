@@ -24,7 +24,7 @@ from skills.robot import FloatArray
 
 if TYPE_CHECKING:
     from plant.kinds import RobotKind
-    from plant.worlds.placement import Placement
+    from plant.worlds.seeding import Placement
 
 PATH_VALUES = 4
 BEFORE_SAMPLES = 3

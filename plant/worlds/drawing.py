@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
-from plant.pictures import INK, MapView, draw_map
+from plant.scene_pictures import INK, MapView, draw_map
 from plant.worlds.world import Point, World
 from skills.robot import FloatArray, Intrinsics, Picture, Pose2D
 

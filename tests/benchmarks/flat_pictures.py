@@ -43,8 +43,8 @@ from errand_train.dataset.views import (
 )
 from executive.app.worlds import knowledge_of, open_world
 from plant.diagram import LooseModel, WorldDiagram, build_diagram
-from plant.pictures import look_at
 from plant.scene import RENDERER
+from plant.scene_pictures import look_at
 from plant.sensors.camera_noise import PictureDegrader, PictureNoise
 from plant.sensors.camera_spec import colour_render_camera
 from plant.worlds.lights import render_parameters

@@ -23,7 +23,7 @@ import numpy as np
 from executive.mission.stack_file import load_stack
 from plant.worlds.builder.own import world_from_grid
 from plant.worlds.builder.rooms import FREE, OCCUPIED, Grid
-from plant.worlds.placement import place_people
+from plant.worlds.seeding import place_people
 from plant.worlds.world import World, load_world
 from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap

@@ -54,9 +54,9 @@ from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from plant.models.catalogue import FACTS_FILE, read_imported
-from plant.pictures import best_view, render_view, save_png
+from plant.scene_pictures import best_view, render_view, save_png
 from plant.simulation import Simulation
-from plant.worlds.placement import place_objects
+from plant.worlds.seeding import place_objects
 from plant.worlds.world import SurfaceTop, World
 from skills.api import Job, Worker
 from skills.files.errors import InputError

@@ -32,7 +32,7 @@ from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import load_knowledge
 from plant.models.builder.importing import ObjectImportError
-from plant.models.builder.importing.reading import read_patches
+from plant.models.builder.importing.mesh_files import read_patches
 from plant.models.builder.importing.solid import solid_of
 from plant.models.catalogue import read_imported
 from plant.worlds.world import WORLDS_FOLDER, load_world

@@ -14,9 +14,9 @@ from pydrake.math import RigidTransform
 from executive.run.mission_history import is_speech
 from executive.run.outcome import RobotResult
 from executive.tree.compiler import CompiledTree, StepPart
-from executive.words.geometry import inside
 from executive.words.goal import GoalCondition, GoalKind, When
 from executive.words.knowledge import ANYBODY, Knowledge
+from executive.words.outlines import inside
 from plant.referee import Verdict
 from plant.referee.judge import LOOKS_AT_DOOR_S, judge
 from plant.referee.object_history import ObjectHistory, ObjectSample

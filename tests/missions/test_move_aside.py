@@ -23,7 +23,7 @@ from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from executive.words.policy import Policy
 from plant import simulation
-from plant.worlds.placement import place_objects
+from plant.worlds.seeding import place_objects
 from plant.worlds.world import load_world
 from tests.benchmarks.manipulation_room import TAKEN, room
 from tests.visitors import OnMessage

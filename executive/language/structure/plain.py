@@ -18,8 +18,8 @@ from executive.language.steps import Steps, Trace
 from executive.language.tokens import Token
 from executive.words.command import START, Command, Task
 from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
-from executive.words.geometry import inside
 from executive.words.knowledge import Knowledge
+from executive.words.outlines import inside
 from skills.api import Thing
 
 _LEFT_OUT: Final = frozenset({"not", "n't", "but", "except", "instead", "rather", "neither", "nor"})

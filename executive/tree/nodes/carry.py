@@ -12,7 +12,7 @@ from executive.tree.nodes.pick_up import go_near_plan
 from executive.tree.nodes.search import where
 from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.command import START
-from executive.words.geometry import inside
+from executive.words.outlines import inside
 from skills.api import Thing
 from skills.robot import Pose2D
 

@@ -12,8 +12,8 @@ from typing import Final
 
 from executive.tree.node import NodeSpec
 from executive.tree.plan import PlanBuilder, pose_2d
-from executive.words.geometry import Point, distance_m, fits, nearest_side
 from executive.words.knowledge import Door, Knowledge
+from executive.words.outlines import Point, distance_m, fits, nearest_side
 from skills.files.errors import InputError
 from skills.perception.doorway import Doorway
 from skills.robot import Pose2D

@@ -27,7 +27,7 @@ from executive.tree.nodes.pick_up import LOOK_AGAIN_S, held_plan, pick_up_plan
 from executive.tree.nodes.recovery import Recovery
 from executive.tree.nodes.search import detect_plan
 from executive.tree.plan import PlanBuilder, after
-from executive.words.geometry import Point, distance_m, inside
+from executive.words.outlines import Point, distance_m, inside
 from skills.api import FLOOR, Cause, Failed, Surface, Thing
 from skills.geometry import compose
 from skills.quantities import Coordinate, Height

@@ -16,7 +16,7 @@ from executive.tree.nodes.aside import can_move_aside, move_aside_plan
 from executive.tree.nodes.guard import Holds
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.plan import PlanBuilder
-from executive.words.geometry import inside
+from executive.words.outlines import inside
 from skills.api import Cause, Surface, Thing
 from skills.robot import Pose2D
 

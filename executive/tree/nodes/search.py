@@ -16,8 +16,8 @@ from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.command import Task
-from executive.words.geometry import inside
 from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge, Pose
+from executive.words.outlines import inside
 from skills.api import Cause, Failed, ObjectObservation, Publish, Thing
 from skills.detect.words import counted, numbered, plural, told_apart
 from skills.files.errors import listing

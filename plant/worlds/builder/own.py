@@ -11,7 +11,7 @@ import numpy as np
 from plant.models.builder.mesh import Material, Mesh, mtl_text, obj_text, palette_picture, write_text
 from plant.models.builder.sdf import Model, model_sdf
 from plant.models.builder.shapes import Box, Cylinder, Shape
-from plant.pictures import save_png
+from plant.scene_pictures import save_png
 from plant.worlds.builder.rooms import (
     BANDS_M,
     FREE,

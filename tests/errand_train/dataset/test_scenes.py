@@ -24,7 +24,7 @@ from errand_train.dataset.resting import choose, resting_poses
 from errand_train.dataset.room import random_room
 from errand_train.dataset.textures import ROLES, numbers, texture
 from errand_train.dataset.views import any_view, camera_specs
-from plant.worlds.placement import polygon_distance
+from plant.worlds.seeding import polygon_distance
 
 
 @pytest.fixture(autouse=True, scope="module")

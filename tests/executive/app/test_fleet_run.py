@@ -21,7 +21,7 @@ from executive.cli.fleet_command import _to_do, resumable_lines
 from executive.mission.request import Request
 from executive.record.history import read_events
 from executive.run.visitor import RunEntry
-from executive.store.given import GivenMissions
+from executive.store.assignments import GivenMissions
 from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
 from executive.words.command import Command, Task, parse_command

@@ -9,7 +9,7 @@ from tiny_detector import CLASSES, model_bytes, write_model
 from executive.app import simulated
 from executive.app.robots import TURNING_M, refuse_blocked, shared_detector, stand_at
 from executive.app.simulated import compile_first
-from plant.worlds.placement import place_people
+from plant.worlds.seeding import place_people
 from plant.worlds.world import load_world
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError

@@ -8,7 +8,7 @@ from executive.app.mission_run import spoken_classes
 from executive.app.prepare import prepare
 from executive.mission.request import Request
 from executive.words.variation import Variation
-from plant.worlds.placement import place_people
+from plant.worlds.seeding import place_people
 
 BEER = "Hey Alice, bring me a beer"
 

@@ -11,8 +11,8 @@ from executive.run.outcome import Outcome
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
-from executive.store.memory import Memory, StepRecord
 from executive.store.missions import MissionStore
+from executive.store.recollection import Memory, StepRecord
 from executive.store.resuming import resumed_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.node import NodeSpec

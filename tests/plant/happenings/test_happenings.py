@@ -8,7 +8,7 @@ import pytest
 
 from executive.words.mission import Route
 from plant.simulation import Simulation
-from plant.worlds.placement import place_people
+from plant.worlds.seeding import place_people
 from plant.worlds.world import DoorRule, MoveRule, SurfaceTop, WorldError, load_world
 from skills.robot import Pose2D
 

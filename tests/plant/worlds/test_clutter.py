@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from plant.worlds.placement import (
+from plant.worlds.seeding import (
     outline_of,
     place_clutter,
     place_objects,

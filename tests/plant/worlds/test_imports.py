@@ -11,7 +11,7 @@ import pytest
 from errand_train.models.outlines import triangles_of
 from plant.models.builder.importing import Wanted, import_object
 from plant.simulation import Simulation
-from plant.worlds.placement import place_objects
+from plant.worlds.seeding import place_objects
 from plant.worlds.world import WORLDS_FOLDER, ObjectRule, load_world
 from skills.files.errors import InputError
 

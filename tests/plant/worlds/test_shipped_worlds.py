@@ -19,7 +19,7 @@ from errand_train.worlds.__main__ import build
 from errand_train.worlds.plan import PLANS, load_plan
 from executive.tree.nodes.doors import view_of
 from executive.words.knowledge import load_knowledge
-from plant.worlds.placement import place_objects, place_people
+from plant.worlds.seeding import place_objects, place_people
 from plant.worlds.world import PACKAGE_NAME, World, add_package, known_worlds, load_world
 
 FOOTPRINT_M = (1.1, 0.6)  # the standing outline of 1.0 by 0.5 with 5 cm around

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from executive.words.mission import Route
-from plant.worlds.placement import place_objects, place_people
+from plant.worlds.seeding import place_objects, place_people
 from plant.worlds.world import WORLDS_FOLDER, World, known_worlds, load_world
 from skills.files.errors import InputError
 from skills.robot import Pose2D

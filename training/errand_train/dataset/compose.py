@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 from errand_train.dataset.objects import CLASSES, DISTRACTORS, ObjectModel, instance, numbers
 from errand_train.dataset.resting import choose, resting_poses
 from errand_train.dataset.room import Room, Support, random_room
-from plant.worlds.placement import polygon_distance
+from plant.worlds.seeding import polygon_distance
 from skills.robot import FloatArray
 
 SELDOM_BY_CHANCE = ("person", "extinguisher")

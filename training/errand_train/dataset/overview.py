@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from plant.pictures import save_png
+from plant.scene_pictures import save_png
 from skills.robot import Picture
 
 COLUMNS, ROWS = 8, 6

@@ -41,7 +41,7 @@ from errand_train.dataset.textures import texture
 from errand_train.dataset.views import View, any_view, camera_specs, roll_deg, view_of
 from errand_train.models.gltf import gltf_text
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture
-from plant.pictures import png_bytes
+from plant.scene_pictures import png_bytes
 from plant.sensors.camera_spec import NEAR_M, colour_render_camera
 from skills.robot import Picture
 

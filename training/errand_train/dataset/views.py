@@ -13,7 +13,7 @@ from errand_train.dataset.compose import Placed
 from errand_train.dataset.room import Obstacle, Room
 from errand_train.dataset.silhouette import project
 from plant.models.spot.description import CAMERAS
-from plant.pictures import look_at
+from plant.scene_pictures import look_at
 from plant.sensors.camera_spec import CameraSpec, load_cameras
 from skills.robot import FloatArray, Intrinsics
 

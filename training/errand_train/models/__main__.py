@@ -17,7 +17,7 @@ from errand_train.models.tray import tray, tray_appearance
 from plant.models.builder.mesh import mtl_text, obj_text, palette_picture, plain_colours, write_text
 from plant.models.builder.sdf import Model, model_sdf
 from plant.models.catalogue import MODELS_FOLDER
-from plant.pictures import save_png
+from plant.scene_pictures import save_png
 
 
 def build(folder: Path) -> None:

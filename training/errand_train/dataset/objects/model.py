@@ -14,7 +14,7 @@ from errand_train.dataset.objects.draft import Finished
 from errand_train.models.gltf import gltf_text
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, plain_colours, write_text
 from plant.models.builder.sdf import Model, model_sdf
-from plant.pictures import save_png
+from plant.scene_pictures import save_png
 from skills.robot import FloatArray
 
 HELD_OUT_EVERY = 4

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.pictures import best_view, draw_detection, draw_map, look_at, render_view, save_png, top_view
+from plant.scene_pictures import best_view, draw_detection, draw_map, look_at, render_view, save_png, top_view
 
 RED, GREY, BLUE = (np.array(rgba) for rgba in ([0.9, 0.05, 0.05, 1], [0.6, 0.6, 0.6, 1], [0.1, 0.1, 0.9, 1]))
 

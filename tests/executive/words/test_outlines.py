@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.words.geometry import distance_m, fits, inside, nearest_side
+from executive.words.outlines import distance_m, fits, inside, nearest_side
 
 SQUARE = ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
 NOTCHED = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (2.0, 1.0), (0.0, 4.0))

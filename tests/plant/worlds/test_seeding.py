@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from plant.models.catalogue import load_catalogue
-from plant.worlds.placement import Placement, outline_W, place_objects, place_people, polygon_distance
+from plant.worlds.seeding import Placement, outline_W, place_objects, place_people, polygon_distance
 from plant.worlds.world import World, WorldError, load_world
 from skills.robot import Pose2D
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.models.builder.importing.libraries import ObjectImportError
-from plant.models.builder.importing.reading import Patch, read_patches
-from plant.models.builder.importing.resting import feet, resting_rotation
+from plant.models.builder.importing.mesh_files import Patch, read_patches
+from plant.models.builder.importing.resting_pose import feet, resting_rotation
 from plant.models.builder.importing.solid import Solid, convex_parts, hull_of, same_points, solid_of
 from plant.models.builder.mesh import (
     SMOOTH_COSINE,
@@ -30,7 +30,7 @@ from plant.models.builder.mesh import (
 from plant.models.builder.sdf import Model, model_sdf
 from plant.models.builder.shapes import ConvexMesh, MassProperties, scaled_to, solid_mass
 from plant.models.catalogue import NAME, ImportedObject, load_catalogue, write_imported
-from plant.pictures import save_png
+from plant.scene_pictures import save_png
 from skills.robot import FloatArray, Picture
 
 LARGEST_M: Final = 5.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +11,7 @@ from executive.mission.gripper import InGripper, cannot_take, objection
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, estimate_tree
 from executive.tree.plan import StepPart
-from executive.words.command import START, Task
+from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import area_m2
 from skills.api import FreeSpace, PlanningError, Skill
@@ -22,6 +22,10 @@ from skills.robot import Pose2D
 from skills.stack import GlobalPlanner
 
 __all__ = ["Abilities", "Checked", "PlannedRoutes", "check_tree"]
+
+
+Fault = tuple[str, str]
+"""What speaks against a part of a mission, and a hint."""
 
 
 @dataclass(frozen=True)
@@ -94,26 +98,29 @@ def check_tree(
 ) -> Checked:
     """Check a compiled mission that begins at `start` with `held` in the gripper: are its objects there and light
     enough, its places in reach, and does the gripper hold in each step what that step needs?"""
-    impossible = tuple(error for part in tree.parts for error in _impossible(part, tree, knowledge, abilities))
-    grasps = tuple(_gripper_errors(tree, knowledge, held))
+    lines = {node.path_id: node.source for node in tree.root.walk()}
+
+    def errors(found: Iterable[tuple[StepPart, Fault]]) -> tuple[InputError, ...]:
+        """Errors at the lines that the parts come from."""
+        return tuple(InputError.at(lines.get(part.path_id), what, hint=hint) for part, (what, hint) in found)
+
+    commands = ((part, part.command) for part in tree.parts if part.command is not None)
+    impossible = errors((part, each) for part, it in commands for each in _impossible(it, knowledge, abilities))
+    needs = ((part, _objection(part, held if part.opening else part.held, knowledge)) for part in tree.parts)
+    grasps = errors((part, each) for part, each in needs if each is not None)
+    full = errors(_full_surfaces(tree, knowledge, abilities))
     estimate, unreachable, warnings = estimate_tree(tree.root, start=start, planner=planner, estimates=estimates)
-    full = tuple(_full_surfaces(tree, knowledge, abilities))
     return Checked((*impossible, *grasps, *unreachable), estimate, (*full, *warnings))
 
 
-def _gripper_errors(tree: CompiledTree, knowledge: Knowledge, held: InGripper | None) -> Iterator[InputError]:
-    """The steps that need something else in the gripper than the steps before leave there."""
-    for part in tree.parts:
-        against, before = None, held if part.opening else part.held
-        if part.command is not None:
-            against = objection(part.command, before, knowledge)
-        elif part.skill is not None:
-            against = _skill_objection(part.skill, before)
-        if against is not None:
-            yield _at(part, tree, *against)
+def _objection(part: StepPart, held: InGripper | None, knowledge: Knowledge) -> Fault | None:
+    """What a part needs else in the gripper than what the parts before leave there."""
+    if part.command is not None:
+        return objection(part.command, held, knowledge)
+    return None if part.skill is None else _skill_objection(part.skill, held)
 
 
-def _skill_objection(skill: type[Skill[Any]], held: InGripper | None) -> tuple[str, str] | None:
+def _skill_objection(skill: type[Skill[Any]], held: InGripper | None) -> Fault | None:
     """Why a skill cannot run with what is held, and a hint; None when it can."""
     if skill.gripper_before is True and held is None:
         return f"{skill.name} needs an object in the gripper, and no step before has grasped one", "grasp one first"
@@ -122,22 +129,17 @@ def _skill_objection(skill: type[Skill[Any]], held: InGripper | None) -> tuple[s
     return None
 
 
-def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[InputError]:
+def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:
     """What makes a command impossible: its object is not known by sight, none that it means can be taken, or its
     surface is out of the arm's reach."""
-    command = part.command
-    if command is None:
-        return
     handles = command.item is not None or command.task in (Task.GRASP, Task.PLACE)
     if handles and not abilities.gripper:
         what = command.item or command.object
-        yield _at(
-            part, tree, f"this kind of robot has no gripper to take the {what} with", "choose another kind of robot"
-        )
+        yield f"this kind of robot has no gripper to take the {what} with", "choose another kind of robot"
         return
-    yield from _nobody_takes(part, tree, knowledge, abilities)
+    yield from _nobody_takes(command, knowledge, abilities)
     if (command.item is not None or command.task is Task.GRASP) and command.goal is not None:
-        yield from _out_of_reach(part, tree, command.goal, knowledge, abilities)
+        yield from _out_of_reach(command.goal, knowledge, abilities)
     if command.task not in (Task.GRASP, Task.FIND) or command.object is None:
         return
     thing = command.object
@@ -147,39 +149,36 @@ def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilit
     unseen += [word for word in thing.attributes if word not in abilities.attributes]
     if command.task is Task.GRASP and not masses:
         known = [one for one in knowledge.things if one in abilities.masses_kg]
-        yield _at(part, tree, f"there is no '{thing.name}' that could be picked up", suggestion(thing.name, known))
+        yield f"there is no '{thing.name}' that could be picked up", suggestion(thing.name, known)
     elif command.task is Task.GRASP and min(masses) > abilities.lift_kg:
         message = f"'{thing.name}' is too heavy: {min(masses):g} kg, and the arm lifts {abilities.lift_kg:g} kg"
-        yield _at(part, tree, message, "ask for something lighter")
+        yield message, "ask for something lighter"
     elif command.task is Task.GRASP and (least_m := _narrowest_m(classes, abilities)) > abilities.opens_m:
         message = f"'{thing.name}' is too wide: {least_m:g} m, and the gripper takes {abilities.opens_m:g} m"
-        yield _at(part, tree, message, "ask for something narrower")
+        yield message, "ask for something narrower"
     elif unseen:
         known = [one for one in knowledge.things if one in abilities.classes]
         message = f"the robot does not know what {listing(unseen)} looks like"
-        yield _at(part, tree, message, f"it knows {listing(known)} by sight")
+        yield message, f"it knows {listing(known)} by sight"
 
 
-def _nobody_takes(
-    part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilities: Abilities
-) -> Iterator[InputError]:
+def _nobody_takes(command: Command, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:
     """That something is to be handed over where nobody is who takes it."""
-    command = part.command
-    if command is None or command.item is None or command.task is Task.PLACE or abilities.takers is None:
+    if command.item is None or command.task is Task.PLACE or abilities.takers is None:
         return
     person = None if command.goal is None else knowledge.person(command.goal)
     if command.goal == START and not abilities.takers:
         hint = "name a surface to put it on, or add somebody under 'people'"
-        yield _at(part, tree, f"nobody is in this world who could take the {command.item}", hint)
+        yield f"nobody is in this world who could take the {command.item}", hint
     elif person is not None and person not in abilities.takers:
         others = (
             f"name {listing(sorted(abilities.takers), last='or')}" if abilities.takers else "add them under 'people'"
         )
         message = f"{person} is not in this world, or takes nothing, so nobody takes the {command.item}"
-        yield _at(part, tree, message, f"{others}, or name a surface to put it on")
+        yield message, f"{others}, or name a surface to put it on"
 
 
-def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[InputError]:
+def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[tuple[StepPart, Fault]]:
     """The steps that put more on a surface than there is room for, as far as sizes and objects are known."""
     brought_m2: dict[str, float] = {}
     for part in tree.parts:
@@ -196,7 +195,7 @@ def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilitie
         taken_m2 = sum(abilities.taken_m2.get(one, 0.0) for one in surfaces)
         if width_m and brought_m2[place] > room_m2 - taken_m2:
             message = f"the {place} is probably full before the {item} is put there"
-            yield _at(part, tree, message, "name another surface, or clear it first")
+            yield part, (message, "name another surface, or clear it first")
 
 
 def _narrowest_m(classes: Collection[str], abilities: Abilities) -> float:
@@ -205,19 +204,11 @@ def _narrowest_m(classes: Collection[str], abilities: Abilities) -> float:
     return min((abilities.widths_m.get(one, 0.0) for one in light), default=0.0)
 
 
-def _out_of_reach(
-    part: StepPart, tree: CompiledTree, goal: str, knowledge: Knowledge, abilities: Abilities
-) -> Iterator[InputError]:
+def _out_of_reach(goal: str, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:
     """That something is to be taken from or put on a surface that is too high or too low for the arm."""
     surface = knowledge.surfaces.get(knowledge.place(goal) or goal)
     low_m, high_m = abilities.reaches_m
     if surface is not None and not low_m <= surface.height <= high_m:
         limit = f"down to {low_m:.2f} m" if surface.height < low_m else f"up to {high_m:.2f} m"
         message = f"the {goal} is {surface.height:g} m high, and the arm reaches {limit}"
-        yield _at(part, tree, message, "name another surface, or another kind of robot")
-
-
-def _at(part: StepPart, tree: CompiledTree, message: str, hint: str) -> InputError:
-    """An error at the line that the part comes from."""
-    source = next((node.source for node in tree.root.walk() if node.path_id == part.path_id), None)
-    return InputError.at(source, message, hint=hint)
+        yield message, "name another surface, or another kind of robot"

@@ -54,24 +54,25 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     What the mission is interrupted for is not taken up, but called for again where need be. A decision stays as it
     was made, without the looks that it took.
     """
-    afresh = {below.path_id for node in tree.mission.walk() if KINDS[node.kind].afresh for below in node.walk()}
-    settled = {node.path_id for node in tree.mission.walk() if _is_settled(node, memory)}
-    over = afresh | {p for n in tree.mission.walk() if n.path_id in settled for c in n.children for p in _paths(c)}
-    skills = {node.path_id: node for node in tree.mission.walk() if node.kind == "skill" and node.path_id not in over}
-    failed = {path for path, step in memory.steps.items() if step.status is Status.FAILURE}
+    nodes = {node.path_id: node for node in tree.mission.walk()}
+    afresh = {path for node in nodes.values() if KINDS[node.kind].afresh for path in _paths(node)}
+    settled = (node for node in nodes.values() if _is_settled(node, memory))
+    over = afresh.union(path for node in settled for path in _paths(node) if path != node.path_id)
+    specs = {path: node for path, node in nodes.items() if path not in afresh}
+    by_status = {status: {p for p, step in memory.steps.items() if step.status is status} for status in Status}
     kept = [
         path
-        for path, leaf in skills.items()
-        if path in failed or all(key in memory.board for key in leaf.options["outputs"].values())
+        for path, leaf in nodes.items()
+        if leaf.kind == SkillLeaf.kind and path not in over
+        if path in by_status[Status.FAILURE] or all(key in memory.board for key in leaf.options["outputs"].values())
     ]
     recollection = Recollection(tree.path_ids, memory.steps).only(kept)
-    specs = {node.path_id: node for node in tree.mission.walk() if node.path_id not in afresh}
     root = _with_resumed_skills(tree.root, specs.keys(), memory, recollection)
     keys = history_keys(tree.robot_name, tree.mission_name)
-    succeeded = {path for path, step in memory.steps.items() if step.status is Status.SUCCESS}
+    asked_again = {path for path, node in specs.items() if node.children}
     again = {
-        keys.answered_before: frozenset(succeeded & specs.keys()) - over,
-        keys.ended_before: frozenset(path for path, step in memory.steps.items() if step.ended) - over,
+        keys.answered_before: frozenset(by_status[Status.SUCCESS] & asked_again - over),
+        keys.ended_before: frozenset((by_status[Status.SUCCESS] | by_status[Status.FAILURE]) - over),
     }
     past = _Past(memory, specs)
     return _as_resumed(tree, past.take_up, {**memory.board, **again}, root=root), recollection
@@ -120,7 +121,7 @@ def _with_resumed_skills(
     spec: NodeSpec, taken_up: Container[str], memory: Memory, recollection: Recollection
 ) -> NodeSpec:
     """The spec with skills that give their results from before, or do their work."""
-    if spec.kind != "skill" or spec.path_id not in taken_up:
+    if spec.kind != SkillLeaf.kind or spec.path_id not in taken_up:
         children = (_with_resumed_skills(child, taken_up, memory, recollection) for child in spec.children)
         return dataclasses.replace(spec, children=tuple(children))
     skill, outputs = spec.options["skill"], spec.options["outputs"]

@@ -7,6 +7,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.mission.request import Request
+from executive.run.mission_history import history_keys
 from executive.run.outcome import Outcome
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings, RunVisitor
@@ -339,3 +340,14 @@ def test_the_operator_is_not_asked_again_about_a_step_that_was_skipped(compiled,
     node = next(node for node in again.build(context).iterate() if node.path_id == ask.path_id)
     node.decorated.status, node.decorated.cause = Status.FAILURE, Cause.EXECUTION
     assert node.update() is after
+
+
+def test_a_question_that_was_answered_is_a_finding_of_its_own_when_it_is_asked_once_more(compiled):
+    tree = compiled(*TIDY)
+    asked = NodeSpec("question", "alice/question", "ask", {"key": "alice/answer", "gives": str})
+    checked = NodeSpec("check", "alice/check", "check", {}, (NodeSpec("pause", "alice/wait", "wait"),))
+    mission = dataclasses.replace(tree.mission, children=(*tree.mission.children, asked, checked))
+    asking = dataclasses.replace(tree, root=dataclasses.replace(tree.root, children=(mission,)))
+    steps = {path: StepRecord(Status.SUCCESS, None, "", 1.0, {}) for path in (asked.path_id, checked.path_id)}
+    again, _ = resumed_tree(asking, Memory(steps, {"alice/answer": "tea"}, None))
+    assert again.board[history_keys(tree.robot_name, tree.mission_name).answered_before] == {checked.path_id}

@@ -22,7 +22,6 @@ class SpeechDetector(Protocol):
 
     def probability(self, frame: Samples) -> float:
         """How probable speech is (0 to 1) in the next FRAME samples."""
-        ...
 
 
 @dataclass(frozen=True)

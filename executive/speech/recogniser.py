@@ -30,22 +30,18 @@ class Recognition(Protocol):
     @property
     def transcripts(self) -> Sequence[Transcript]:
         """The readings, likeliest first; none when nothing was said."""
-        ...
 
     def more(self) -> Iterator[Sequence[Transcript]]:
         """The readings of further searches, each slower than the one before; each set has its likeliest first."""
-        ...
 
     def unprompted(self) -> str:
         """What is heard when no names are expected, by a quick search; empty for nothing."""
-        ...
 
     def likelihoods(self, texts: Sequence[str]) -> Sequence[float]:
         """The log likelihood of each text given the sound, when no names are expected.
 
         They can be compared with each other, not with those of `transcripts`.
         """
-        ...
 
 
 class Recogniser(Protocol):
@@ -53,11 +49,9 @@ class Recogniser(Protocol):
 
     def transcribe(self, sound: Samples, vocabulary: Vocabulary) -> Recognition:
         """Recognise at most 30 s of sound at RATE_HZ."""
-        ...
 
     def draft(self, sound: Samples, vocabulary: Vocabulary) -> str:
         """A quick first reading of a sentence that is still being spoken."""
-        ...
 
 
 _MOST_NAMES = 5_000

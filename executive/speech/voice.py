@@ -17,7 +17,6 @@ class Voice(Protocol):
 
     def say(self, text: str) -> None:
         """Begin to say `text`."""
-        ...
 
 
 class Silence:

@@ -106,7 +106,7 @@ class WhisperRecogniser:
         """The likeliest texts for an encoded sound, found with a beam of that width."""
         (result,) = self._whisper.model.generate(
             encoded,
-            [self._start(prompt)],
+            [start_tokens(self._tokens, prompt)],
             beam_size=beam,
             num_hypotheses=beam,
             max_length=448,
@@ -131,15 +131,12 @@ class WhisperRecogniser:
         several = np.repeat(np.asarray(encoded), len(texts), axis=0)
         aligned = self._whisper.model.align(
             self._ctranslate2.StorageView.from_array(np.ascontiguousarray(several)),
-            self._start("")[:-1],
+            start_tokens(self._tokens, "")[:-1],
             [self._tokens.encode(f" {text}") for text in texts],
             max(int(length_s * _FRAMES_PER_S), 2),
             median_filter_width=1,
         )
         return [sum(math.log(max(p, 1e-9)) + _PER_TOKEN for p in one.text_token_probs) for one in aligned]
-
-    def _start(self, prompt: str) -> list[int]:
-        return start_tokens(self._tokens, prompt)
 
     def encoded(self, sound: Samples) -> Any:
         """The sound as the encoder hears it, some silence behind it."""

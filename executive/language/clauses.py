@@ -40,7 +40,7 @@ class Clause:
     """A clause: what joins it to the one before, its cue (`kind`, and `cue` in words), and the other words.
 
     `part` is the part of the sentence for one addressee that it belongs to. `lead` are items that were left out before
-    it, its verb among them.
+    it, its verb among them. `before` is what is to be done where it stands behind that, as in "go home if ...".
     """
 
     joint: str
@@ -49,6 +49,7 @@ class Clause:
     cue: str = ""
     lead: tuple[Item, ...] = ()
     part: Saying | None = field(default=None, compare=False, repr=False)
+    before: str = ""
 
     @property
     def begins(self) -> bool:
@@ -74,16 +75,6 @@ class Clause:
     def then(self) -> bool:
         """Whether "then" stands before it."""
         return re.search(r"\bthen\b", self.joint, re.IGNORECASE) is not None
-
-
-@dataclass(frozen=True)
-class Behind:
-    """What stands behind what is to be done (`before`): its kind, its first words and the others."""
-
-    before: str
-    kind: Cue
-    cue: str
-    text: str
 
 
 @dataclass(frozen=True)
@@ -152,7 +143,7 @@ def _kind(text: str) -> tuple[Cue, str] | None:
     return None
 
 
-def cue_behind(text: str) -> Behind | None:
+def cue_behind(text: str) -> Clause | None:
     """The first thing that stands behind what is to be done in a clause, so that it decides or repeats that."""
     forms = CLAUSES.mapping("behind")
     found = [(match.start(), Cue(kind), match) for kind, form in forms for match in form.finditer(text, 1)]
@@ -160,7 +151,7 @@ def cue_behind(text: str) -> Behind | None:
     if not found:
         return None
     start, kind, match = min(found, key=lambda one: one[0])
-    return Behind(text[:start].strip(" ,"), kind, match[0], text[match.end() :].strip(" ,"))
+    return Clause("", text[match.end() :].strip(" ,"), kind, match[0], before=text[:start].strip(" ,"))
 
 
 def verb_positions(text: str) -> Iterator[int]:

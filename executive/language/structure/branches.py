@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from executive.language.amounts import seconds_of, time_of, times_of
-from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, cut, text_of, verb_positions
+from executive.language.clauses import ACTS, CLAUSES, Clause, Cue, cut, text_of, verb_positions
 from executive.language.items import verb
 from executive.language.questions import RefusalError
 from executive.language.structure.conditions import suppose
@@ -65,7 +65,7 @@ class Branches(Base):
                 what = f"what is to be done {clause.cue} {clause.text}? Say the condition first"
                 raise RefusalError(what, [clause.text])
             main = row.plain.pop()  # bring me a beer, if there is one
-            self.modified(row, main, Behind(main.text, clause.kind or Cue.IF, clause.cue, clause.text))
+            self.modified(row, main, replace(clause, before=main.text))
             return at + 1
         self.flush(row)
         asked = row.asked if row.asked is not None and row.asked.looked else None
@@ -240,7 +240,7 @@ class Branches(Base):
             raise RefusalError(f"I do not understand for how long: '{text}'", [text])
         for cut_at in (len(text), *verb_positions(text)) if clause.kind is Cue.UNTIL else ():
             if time_of(said := text[:cut_at].strip(" ,")) is not None:
-                return self._rounds_behind(row, (), Behind("", Cue.UNTIL, clause.cue, said)), text[cut_at:]
+                return self._rounds_behind(row, (), replace(clause, text=said)), text[cut_at:]
         supposed, rest = self.split(text, state, follows)
         return _rounds_by(clause.kind, supposed), rest
 
@@ -290,7 +290,7 @@ class Branches(Base):
         both = (Do.of(reading.commands[0]), Speak(speak=template(said.text)))
         self.put(row, Together(steps=both), reading.state)
 
-    def modified(self, row: Row, clause: Clause, found: Behind) -> None:
+    def modified(self, row: Row, clause: Clause, found: Clause) -> None:
         """What is done only if something is so, or several times."""
         scope = self._scope(row, clause, found)
         rounds: Rounds | None
@@ -310,7 +310,7 @@ class Branches(Base):
             raise RefusalError(f"I do not understand how often: '{found.cue} {found.text}'".strip(), [found.cue])
         self.repeat_of(row, rounds, scope)
 
-    def _rounds_behind(self, row: Row, scope: Sequence[Clause], found: Behind) -> Rounds:
+    def _rounds_behind(self, row: Row, scope: Sequence[Clause], found: Clause) -> Rounds:
         """ "... until there are none left", "... until three o'clock"."""
         if not found.text:
             raise RefusalError(f"{found.cue.lower()} what?", [found.cue])
@@ -320,7 +320,7 @@ class Branches(Base):
         _, state = type(self)(self.reader).sequence(scope, row.state)
         return replace(_rounds_by(found.kind, suppose(found.text, state, self.reader)), state=row.state)
 
-    def _scope(self, row: Row, clause: Clause, found: Behind) -> list[Clause]:
+    def _scope(self, row: Row, clause: Clause, found: Clause) -> list[Clause]:
         """The clauses that what stands behind belongs to. Raises RefusalError: that is not clear."""
         main = replace(clause, text=found.before)
         alone = clause.begins or (clause.then and not ACTS.comes_back.fullmatch(found.before))
@@ -339,7 +339,7 @@ class Branches(Base):
             raise unclear(found)
         return scope
 
-    def _guarded(self, row: Row, scope: Sequence[Clause], found: Behind) -> None:
+    def _guarded(self, row: Row, scope: Sequence[Clause], found: Clause) -> None:
         """What is done only if something is so."""
         if not found.text:
             raise RefusalError(f"'{found.cue}' what?", [found.cue])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from executive.language.amounts import seconds_of, times_of
-from executive.language.clauses import ACTS, CLAUSES, Behind, Clause, Cue, text_of
+from executive.language.clauses import ACTS, CLAUSES, Clause, Cue, text_of
 from executive.language.lexicon import VerbKind
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE
@@ -148,7 +148,7 @@ def checked_statement(text: str) -> str | None:
     return None if found is None else f"{found[1]} {'are' if found[1].lower() == 'you' else 'is'} {found[2]}"
 
 
-def unclear(found: Behind) -> RefusalError:
+def unclear(found: Clause) -> RefusalError:
     """The refusal of what could belong to more than one thing."""
     said = f"{found.cue} {found.text}".strip()
     return RefusalError(f"it is not clear to what '{said}' belongs; say it first", [said])

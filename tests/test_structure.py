@@ -19,7 +19,7 @@ LINES = {
     "executive/speech": 1598,
     "executive/mission": 1550,
     "executive/tree": 7405,
-    "executive/run": 3105,
+    "executive/run": 3104,
     "executive/record": 964,
     "executive/store": 1685,
     "executive/conversation": 604,

@@ -80,8 +80,7 @@ class TickNote:
 
 @dataclass(frozen=True)
 class Progress:
-    """The state of a run after each tick: node states and mission of each robot, and how it was last seen (it is looked
-    at twice a second, and when its mission ends).
+    """The state of a run after each tick: node states and mission of each robot, and how it was seen in the last 0.5 s.
 
     `notes` has the robots whose trees were ticked. Computing the tick took `tick_wall_s` on the wall's clock, which was
     too long `overruns` times so far.

@@ -44,17 +44,19 @@ def load_world(name: str = "flat") -> World:
     return open_world(name)
 
 
-def parse(sentence: str, *, knowledge: Knowledge | None = None, require_wake: bool = False) -> Understanding:
+def parse(
+    sentence: str, *, knowledge: Knowledge | None = None, require_wake: bool = False, open_words: bool = False
+) -> Understanding:
     """What a sentence means: commands, or a refusal that names the words.
 
-    `knowledge` is what the robot knows of its world, by default of `flat`. With `require_wake` the sentence must call
-    the robot by its name.
+    `knowledge` is what the robot knows of its world, by default of `flat`; with `open_words` every name is accepted
+    instead. With `require_wake` the sentence must call the robot by its name.
     """
     from executive.app.worlds import knowledge_of
     from executive.language.parser import load_parser
     from executive.language.understand import understand
 
-    known = knowledge_of(load_world()) if knowledge is None else knowledge
+    known = knowledge_of(load_world()) if knowledge is None and not open_words else knowledge
     return understand(sentence, parser=load_parser(), knowledge=known, require_wake=require_wake)
 
 

@@ -26,7 +26,7 @@ LINES = {
     "executive/view": 1383,
     "executive/testing": 813,
     "executive/app": 7508,
-    "executive/cli": 3834,
+    "executive/cli": 3833,
     "skills": 25284,
     "plant": 11959,
 }

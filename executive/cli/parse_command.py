@@ -9,11 +9,11 @@ from typing import Annotated
 
 import typer
 
+import executive
 from executive.app.worlds import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, print_json, writing
 from executive.language.explain import arcs_svg, explain, explanation_lines
-from executive.language.parser import load_parser
-from executive.language.understand import Status, Understanding, understand
+from executive.language.understand import Status, Understanding
 from executive.words.mission import DEFAULT_WORLD
 from executive.words.yaml_steps import steps_to_yaml
 from skills.files.errors import InputError
@@ -40,13 +40,12 @@ def parse(
     if svg is not None and sentence is None:
         raise InputError("--svg draws one sentence", hint='try: errand parse "go to the kitchen" --svg arcs.svg')
     knowledge = None if open_words else knowledge_of(open_world(world or DEFAULT_WORLD))
-    parser = load_parser()
     if file is None:
         lines = [sentence or ""]
     else:
         lines = read_text(file, most_bytes=20_000_000, hint="name a text file in UTF-8").splitlines()
     wake = knowledge is not None and knowledge.robot.require_wake
-    told = (understand(line, parser=parser, knowledge=knowledge, require_wake=wake) for line in lines)
+    told = (executive.parse(line, knowledge=knowledge, require_wake=wake, open_words=open_words) for line in lines)
     if jsonl:
         for meaning in told:
             print(json.dumps(_values(meaning, explained), ensure_ascii=False), flush=True)

@@ -36,6 +36,11 @@ def test_a_sentence_is_understood_by_what_is_known_of_a_world():
     assert executive.parse("go to the table", knowledge=known, require_wake=True).commands == ()
 
 
+def test_a_sentence_may_name_what_no_world_has():
+    assert executive.parse("go to the cellar").commands == ()
+    assert executive.parse("go to the cellar", open_words=True).commands[0].goal == "cellar"
+
+
 def test_a_check_says_how_long_a_mission_takes_and_where_it_goes():
     checked = executive.check(executive.Request("go to the kitchen"))
     assert (checked.ok, checked.errors) == (True, ())

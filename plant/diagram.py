@@ -34,13 +34,12 @@ from plant.happenings.doors import add_panel
 from plant.kinds import BodyOptions, LocomotionLimits, RobotBody, robot_kind
 from plant.scene import Scene
 from plant.scenery import add_model, add_scenery
-from plant.worlds.world import DoorRule
+from plant.worlds.world import DoorRule, add_package
 
 TIME_STEP_S = 0.0125
 NEAR_RIGID = 0.1
 """Contact of light objects is as soft as this times a time step's (Castro et al. 2022, section V.B); Drake's 1.0 lets
 80 N press a fingertip 3 cm into a cube of 50 g."""
-PACKAGE = "errand"
 FLOOR_TOP_M = 0.01
 TRAY_PATH = Path(__file__).parent / "models" / "tray" / "tray.sdf"
 X_PT_HOME = RigidTransform(
@@ -185,7 +184,7 @@ def parser_of(plant: MultibodyPlant) -> Parser:
     """A parser that knows the package of the worlds and models."""
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
-    parser.package_map().Add(PACKAGE, Path(__file__).parent)
+    add_package(parser.package_map())
     return parser
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import unicodedata
-from types import MappingProxyType
 from typing import Any, Final
 
 from skills.files.errors import InputError
@@ -15,7 +14,6 @@ LONGEST_TEXT: Final = 2000
 LONGEST_ANSWER: Final = 300
 """Letters of an answer, so that a sentence with it can still be said."""
 _BLANKS: Final = frozenset("\t\n\r")
-_UNWRITABLE: Final = MappingProxyType({"Cc": "a control character", "Cs": "half of a character"})
 _SHOWN: Final = 40
 
 

@@ -57,12 +57,16 @@ def test_a_number_that_json_does_not_know_is_told_as_text(findings):
     assert findings.findings[0].answer == "nan"
 
 
-def test_an_answer_given_again_after_a_restart_is_one_finding(clock):
-    board = Board("alice")
-    keys = history_keys("Alice", "patrol")
+def findings_after_a_restart(clock):
+    """The findings of a mission that had answered its question with no before."""
+    board, keys = Board("alice"), history_keys("Alice", "patrol")
     board.put(keys.findings, (Finding("alice/patrol/1", 4.0, "q", False, "none"),))
     board.put(keys.answered_before, frozenset({"alice/patrol/1"}))
-    findings = Findings(clock, board, "Alice", "patrol")
+    return Findings(clock, board, "Alice", "patrol")
+
+
+def test_an_answer_given_again_after_a_restart_is_one_finding(clock):
+    findings = findings_after_a_restart(clock)
     findings.message("answer", answered("alice/patrol/1", False, "none"))
     assert [one.t_s for one in findings.findings] == [4.0]
     clock.advance(9.0)
@@ -71,11 +75,7 @@ def test_an_answer_given_again_after_a_restart_is_one_finding(clock):
 
 
 def test_another_answer_after_a_restart_is_a_finding_of_its_own(clock):
-    board = Board("alice")
-    keys = history_keys("Alice", "patrol")
-    board.put(keys.findings, (Finding("alice/patrol/1", 4.0, "q", False, "none"),))
-    board.put(keys.answered_before, frozenset({"alice/patrol/1"}))
-    findings = Findings(clock, board, "Alice", "patrol")
+    findings = findings_after_a_restart(clock)
     findings.message("answer", answered("alice/patrol/1", True, "there"))
     assert [one.answer for one in findings.findings] == [False, True]
 

@@ -1,6 +1,7 @@
-"""A leaf that does what a script says, and counts what is done to it."""
+"""Leaves that do what a script says, and count what is done to them."""
 
 from py_trees.behaviour import Behaviour
+from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
 from executive.tree.behaviour import Explained
@@ -47,10 +48,29 @@ class Leaf(Explained, Behaviour):
             self.log.append(f"-{self.name}")
 
 
-def tick(root, times=1):
-    """Tick the root, and give its status after each."""
+class Queue(Explained, StatusQueue):
+    """Goes through `statuses`, then succeeds; says why it fails, and counts how often it is stopped."""
+
+    def __init__(self, *statuses: Status, name: str = "action", cause: Cause = Cause.EXECUTION) -> None:
+        super().__init__(name=name, queue=list(statuses), eventually=S)
+        self.path_id, self.fails_with, self.stopped = f"a/{name}", cause, 0
+        self.clear_explanation()
+
+    def update(self) -> Status:
+        status = super().update()
+        self.cause, self.message = (self.fails_with, "slipped") if status == F else (None, "goes on")
+        return status
+
+    def terminate(self, new_status: Status) -> None:
+        self.stopped += new_status == N and self.status == R
+
+
+def tick(root, times=1, clock=None, dt_s=1.0):
+    """Tick the root, after dt_s of the clock each where one is given; its status after each tick."""
     found = []
     for _ in range(times):
+        if clock is not None:
+            clock.advance(dt_s)
         root.tick_once()
         found.append(root.status)
     return found

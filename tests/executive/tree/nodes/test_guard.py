@@ -6,7 +6,6 @@ import pytest
 from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained
 from executive.tree.nodes.guard import (
     BatteryAtLeast,
     BatteryForWork,
@@ -22,8 +21,7 @@ from executive.tree.nodes.guard import (
 from executive.words.policy import StaleData
 from skills.api import Cause, Failed, Thing
 from skills.robot import Lease, Pose2D
-
-R, S, F = Status.RUNNING, Status.SUCCESS, Status.FAILURE
+from tests.executive.tree.scripted import F, N, Queue, R, S, tick
 
 
 class Readings(Condition):
@@ -206,35 +204,6 @@ def test_the_mission_stands_while_another_holds_the_lease(context, robot):
     assert OwnLease().violated(context) == Waiting("the tablet holds the lease of Alice")
 
 
-R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
-
-
-class Queue(Explained, StatusQueue):
-    """A scripted leaf that says why it fails."""
-
-    def __init__(self, *statuses: Status, cause: Cause = Cause.EXECUTION) -> None:
-        super().__init__(name="queue", queue=list(statuses), eventually=S)
-        self.path_id, self.fails_with, self.stopped = "a/queue", cause, 0
-        self.clear_explanation()
-
-    def update(self) -> Status:
-        status = super().update()
-        self.cause, self.message = (self.fails_with, "slipped") if status == F else (None, "goes on")
-        return status
-
-    def terminate(self, new_status: Status) -> None:
-        self.stopped += new_status == N and self.status == R
-
-
-def ticked(root, clock, times: int, dt_s: float = 1.0) -> list[Status]:
-    statuses = []
-    for _ in range(times):
-        clock.advance(dt_s)
-        root.tick_once()
-        statuses.append(root.status)
-    return statuses
-
-
 class Flag:
     """A condition that the test switches."""
 
@@ -255,9 +224,9 @@ class Flag:
 def test_guard_halts_its_child_when_the_condition_breaks(context, clock):
     flag, child = Flag(), Queue(R, R, R, S)
     root = Guard(path_id="a/g", name="g", child=child, condition=flag, context=context)
-    assert ticked(root, clock, 2) == [R, R]
+    assert tick(root, 2, clock) == [R, R]
     flag.bad = True
-    assert ticked(root, clock, 1) == [F]
+    assert tick(root, 1, clock) == [F]
     assert (root.cause, root.message, child.stopped, flag.begun) == (Cause.EXECUTION, "the flag fell", 1, 1)
 
 
@@ -265,13 +234,13 @@ def test_guard_does_not_begin_its_child_when_the_condition_is_broken_before(cont
     flag, child = Flag(), Queue(S)
     flag.bad = True
     root = Guard(path_id="a/g", name="g", child=child, condition=flag, context=context)
-    assert ticked(root, clock, 1) == [F]
+    assert tick(root, 1, clock) == [F]
     assert child.status == N
 
 
 def test_guard_passes_its_child_on(context, clock):
     root = Guard(path_id="a/g", name="g", child=Queue(R, F), condition=Flag(), context=context)
-    assert ticked(root, clock, 2) == [R, F]
+    assert tick(root, 2, clock) == [R, F]
     assert (root.cause, root.message) == (Cause.EXECUTION, "slipped")
 
 
@@ -305,9 +274,9 @@ def test_a_guard_contradicts_a_success_when_the_gripper_is_empty_then(context, c
     robot.holding = True
     child = Queue(R, S)
     root = Guard(path_id="a/g", name="g", child=child, condition=Holds("coke", "home", until_put_down), context=context)
-    assert ticked(root, clock, 1) == [R]
+    assert tick(root, 1, clock) == [R]
     child.update = lambda: (setattr(robot, "holding", False), S)[1]  # it falls in the tick in which the drive ends
-    assert ticked(root, clock, 1) == [status]
+    assert tick(root, 1, clock) == [status]
     assert root.cause is (None if until_put_down else Cause.EXECUTION)
 
 
@@ -317,9 +286,9 @@ def test_the_guard_leaves_an_offered_object_to_the_skill_that_offers_it(context,
     robot.holding = True
     condition = Holds("coke", "home", until_put_down=True)
     root = Guard(path_id="a/g", name="g", child=Queue(*[R] * 20), condition=condition, context=context)
-    assert ticked(root, clock, 1) == [R]
+    assert tick(root, 1, clock) == [R]
     robot.holding, context.payload.offered = False, offered
-    assert (F in ticked(root, clock, 12)) is breaks
+    assert (F in tick(root, 12, clock)) is breaks
 
 
 def test_a_guard_takes_another_object_in_the_gripper_for_what_it_is(context, clock, robot):
@@ -331,5 +300,5 @@ def test_a_guard_takes_another_object_in_the_gripper_for_what_it_is(context, clo
         condition=Holds("beer", "to Robin", known_as=("beer",)),
         context=context,
     )
-    assert ticked(root, clock, 1) == [F]
+    assert tick(root, 1, clock) == [F]
     assert (root.cause, root.message) == (Cause.PRECONDITION, "the gripper holds the hammer, not the beer")

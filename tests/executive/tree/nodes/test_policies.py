@@ -3,33 +3,13 @@
 from dataclasses import replace
 
 import pytest
-from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained
 from executive.tree.nodes.composites import MemorySequence
 from executive.tree.nodes.policies import AskOperator, GoBack, RememberPose, Retry, Skip, Summary, Timeout
 from skills.api import Cause
 from skills.robot import Pose2D
-
-R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
-
-
-class Queue(Explained, StatusQueue):
-    """A scripted leaf that says why it fails."""
-
-    def __init__(self, *statuses: Status, name: str = "action", cause: Cause = Cause.EXECUTION) -> None:
-        super().__init__(name=name, queue=list(statuses), eventually=S)
-        self.path_id, self.fails_with, self.stopped = f"a/{name}", cause, 0
-        self.clear_explanation()
-
-    def update(self) -> Status:
-        status = super().update()
-        self.cause, self.message = (self.fails_with, "slipped") if status == F else (None, "goes on")
-        return status
-
-    def terminate(self, new_status: Status) -> None:
-        self.stopped += new_status == N and self.status == R
+from tests.executive.tree.scripted import F, N, Queue, R, S, tick
 
 
 class Operator:
@@ -52,14 +32,6 @@ class Operator:
 
     def withdraw(self):
         self.withdrawn += 1
-
-
-def ticked(root, times: int) -> list[Status]:
-    statuses = []
-    for _ in range(times):
-        root.tick_once()
-        statuses.append(root.status)
-    return statuses
 
 
 def skip(child):
@@ -88,19 +60,19 @@ def test_a_skip_turns_failure_into_success_and_keeps_the_reason():
     # child  R   F
     # skip   R   S
     root = skip(Queue(R, F))
-    assert ticked(root, 2) == [R, S]
+    assert tick(root, 2) == [R, S]
     assert (root.skipped, root.cause, root.message) == ("slipped", None, "skipped: slipped")
 
 
 def test_a_skip_forgets_when_it_starts_anew():
     root = skip(Queue(F, S))
-    assert (ticked(root, 2), root.skipped) == ([S, S], None)
+    assert (tick(root, 2), root.skipped) == ([S, S], None)
 
 
 @pytest.mark.parametrize("cause", [Cause.ERROR, Cause.CANCELLED])
 def test_defects_and_cancels_are_not_skipped(cause):
     root = skip(Queue(F, cause=cause))
-    assert (ticked(root, 1), root.cause, root.skipped) == ([F], cause, None)
+    assert (tick(root, 1), root.cause, root.skipped) == ([F], cause, None)
 
 
 def test_the_answer_retry_starts_the_child_anew(ask):
@@ -109,7 +81,7 @@ def test_the_answer_retry_starts_the_child_anew(ask):
     # ask     R   R   R   R   S
     operator = Operator("retry")
     root = ask(Queue(R, F, S), operator)
-    assert ticked(root, 5) == [R, R, R, R, S]
+    assert tick(root, 5) == [R, R, R, R, S]
     assert (root.skipped, operator.asked[0].text) == (None, "slipped. What now?")
 
 
@@ -117,7 +89,7 @@ def test_the_answer_retry_starts_the_child_anew(ask):
 def test_the_answers_skip_and_stop_end_it(ask, answer, end):
     operator = Operator(answer)
     root = ask(Queue(F), operator, text="What now?")
-    assert ticked(root, 3) == [R, R, end]
+    assert tick(root, 3) == [R, R, end]
     assert operator.asked[0].text == "What now? (slipped)"
     assert (root.skipped, root.cause) == (("slipped", None) if end == S else (None, Cause.EXECUTION))
 
@@ -125,14 +97,14 @@ def test_the_answers_skip_and_stop_end_it(ask, answer, end):
 def test_stopping_takes_the_question_back(ask):
     operator = Operator("skip")
     root = ask(Queue(F), operator)
-    ticked(root, 1)
+    tick(root, 1)
     root.stop(N)
     assert (operator.withdrawn, root.status, root.cause) == (1, N, Cause.CANCELLED)
 
 
 def test_a_defect_is_not_asked_about(ask):
     operator = Operator()
-    assert (ticked(ask(Queue(F, cause=Cause.ERROR), operator), 1), operator.asked) == ([F], [])
+    assert (tick(ask(Queue(F, cause=Cause.ERROR), operator), 1), operator.asked) == ([F], [])
 
 
 @pytest.mark.parametrize(("back", "says"), [(S, "is back where it started"), (F, "could not go back: slipped")])
@@ -142,25 +114,25 @@ def test_the_way_back_ends_in_the_first_failure(back, says):
     # root  R   R   R   F
     action, way = Queue(R, F, cause=Cause.PLANNING), Queue(R, back, name="back")
     root = GoBack(path_id="a/return", name="return", children=[action, way])
-    assert ticked(root, 4) == [R, R, R, F]
+    assert tick(root, 4) == [R, R, R, F]
     assert (root.cause, root.message) == (Cause.PLANNING, f"slipped; the robot {says}")
 
 
 def test_there_is_no_way_back_after_success():
     action, way = Queue(R, S), Queue(S, name="back")
-    assert ticked(GoBack(path_id="a/return", name="return", children=[action, way]), 2) == [R, S]
+    assert tick(GoBack(path_id="a/return", name="return", children=[action, way]), 2) == [R, S]
     assert way.status == N
 
 
 def test_there_is_no_way_back_after_a_defect():
     action, way = Queue(F, cause=Cause.ERROR), Queue(S, name="back")
-    assert ticked(GoBack(path_id="a/return", name="return", children=[action, way]), 1) == [F]
+    assert tick(GoBack(path_id="a/return", name="return", children=[action, way]), 1) == [F]
     assert way.status == N
 
 
 def test_the_way_back_begins_with_the_deed_when_it_starts_anew():
     action, way = Queue(F, S), Queue(S, name="back")
-    assert ticked(GoBack(path_id="a/return", name="return", children=[action, way]), 3) == [R, F, S]
+    assert tick(GoBack(path_id="a/return", name="return", children=[action, way]), 3) == [R, F, S]
 
 
 @pytest.mark.parametrize(
@@ -173,7 +145,7 @@ def test_the_way_back_begins_with_the_deed_when_it_starts_anew():
 )
 def test_the_summary_names_what_was_skipped(first, steps, status, says):
     root = Summary(path_id="a/summary", name="summary", child=skip(Queue(first)), steps=steps)
-    assert ticked(root, 1) == [status]
+    assert tick(root, 1) == [status]
     assert says in root.message
 
 
@@ -194,15 +166,6 @@ def test_remember_pose_waits_until_localised_and_gives_up(context, clock):
     assert (leaf.status, leaf.cause) == (Status.FAILURE, Cause.PRECONDITION)
 
 
-def ticked_each_second(root, clock, times: int, dt_s: float = 1.0) -> list[Status]:
-    statuses = []
-    for _ in range(times):
-        clock.advance(dt_s)
-        root.tick_once()
-        statuses.append(root.status)
-    return statuses
-
-
 def timeout(child, clock, limit_s=1.5):
     return Timeout(path_id="a/t", name="t", child=child, limit_s=limit_s, clock=clock)
 
@@ -218,67 +181,67 @@ def test_timeout_fails_on_the_robots_clock_even_when_success_comes_late(clock, l
     # timeout  R   R   F
     child = Queue(R, R, last, R)
     root = timeout(child, clock)
-    assert ticked_each_second(root, clock, 3) == [R, R, F]
+    assert tick(root, 3, clock) == [R, R, F]
     assert root.cause is Cause.TIMEOUT
     assert child.status != R
 
 
 def test_timeout_stops_a_running_child(clock):
     child = Queue(R, R, R, R)
-    ticked_each_second(timeout(child, clock), clock, 3)
+    tick(timeout(child, clock), 3, clock)
     assert child.stopped == 1
 
 
 def test_timeout_lets_success_in_time_and_failure_pass(clock):
-    assert ticked_each_second(timeout(Queue(R, S), clock), clock, 2) == [R, S]
+    assert tick(timeout(Queue(R, S), clock), 2, clock) == [R, S]
     root = timeout(Queue(R, R, F), clock)
-    assert ticked_each_second(root, clock, 3) == [R, R, F]
+    assert tick(root, 3, clock) == [R, R, F]
     assert root.cause is Cause.EXECUTION
 
 
 def test_timeout_starts_anew_after_an_end(clock):
     root = timeout(Queue(R, R, R, R, S), clock)
-    assert ticked_each_second(root, clock, 3) == [R, R, F]
-    assert ticked_each_second(root, clock, 2) == [R, S]
+    assert tick(root, 3, clock) == [R, R, F]
+    assert tick(root, 2, clock) == [R, S]
 
 
 def test_retry_tries_again_one_tick_later_until_it_works(clock):
     # child  F  F  S
     # retry  R  R  S
     root = retry(Queue(F, F, S))
-    assert ticked_each_second(root, clock, 2) == [R, R]
+    assert tick(root, 2, clock) == [R, R]
     assert "attempt 3 of 3, since slipped" in root.message
-    assert ticked_each_second(root, clock, 1) == [S]
+    assert tick(root, 1, clock) == [S]
 
 
 def test_retry_is_bounded_and_says_how_often(clock):
     root = retry(Queue(F, F, F))
-    assert ticked_each_second(root, clock, 3) == [R, R, F]
+    assert tick(root, 3, clock) == [R, R, F]
     assert (root.cause, root.message) == (Cause.EXECUTION, "slipped (after 3 attempts)")
 
 
 @pytest.mark.parametrize("cause", [Cause.TIMEOUT, Cause.ERROR, Cause.PRECONDITION])
 def test_retry_leaves_other_causes_alone(clock, cause):
     root = retry(Queue(F, S, cause=cause))
-    assert ticked_each_second(root, clock, 1) == [F]
+    assert tick(root, 1, clock) == [F]
     assert root.cause is cause
 
 
 def test_retry_begins_a_sequence_at_its_first_step(clock):
     first, second = Queue(S, R, S), Queue(F, S)
     root = retry(MemorySequence(path_id="a/s", name="s", children=[first, second]))
-    assert ticked_each_second(root, clock, 3) == [R, R, S]
+    assert tick(root, 3, clock) == [R, R, S]
     assert first.status == S
 
 
 def test_retry_counts_from_one_after_an_end(clock):
     root = retry(Queue(F, F, F, F, F, S))
-    assert ticked_each_second(root, clock, 3) == [R, R, F]
-    assert ticked_each_second(root, clock, 3) == [R, R, S]
+    assert tick(root, 3, clock) == [R, R, F]
+    assert tick(root, 3, clock) == [R, R, S]
 
 
 def test_interrupted_decorators_say_so(context, clock):
     for root in (timeout(Queue(R, R), clock), retry(Queue(R, R))):
-        ticked_each_second(root, clock, 1)
+        tick(root, 1, clock)
         root.stop(N)
         assert (root.cause, root.children[0].status) == (Cause.CANCELLED, N)

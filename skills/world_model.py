@@ -1,4 +1,4 @@
-"""What skills know of the world: objects that were seen, where the robot is, and where there is room.
+"""World model of skills: seen objects, the estimated pose, and free space.
 
 Skills of others import these names from `skills.api`.
 """
@@ -185,4 +185,4 @@ NO_WORK_COUNTER: Final = NoWorkCounter()
 
 
 IN_THE_WAY: Final = "in_the_way"
-"""The output port of what keeps a robot from grasping an object: the objects that stand about it."""
+"""Output port with the objects that block every grasp."""

@@ -33,7 +33,7 @@ _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCEL
 
 @dataclass(frozen=True)
 class Watching:
-    """What controls a run and who watches it, as `run_request` takes them."""
+    """The control and the watchers of a run, as `run_request` takes them."""
 
     control: Control
     visitors: Sequence[RunVisitor] = ()
@@ -178,7 +178,7 @@ class MissionRuns:
         return self.set_aside(mission, cause)
 
     def _give_up_broken_off(self, mission: StoredMission) -> None:
-        """Give up what was broken off for a mission that is run at once: it could not be taken up afterwards."""
+        """Gives up missions that were broken off, because the mission that runs now replaces their world."""
         for broken in self._missions.missions(MissionState.RUNNING):
             self._missions.finish(
                 broken.id, MissionState.CANCELLED, f"broken off, and given up for mission {mission.id}"
@@ -225,7 +225,7 @@ class MissionRuns:
 
     @contextmanager
     def _cancelling(self, control: Control) -> Iterator[None]:
-        """Have `cancel` cancel the run of this control, also where it came before."""
+        """Lets `cancel` cancel this run, also when `cancel` was called before the run began."""
         self._control = control
         if self._cancelled is not None:
             control.cancel(self._cancelled)
@@ -331,7 +331,7 @@ class TakenUp:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """What became of its past so far."""
+        """Lines for the user: what was taken over of the mission's past."""
         return tuple(line for each in self.recollections for line in each.told)
 
 

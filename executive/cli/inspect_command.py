@@ -145,7 +145,7 @@ _FORMS: Final[Mapping[TreeFormat, Callable[[NodeView], str]]] = {
     TreeFormat.JSON: lambda view: json.dumps(to_json(view), ensure_ascii=False) + "\n",
 }
 _MOST: Final = {TreeFormat.TEXT: MANY_NODES, TreeFormat.SVG: DRAWN_NODES, TreeFormat.MERMAID: DRAWN_NODES}
-"""Programs, which read the other forms, do not mind a large tree."""
+"""Most nodes of the forms that people read; programs read the other forms, at any size."""
 
 
 @takes_request("sentence", "world")

@@ -59,7 +59,7 @@ class Understanding:
 
     @property
     def all_steps(self) -> tuple[Step, ...]:
-        """What it asks for as steps: those that decide, repeat or wait, else its commands."""
+        """The steps of the sentence; its commands as steps where it has no blocks."""
         return self.steps or steps_of_commands(self.commands)
 
     @property

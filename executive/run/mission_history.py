@@ -1,4 +1,4 @@
-"""What a mission has done so far: when its parts ran, what it found out and said, and what its claim tells of that."""
+"""History of a mission: when its parts ran, what it found and said, and the text of its claim."""
 
 from __future__ import annotations
 

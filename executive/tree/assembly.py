@@ -35,7 +35,7 @@ class Named:
     quantity: Any = None
 
     def is_alike(self, kind: Any) -> bool:
-        """Whether its values and those of a type are of one kind for expressions, or of the same type."""
+        """Whether expressions may compare its values with those of type `kind`."""
         return self.type is kind or (kind_of(self.type) is kind_of(kind) and kind_of(kind) is not Kind.OTHER)
 
     def is_same(self, other: Named | None) -> bool:

@@ -74,7 +74,7 @@ class ExplainedNode(_TakesKeywords, Explained):
         return {}
 
     def say_again(self, status: Status, cause: Cause | None, message: str) -> None:
-        """Say what it said before a restart."""
+        """Takes over the status, cause and message that the node had before a restart."""
         self.status, self.cause, self.message = status, cause, message
 
     def fail(self, failure: Failed) -> Status:
@@ -155,7 +155,7 @@ class MemoryComposite(ExplainedNode, Composite):
     least: ClassVar[int] = 1
     children: list[Behaviour]
     taken_up: bool = field(default=False, init=False)
-    """Set before the first tick of a mission that goes on after a restart: nothing is forgotten then."""
+    """Whether the mission goes on after a restart; then the first tick forgets nothing."""
     _index: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:

@@ -129,7 +129,7 @@ class _Walk:
     drawn: float = 0.0
 
     def draw(self, node: NodeSpec, taken: Estimate) -> Estimate:
-        """A skill draws so much of a full battery, or charges it; the one that empties it is warned of."""
+        """Adds the charge that a skill draws, or that it restores; warns at the skill that empties the battery."""
         before, self.drawn = self.drawn, 0.0 if node.name == CHARGE else self.drawn + taken.charge
         if before <= 1.0 < self.drawn:
             hint = f"charge before it (`skill: {CHARGE}`) or split the mission, or it is interrupted for the dock"

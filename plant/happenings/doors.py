@@ -94,7 +94,7 @@ class _Panel(Kept):
     history: list[tuple[float, float]]
 
     def move_to(self, share: float, now_s: float) -> None:
-        """Take a share, and record a change between open, closed and moving."""
+        """Opens the door by `share` (0 to 1), and records when it becomes open, closed or moving."""
         self.share = share
         told = share if share in (0.0, 1.0) else 0.5
         if told != self.history[-1][1]:

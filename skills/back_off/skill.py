@@ -42,12 +42,12 @@ class BackOff(BackOffPorts, MovingSkill[BackOffInputs]):
     options: BackOffOptions
 
     def begin(self, inputs: BackOffInputs) -> None:
-        """Start anew."""
+        """Starts a new attempt."""
         super().begin(inputs)
         self._scans = ScanHealth(self.context)
 
     def trouble(self) -> SkillFailure | None:
-        """A LiDAR that does not work."""
+        """Reports a LiDAR that does not work."""
         trouble = self._scans.trouble()
         if trouble is None:
             return None

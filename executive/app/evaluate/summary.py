@@ -55,7 +55,7 @@ class Group:
 
     @property
     def label(self) -> str:
-        """Its dimension and name in words."""
+        """Dimension and name of the group, in words."""
         return label_of(self.dimension, self.name)
 
     @cached_property

@@ -1,6 +1,6 @@
-"""Gives out work, one function for many items, to processes of this machine or a Dask cluster; each may die.
+"""Workers: run one function on many items, in processes of this machine or on a Dask cluster.
 
-A Dask cluster needs the extra `cluster`.
+A worker may die; its item is given to another. A Dask cluster needs the extra `cluster`.
 """
 
 from __future__ import annotations

@@ -310,7 +310,7 @@ def look_plan(builder: PlanBuilder, number: int, look: Look | DoorOpen, key: str
 
 
 def decision_of(flow: Flow, condition: Condition, builder: PlanBuilder) -> Decision:
-    """The decision of a condition whose looks stand at the builder. Raises InputError, as `decide_plan`."""
+    """The decision of a condition, with the looks that `builder` has planned. Raises InputError like `decide_plan`."""
     source, parts = builder.source, list(parts_of(condition))
     expressions = [part.expression for part in parts if isinstance(part, ValueIs)]
     for expression in expressions:

@@ -17,7 +17,7 @@ def below(node):
     return [each for child in node.__subclasses__() for each in (child, *below(child))]
 
 
-def test_every_kind_is_one_class():
+def test_each_kind_of_node_has_exactly_one_class():
     named = [
         node.kind for node in below(ExplainedNode) if node.__module__.startswith(kinds.nodes.__name__) and node.kind
     ]

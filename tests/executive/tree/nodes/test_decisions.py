@@ -123,13 +123,13 @@ TABLE = [
 
 
 @pytest.mark.parametrize(("parts", "every", "some"), TABLE)
-def test_combinations(view, answered, parts, every, some):
+def test_all_and_any_know_an_answer_as_soon_as_one_look_decides_it(view, answered, parts, every, some):
     both, either = answered(AllOf(all=(LOOK, LOOK)), *parts), answered(AnyOf(any=(LOOK, LOOK)), *parts)
     assert (both.holds(view), either.holds(view)) == (every, some)
 
 
 @pytest.mark.parametrize(("part", "whole"), [(True, False), (False, True), (None, None)])
-def test_not(view, answered, part, whole):
+def test_not_turns_an_answer_and_leaves_an_unknown_one(view, answered, part, whole):
     assert answered(Not(**{"not": LOOK}), part).holds(view) is whole
 
 

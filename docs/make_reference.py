@@ -90,7 +90,7 @@ SCHEMA_PAGES = (
         "Skill tests",
         "`*.skilltest.yaml`: tests of one skill as data, collected by pytest.",
         SkillTestFile,
-        "tests/skills/stow/stow.skilltest.yaml",
+        "tests/skills/manipulation/stow/stow.skilltest.yaml",
     ),
 )
 

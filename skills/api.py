@@ -208,7 +208,7 @@ class Payload:
 
 @dataclass
 class SeenSolid:
-    """Solid cells (N, 3) of the world near the robot, as its depth pictures show them; see `skills.arm.solid_cells`.
+    """Solid cells (N, 3) of the world near the robot, from its depth images (`skills.manipulation.arm.solid_cells`).
 
     `views` are the last depth pictures, thinned out, each with the X_WO of its time.
     """

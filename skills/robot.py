@@ -74,7 +74,7 @@ class ArmCapabilities:
     `carry_best_x_m` and low. Where what is carried so sticks out over furniture, the hand is drawn in to the first of
     `tuck_x_m`, turned to a side; none for an arm that carries within the body's outline.
     Joints that turn without end are `continuous` in the description. `inverse` solves its inverse kinematics; None for
-    the families whose closed form `skills.arm.kinematics` reads from the description.
+    the families whose closed form `skills.manipulation.arm.kinematics` reads from the description.
     """
 
     joint_names: tuple[str, ...]

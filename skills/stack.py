@@ -24,12 +24,12 @@ from skills.quantities import shown
 from skills.robot import FloatArray, GripperCapabilities, Pose2D
 
 if TYPE_CHECKING:
-    from skills.arm.collision import ArmScene
-    from skills.arm.motion import ArmPlanner
     from skills.detection import Detector
     from skills.estimate.grid_map import GridMap
-    from skills.grasp.candidates import GraspCandidate, Target
-    from skills.grasp.planning import GraspPlan, Surroundings
+    from skills.manipulation.arm.collision import ArmScene
+    from skills.manipulation.arm.motion import ArmPlanner
+    from skills.manipulation.grasp.candidates import GraspCandidate, Target
+    from skills.manipulation.grasp.planning import GraspPlan, Surroundings
     from skills.navigate.follower import Drive
     from skills.navigate.footprint import Footprint
     from skills.navigate.path import Path as WayPath

@@ -86,15 +86,19 @@ def test_no_module_breaks_the_import_rule(package: str) -> None:
 @pytest.mark.parametrize(
     ("path", "source", "expected"),
     [
-        ("skills/grasp/skill.py", "from plant.simulation import Simulation", ["plant.simulation.Simulation"]),
-        ("skills/grasp/skill.py", "import executive.run.runner", ["executive.run.runner"]),
+        (
+            "skills/manipulation/grasp/skill.py",
+            "from plant.simulation import Simulation",
+            ["plant.simulation.Simulation"],
+        ),
+        ("skills/manipulation/grasp/skill.py", "import executive.run.runner", ["executive.run.runner"]),
         ("plant/spot/robot.py", "from skills.api import Surface", ["skills.api.Surface"]),
         ("plant/spot/robot.py", "from skills.robot import Robot", []),
         ("plant/worlds/world.py", "from skills.files.yaml_source import read_yaml", []),
         ("plant/referee/judge.py", "from executive.words.goal import GoalCondition", []),
         ("plant/referee/judge.py", "from executive.tree import goals", ["executive.tree.goals"]),
         ("executive/words/goal.py", "from executive.language import steps", ["executive.language.steps"]),
-        ("executive/words/goal.py", "from skills.grasp import ports", ["skills.grasp.ports"]),
+        ("executive/words/goal.py", "from skills.manipulation.grasp import ports", ["skills.manipulation.grasp.ports"]),
         ("executive/run/runner.py", "def f():\n    import plant.simulation", ["plant.simulation"]),
         ("executive/run/runner.py", "from executive.cli.entry import app", ["executive.cli.entry.app"]),
         ("executive/run/runner.py", "from skills.api import Cause", []),

@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 813,
     "executive/app": 7508,
     "executive/cli": 3833,
-    "skills": 25284,
-    "plant": 11959,
+    "skills": 25290,
+    "plant": 11958,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 495, 84, 20
+MODULES, ONE_IMPORTER, SAME_NAME = 496, 84, 20
 """All modules; those that one other imports; file names that stand more than once."""
 
 

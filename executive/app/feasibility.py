@@ -21,8 +21,8 @@ from executive.tree.estimate import Route, RoutePlanner, load_estimates
 from plant.kinds import robot_kind
 from plant.models.catalogue import load_catalogue
 from plant.worlds.world import World
-from skills.arm.kinematics import arm_model
 from skills.files.errors import Problems
+from skills.manipulation.arm.kinematics import arm_model
 from skills.perception.attributes import known_attributes
 from skills.perception.class_forms import class_forms
 from skills.robot import Capabilities, Pose2D

@@ -80,8 +80,8 @@ def _bend_arm() -> None:
     from pydrake.math import RigidTransform
 
     from plant.kinds import robot_kind
-    from skills.arm.collision import ArmScene, Box, gaps_m
-    from skills.arm.kinematics import arm_model
+    from skills.manipulation.arm.collision import ArmScene, Box, gaps_m
+    from skills.manipulation.arm.kinematics import arm_model
 
     capabilities = robot_kind("fetch").capabilities()
     model = arm_model(capabilities)
@@ -97,7 +97,7 @@ def _see_cells() -> None:
     """Take in a depth picture for the arm."""
     from pydrake.math import RigidTransform
 
-    from skills.arm.solid_cells import Outline, with_picture
+    from skills.manipulation.arm.solid_cells import Outline, with_picture
     from skills.robot import FrameTree, Image, Intrinsics
 
     lens, depth_m = Intrinsics(2, 2, 1.0, 1.0, 1.0, 1.0), np.ones((2, 2), dtype=np.float32)

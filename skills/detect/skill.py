@@ -21,8 +21,6 @@ from skills.api import (
     Surface,
     Thing,
 )
-from skills.arm.looking_skill import LookingSkill
-from skills.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
 from skills.detect.messages import (
     coverage_message,
     detections_message,
@@ -35,6 +33,8 @@ from skills.detect.unidentified import most_free_first, segments_3d, unnamed
 from skills.detect.viewpoints import in_plain_view, look_targets, surface_boxes
 from skills.detect.words import counted, describe, surface_names, wanted
 from skills.geometry import wrap
+from skills.manipulation.arm.looking_skill import LookingSkill
+from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
 from skills.perception.attributes import known_attributes, shows
 from skills.perception.class_forms import THING, class_forms
 from skills.perception.coverage import Coverage

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Surface
-from skills.arm.collision import Box
 from skills.geometry import grid_inside
+from skills.manipulation.arm.collision import Box
 from skills.perception.detection_3d import depth_ahead_m
 from skills.perception.surface_segmentation import Cluster
 from skills.robot import FloatArray, Image

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from skills.arm.kinematics import arm_model
-from skills.arm.pull import levers_m
+from skills.manipulation.arm.kinematics import arm_model
+from skills.manipulation.arm.pull import levers_m
 from skills.robot import Capabilities, Joints
 
 PULL_N = 15.0

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import SkillContext
-from skills.arm.kinematics import ArmModel, arm_model
+from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.navigate.footprint import Footprint
 from skills.robot import FloatArray
 

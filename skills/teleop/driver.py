@@ -13,8 +13,8 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.api import SkillContext
-from skills.arm.collision import ArmScene
-from skills.arm.kinematics import ArmModel, arm_model
+from skills.manipulation.arm.collision import ArmScene
+from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.navigate.base import Base
 from skills.navigate.follower import FollowerOptions
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m

@@ -12,7 +12,7 @@ from table_scene import LENS, taken
 
 from plant.fetch.kind import fetch_capabilities
 from plant.models.fetch.description import HEAD_CAMERA
-from skills.arm.kinematics import arm_model
+from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import CommandState, CommandStatus, FrameTree, Image, Joints
 
 HEAD_CAPABILITIES = fetch_capabilities()

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from skills.api import Detection, Surface
-from skills.arm.poses import camera_pose
+from skills.manipulation.arm.poses import camera_pose
 from skills.robot import FrameTree, Image, Intrinsics
 
 LENS = Intrinsics(320, 240, 276.0, 276.0, 160.0, 120.0)

@@ -19,7 +19,7 @@ from executive.tree.behaviour import ExplainedDecorator, suspend
 from executive.tree.context import RunContext
 from executive.words.policy import StaleData
 from skills.api import Cause, Failed, Thing
-from skills.arm.hold import Grip, HoldWatch, grip_again, hold_watch
+from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.perception.class_forms import THING
 from skills.robot import Pose2D
 

@@ -16,8 +16,8 @@ from executive.cli.entry import app
 from executive.cli.robot_command import TerminalKeys, context_for, page_actions, period
 from executive.mission.load import load_mission
 from executive.view.page_control import RefusedError
-from skills.arm.kinematics import arm_model
 from skills.files.errors import InputError
+from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Pose2D
 from skills.teleop.driver import SavedPose, Teleop, TeleopOptions
 

@@ -210,6 +210,6 @@ def test_a_class_that_only_declares_gives_the_skill_when_it_is_called(declared, 
 
 def test_ports_that_name_a_class_of_another_skill_are_refused(declared):
     (found,) = skills_of([declared]).values()
-    found.done_by = "skills.stow.skill:Stow"
+    found.done_by = "skills.manipulation.stow.skill:Stow"
     with pytest.raises(TypeError, match=r"skills\.stow\.skill:Stow does not derive from WavePorts"):
         found.loaded()

@@ -10,11 +10,11 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scripted_robot import CAPABILITIES, GRIPPER, MODEL, ScriptedRobot, context_of
 
 from skills.api import Running, Succeeded
-from skills.arm.collision import ArmScene, box_corners
-from skills.arm.collision import Box as HeldBox
-from skills.arm.poses import carry_configuration
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.self_filter import ArmShape, SelfFilter
+from skills.manipulation.arm.collision import ArmScene, box_corners
+from skills.manipulation.arm.collision import Box as HeldBox
+from skills.manipulation.arm.poses import carry_configuration
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import NoWayError, plan_path

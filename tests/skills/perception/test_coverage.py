@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform
 from table_scene import GREY, TABLE, Can, scene
 
 from skills.api import Surface
-from skills.arm.poses import camera_pose
+from skills.manipulation.arm.poses import camera_pose
 from skills.perception.coverage import Coverage, SurfaceShares
 
 AWAY = Surface("shelf", ((-3.0, -0.5), (-2.0, -0.5), (-2.0, 0.5), (-3.0, 0.5)), 0.75)

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from table_scene import BLUE, CAMERA, COKE, GREY, LENS, RED, TABLE, Can, scene, seen_as
 
 from skills.api import Detection
-from skills.arm.poses import camera_pose
+from skills.manipulation.arm.poses import camera_pose
 from skills.perception.position import position_of
 from skills.robot import FrameTree, Image
 

@@ -8,9 +8,9 @@ import pytest
 
 from skills.api import ObjectObservation, Surface
 from skills.detect.skill import Detect, DetectInputs
+from skills.manipulation.stow.skill import Stow, StowInputs
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
-from skills.stow.skill import Stow, StowInputs
 
 
 def run_pytest(folder, **files):

@@ -7,8 +7,8 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 from table_scene import CAMERA, COKE, TABLE, scene
 
-from skills.arm.poses import camera_pose
 from skills.detection import Detection
+from skills.manipulation.arm.poses import camera_pose
 from skills.perception.detector.camera_images import (
     brightened,
     detections_in,

@@ -1,0 +1,1 @@
+"""The skills that use the arm, and the arm that they share: motion, collisions, poses, gaze, holding."""

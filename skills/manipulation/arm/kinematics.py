@@ -1,0 +1,286 @@
+"""Kinematics of two families of arms, read from the robot's own URDF.
+
+One has a shoulder yaw, two parallel pitch joints and a spherical roll-pitch-roll wrist; the other seven joints (see
+`seven_joints`). All poses are in the body frame B; the hand frame H is the last arm link's, x along the fingers, z
+along their closing. The inverse is solved in closed form, every branch and no seeds, or by the solver that the robot's
+capabilities bring.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from skills.geometry import wrap
+from skills.manipulation.arm.seven_joints import AXES, JOINTS, SevenJoints
+from skills.robot import Capabilities, FloatArray, InverseKinematics
+
+_EXPECTED_AXES = ((0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0))
+
+
+@dataclass(frozen=True)
+class ChainJoint:
+    """One revolute joint: X_PF is its frame in the parent link, limits in rad, `child` the link that it moves.
+
+    The limits of one that turns without end are infinite.
+    """
+
+    name: str
+    child: str
+    X_PF: RigidTransform
+    axis: tuple[float, float, float]
+    lower_rad: float
+    upper_rad: float
+
+
+@dataclass(frozen=True)
+class ArmModel:
+    """Forward and inverse kinematics of the arm."""
+
+    joints: tuple[ChainJoint, ...]
+    stowed_rad: FloatArray
+    solver: InverseKinematics | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Arm joint names from the shoulder on."""
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def hand_link(self) -> str:
+        """Name of the last arm link."""
+        return self.joints[-1].child
+
+    @cached_property
+    def lower_rad(self) -> FloatArray:
+        """Lower joint limits (J,)."""
+        return np.array([joint.lower_rad for joint in self.joints])
+
+    @cached_property
+    def upper_rad(self) -> FloatArray:
+        """Upper joint limits (J,)."""
+        return np.array([joint.upper_rad for joint in self.joints])
+
+    @cached_property
+    def endless(self) -> NDArray[np.bool_]:
+        """Which joints turn without end (J,)."""
+        return np.isinf(self.upper_rad)
+
+    @property
+    def p_BS(self) -> FloatArray:
+        """The shoulder in the body frame (3,), m."""
+        return np.asarray(self.joints[0].X_PF.translation())
+
+    def X_BH(self, q_rad: FloatArray) -> RigidTransform:
+        """Pose of the hand for joint angles q_rad (J,)."""
+        rotation, positions = self._chain(q_rad)
+        return RigidTransform(RotationMatrix.ProjectToRotationMatrix(rotation), positions[-1])
+
+    def points_B(self, q_rad: FloatArray) -> FloatArray:
+        """Where the joints are, from the shoulder on, (J, 3) in the body frame."""
+        return np.array(self._chain(q_rad)[1])
+
+    def _chain(self, q_rad: FloatArray) -> tuple[NDArray[np.float64], list[FloatArray]]:
+        """Rotation of the hand, and the place of each joint."""
+        rotation, position, positions = np.eye(3), np.zeros(3), []
+        for joint, angle in zip(self.joints, q_rad, strict=True):
+            position = position + rotation @ joint.X_PF.translation()
+            rotation = rotation @ joint.X_PF.rotation().matrix() @ _axis_rotation(joint.axis, float(angle))
+            positions.append(position)
+        return rotation, positions
+
+    def within_limits(self, q_rad: FloatArray, margin_rad: float = 0.0) -> bool:
+        """Whether q_rad keeps margin_rad from every limit."""
+        return bool(np.all(q_rad >= self.lower_rad + margin_rad) and np.all(q_rad <= self.upper_rad - margin_rad))
+
+    def turned_near(self, q_rad: FloatArray, q_near_rad: FloatArray) -> FloatArray:
+        """The same posture with joints that turn without end within half a turn of q_near_rad; both (J,)."""
+        if not self.endless.any():
+            return q_rad
+        turned = q_rad + math.tau * np.round((q_near_rad - q_rad) / math.tau)
+        return np.where(self.endless, turned, q_rad)
+
+    def off_rad(self, q_rad: FloatArray, q_other_rad: FloatArray) -> float:
+        """The largest turn of a joint between two postures; whole turns do not count where they change nothing."""
+        return float(np.max(np.abs(self.turned_near(q_rad, q_other_rad) - q_other_rad)))
+
+    def inverse(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> tuple[FloatArray, ...]:
+        """Joint angles that put the hand at X_BH and keep margin_rad from the limits; empty when out of reach.
+
+        Six joints give all that there are, seven a choice.
+        """
+        if self._seven is not None:
+            return tuple(self._seven.solutions(X_BH, margin_rad))
+        solutions = self._closed_form(X_BH) if self.solver is None else self.solver(X_BH)
+        return tuple(q for q in solutions if self.within_limits(q, margin_rad))
+
+    def reaches(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> bool:
+        """Whether there are joint angles that put the hand at X_BH and keep margin_rad from the limits."""
+        if self._seven is not None:
+            return self._seven.reaches(X_BH, margin_rad)
+        return bool(self.inverse(X_BH, margin_rad))
+
+    @cached_property
+    def _seven(self) -> SevenJoints | None:
+        """The solver of an arm with seven joints."""
+        if self.solver is not None or len(self.joints) != JOINTS:
+            return None
+        x, _, z = np.array([joint.X_PF.translation() for joint in self.joints]).T
+        return SevenJoints(
+            self.p_BS,
+            *(float(x[1]), float(z[1])),
+            *(float(x[2] + x[3]), float(x[4] + x[5]), float(x[6])),
+            _roll(self.joints[-1].X_PF.rotation()),
+            self.lower_rad,
+            self.upper_rad,
+        )
+
+    def _closed_form(self, X_BH: RigidTransform) -> list[FloatArray]:
+        """Every branch of an arm with shoulder yaw, two pitch joints and a spherical wrist."""
+        solutions = []
+        for q_arm in self._arm_branches(X_BH.translation() - self.p_BS):
+            R_BE = _axis_rotation((0, 0, 1), q_arm[0]) @ _axis_rotation((0, 1, 0), q_arm[1] + q_arm[2])
+            for q_wrist in _wrist_branches(R_BE.T @ X_BH.rotation().matrix()):
+                solutions.append(wrap(np.array([*q_arm, *q_wrist])))
+        return solutions
+
+    def nearest_inverse(
+        self, X_BH: RigidTransform, q_near_rad: FloatArray, margin_rad: float = 0.03
+    ) -> FloatArray | None:
+        """The inverse solution nearest to q_near_rad, or None when out of reach."""
+        if self._seven is not None:
+            return self._seven.nearest(X_BH, q_near_rad, margin_rad)
+        solutions = self.inverse(X_BH, margin_rad)
+        return min(solutions, key=lambda q: float(np.max(np.abs(q - q_near_rad))), default=None)
+
+    def _arm_branches(self, p_SW: FloatArray) -> list[tuple[float, float, float]]:
+        """Angles of the first three joints that put the wrist at p_SW from the shoulder."""
+        upper = float(self.joints[2].X_PF.translation()[0])
+        fore_x, _, fore_z = self.joints[3].X_PF.translation()
+        fore, bend = math.hypot(fore_x, fore_z), math.atan2(fore_z, fore_x)
+        radius, yaw = math.hypot(p_SW[0], p_SW[1]), math.atan2(p_SW[1], p_SW[0])
+        cosine = (radius**2 + p_SW[2] ** 2 - upper**2 - fore**2) / (2 * upper * fore)
+        if abs(cosine) > 1.0:
+            return []
+        branches = []
+        for (turn, sign), elbow in itertools.product(((0.0, 1.0), (math.pi, -1.0)), (1.0, -1.0)):
+            fold = elbow * math.acos(cosine)
+            pitch = math.atan2(p_SW[2], sign * radius) - math.atan2(
+                fore * math.sin(fold), upper + fore * math.cos(fold)
+            )
+            branches.append((yaw + turn, -pitch, bend - fold))
+        return branches
+
+
+def _axis_rotation(axis: tuple[float, ...], angle_rad: float) -> NDArray[np.float64]:
+    """Rotation matrix about one of the coordinate axes."""
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    if axis[2]:
+        return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+    if axis[1]:
+        return np.array([[c, 0, s], [0, 1.0, 0], [-s, 0, c]])
+    return np.array([[1.0, 0, 0], [0, c, -s], [0, s, c]])
+
+
+def _wrist_branches(R: NDArray[np.float64]) -> list[tuple[float, float, float]]:
+    """Roll, pitch, roll angles whose product is R; at the singularity the first roll is zero."""
+    sine = math.hypot(R[0, 1], R[0, 2])
+    if sine < 1e-6:
+        return [(0.0, 0.0 if R[0, 0] > 0 else math.pi, math.atan2(R[2, 1], R[1, 1]))]
+    return [
+        (
+            math.atan2(sign * R[1, 0], -sign * R[2, 0]),
+            math.atan2(sign * sine, R[0, 0]),
+            math.atan2(sign * R[0, 1], sign * R[0, 2]),
+        )
+        for sign in (1.0, -1.0)
+    ]
+
+
+def _roll(R: RotationMatrix) -> float:
+    """The angle of a turn about x."""
+    return math.atan2(R.matrix()[2, 1], R.matrix()[1, 1])
+
+
+def _floats(text: str) -> tuple[float, float, float]:
+    x, y, z = (float(part) for part in text.split())
+    return x, y, z
+
+
+def _read_joint(element: ElementTree.Element) -> ChainJoint:
+    """A ChainJoint from a URDF joint element."""
+    origin, limit, child, axis = (element.find(tag) for tag in ("origin", "limit", "child", "axis"))
+    xyz = _floats(origin.get("xyz", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
+    rpy = _floats(origin.get("rpy", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
+    endless = element.get("type") == "continuous"
+    if child is None or axis is None or (limit is None and not endless):
+        raise ValueError(f"URDF joint {element.get('name')}: it needs <limit>, <child> and <axis>")
+    lower, upper = (
+        (limit.get("lower", "0"), limit.get("upper", "0")) if limit is not None and not endless else ("-inf", "inf")
+    )
+    return ChainJoint(
+        name=element.get("name", ""),
+        child=child.get("link", ""),
+        X_PF=RigidTransform(RollPitchYaw(np.array(rpy)), np.array(xyz)),
+        axis=_floats(axis.get("xyz", "1 0 0")),
+        lower_rad=float(lower),
+        upper_rad=float(upper),
+    )
+
+
+def _check_structure(joints: tuple[ChainJoint, ...]) -> None:
+    """Raise ValueError when the closed-form inverse does not fit the chain."""
+    axes = tuple(tuple(round(a) for a in joint.axis) for joint in joints)
+    offsets = [joint.X_PF.translation() for joint in joints]
+    turns = [joint.X_PF.rotation() for joint in joints]
+    if len(joints) == JOINTS:  # a hand that is turned about the last axis makes no other arm
+        turns[-1] = turns[-1].MakeXRotation(-_roll(turns[-1])) @ turns[-1]
+    turned = any(not turn.IsNearlyIdentity(1e-6) for turn in turns)
+    names = [joint.name for joint in joints]
+    if len(joints) == JOINTS:
+        straight = np.allclose([offsets[1][1], *(p for k in range(2, JOINTS) for p in offsets[k][1:])], 0, atol=1e-6)
+        if axes != AXES or turned or not straight:
+            raise ValueError(f"arm {names}: not seven joints z-y-x-y-x-y-x in a straight line; axes {axes}")
+        return
+    straight = all(np.allclose(offsets[k], 0, atol=1e-6) for k in (1, 4, 5)) and np.allclose(
+        [offsets[2][1], offsets[2][2], offsets[3][1]], 0, atol=1e-6
+    )
+    if axes != _EXPECTED_AXES or turned or not straight:
+        raise ValueError(f"arm {names}: not a z-y-y arm with an x-y-x wrist; axes {axes}")
+
+
+@lru_cache(maxsize=4)
+def _read_model(
+    description: str,
+    names: tuple[str, ...],
+    stowed: tuple[float, ...],
+    closed_form: bool,
+) -> ArmModel:
+    robot = ElementTree.fromstring(description.replace("drake:", "drake-"))  # the prefix is often left undeclared
+    elements = {element.get("name"): element for element in robot.findall("joint")}
+    missing = [name for name in names if name not in elements]
+    if missing:
+        raise ValueError(f"URDF of the robot: no joint {', '.join(missing)}")
+    joints = tuple(_read_joint(elements[name]) for name in names)
+    if closed_form:
+        _check_structure(joints)
+    return ArmModel(joints, np.array(stowed))
+
+
+def arm_model(capabilities: Capabilities) -> ArmModel:
+    """The arm described by a robot's capabilities.
+
+    Raises ValueError when it has none, or one of another structure that brings no solver of its own.
+    """
+    if capabilities.arm is None or capabilities.gripper is None:
+        raise ValueError("the robot has no arm with a gripper")
+    names, stowed, solver = capabilities.arm.joint_names, capabilities.arm.stowed_rad, capabilities.arm.inverse
+    model = _read_model(capabilities.description, names, stowed[: len(names)], solver is None)
+    return model if solver is None else replace(model, solver=solver)

@@ -1,0 +1,68 @@
+"""The force at the hand, from what the arm's joints do against what they did while nothing pulled."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from skills.manipulation.arm.kinematics import ArmModel
+from skills.robot import FloatArray
+
+_STEP_RAD = 1e-4
+_DAMPING_M = 0.12
+"""Levers (m) far below this tell nothing of a force: an arm that is stretched out hardly feels a pull along itself."""
+
+
+def levers_m(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray) -> FloatArray:
+    """How far (m, body frame) each joint moves the point p_HO of the hand per radian, (3, J)."""
+    steps = _STEP_RAD * np.eye(len(q_rad))
+    ways = [model.X_BH(q_rad + step) @ p_HO - model.X_BH(q_rad - step) @ p_HO for step in steps]
+    return np.asarray(np.array(ways).T / (2.0 * _STEP_RAD))
+
+
+def hand_force_n(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> FloatArray:
+    """The force (3,), N, body frame, at p_HO of the hand against which the joints hold with extra_nm (J,) more."""
+    J = levers_m(model, q_rad, p_HO)
+    return np.asarray(-np.linalg.solve(J @ J.T + _DAMPING_M**2 * np.eye(3), J @ extra_nm))
+
+
+@dataclass
+class PullWatch:
+    """Whether somebody pulls at the hand: the mean of the last readings against a baseline that the first ones give.
+
+    A pull is a force beyond `threshold_n` at `ticks` readings in a row.
+    """
+
+    model: ArmModel
+    p_HO: FloatArray
+    threshold_n: float
+    ticks: int = 3
+    baseline_readings: int = 10
+    mean_of: int = 4
+    force_n: float = field(default=0.0, init=False)
+    _first: list[FloatArray] = field(default_factory=list, init=False)
+    _last: deque[FloatArray] = field(default_factory=deque, init=False)
+    _stamp_s: float = field(default=-math.inf, init=False)
+    _felt: int = field(default=0, init=False)
+
+    def felt(self, stamp_s: float, q_rad: FloatArray, efforts_nm: FloatArray) -> bool:
+        """Take in a reading, unless it was taken in before; whether somebody pulls."""
+        if stamp_s > self._stamp_s:
+            self._stamp_s = stamp_s
+            self._take(q_rad, efforts_nm)
+        return self._felt >= self.ticks
+
+    def _take(self, q_rad: FloatArray, efforts_nm: FloatArray) -> None:
+        if len(self._first) < self.baseline_readings:
+            self._first.append(efforts_nm)
+            return
+        self._last.append(efforts_nm)
+        if len(self._last) > self.mean_of:
+            self._last.popleft()
+        extra_nm = np.mean(self._last, axis=0) - np.mean(self._first, axis=0)
+        self.force_n = float(np.linalg.norm(hand_force_n(self.model, q_rad, self.p_HO, extra_nm)))
+        enough = len(self._last) == self.mean_of and self.force_n > self.threshold_n
+        self._felt = self._felt + 1 if enough else 0

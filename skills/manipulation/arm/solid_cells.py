@@ -1,0 +1,215 @@
+"""What stands within the arm's reach, as depth pictures show it: solid cells of the world, given as boxes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+
+from skills.estimate.compiled import compiled
+from skills.manipulation.arm.collision import Box
+from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, lens_rays
+from skills.robot import FloatArray, Image, Intrinsics
+
+CELL_M: Final = 0.04
+_NEAREST_M, _FURTHEST_M = 0.28, 2.5
+_FEWEST_POINTS = 4
+_SEEN_PAST_M = 0.08
+_SHADOW_CELLS = 8
+_FLOOR_M = 0.05
+_SPAN = 1 << 20
+_OFFSET = _SPAN // 2
+_STRIDES = np.array([_SPAN**2, _SPAN, 1])
+_THINNED, _VIEWS_KEPT = 8, 32
+
+Cells = NDArray[np.int64]
+View = tuple[Image, RigidTransform]
+"""A depth picture and the X_WO of its time."""
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What is the robot's own, from above: all between two corners (2,) of the body frame at a pose X_WB."""
+
+    X_WB: RigidTransform
+    low_m: FloatArray
+    high_m: FloatArray
+
+    def holds(self, points_W: FloatArray) -> NDArray[np.bool_]:
+        """Which world points (N, 3) lie within."""
+        points_B = (points_W - self.X_WB.translation()) @ self.X_WB.rotation().matrix()[:, :2]
+        return np.asarray(np.all((points_B > self.low_m) & (points_B < self.high_m), axis=1))
+
+
+def with_picture(cells: Cells, image: Image, X_WO: RigidTransform, own: Outline) -> Cells:
+    """The cells (N, 3) of before without those that a depth picture sees past, and those in which it has points.
+
+    Points of the robot's own are passed over.
+    """
+    X_WC, (x_C, y_C) = camera_pose_W(image, X_WO), lens_rays(image.depth_intrinsics)
+    eye, body = X_WC.GetAsMatrix34(), own.X_WB.GetAsMatrix34()
+    keys, counts = np.unique(_keys(image.depth_m, x_C, y_C, eye, body, own.low_m, own.high_m), return_counts=True)
+    kept = cells[~_seen_past(cells, image, X_WO)]
+    return _unique(np.vstack([kept, _cells(keys[counts >= _FEWEST_POINTS])]))
+
+
+@compiled
+def _keys(
+    depth_m: NDArray[np.float32],
+    x_C: FloatArray,
+    y_C: FloatArray,
+    X_WC: FloatArray,
+    X_WB: FloatArray,
+    low_B: FloatArray,
+    high_B: FloatArray,
+) -> NDArray[np.int64]:
+    """The keys of the cells of all points of a depth picture but the robot's own; poses are (3, 4) matrices.
+
+    `x_C` and `y_C` are x/z of each column and y/z of each row.
+    """
+    keys = np.empty(depth_m.size, dtype=np.int64)
+    found = 0
+    for v in range(depth_m.shape[0]):
+        for u in range(depth_m.shape[1]):
+            z = np.float64(depth_m[v, u])
+            if not MIN_DEPTH_M < z < _FURTHEST_M:
+                continue
+            dx = z * (X_WC[0, 0] * x_C[u] + X_WC[0, 1] * y_C[v] + X_WC[0, 2])
+            dy = z * (X_WC[1, 0] * x_C[u] + X_WC[1, 1] * y_C[v] + X_WC[1, 2])
+            dz = z * (X_WC[2, 0] * x_C[u] + X_WC[2, 1] * y_C[v] + X_WC[2, 2])
+            x, y, height = dx + X_WC[0, 3], dy + X_WC[1, 3], dz + X_WC[2, 3]
+            if height <= _FLOOR_M or dx * dx + dy * dy + dz * dz <= _NEAREST_M * _NEAREST_M:
+                continue
+            bx, by, bz = x - X_WB[0, 3], y - X_WB[1, 3], height - X_WB[2, 3]
+            ahead = bx * X_WB[0, 0] + by * X_WB[1, 0] + bz * X_WB[2, 0]
+            left = bx * X_WB[0, 1] + by * X_WB[1, 1] + bz * X_WB[2, 1]
+            if low_B[0] < ahead < high_B[0] and low_B[1] < left < high_B[1]:
+                continue
+            i, j, k = math.floor(x / CELL_M), math.floor(y / CELL_M), math.floor(height / CELL_M)
+            keys[found] = ((i + _OFFSET) * _SPAN + j + _OFFSET) * _SPAN + k + _OFFSET
+            found += 1
+    return keys[:found]
+
+
+def solid_boxes(
+    cells: Cells, X_WB: RigidTransform, reach_m: float, left_out: Callable[[FloatArray], NDArray[np.bool_]]
+) -> list[Box]:
+    """Boxes in the body frame about the cells within a reach, but those whose middles p_W (N, 3) are `left_out`.
+
+    What is behind a cell, up to 32 cm and within the reach, is unknown and counts as solid, too: of a board only the
+    edge is seen.
+    """
+    middles, origin_W = _middles(cells), X_WB.translation()
+    middles = middles[np.linalg.norm((middles - origin_W)[:, :2], axis=1) < reach_m]
+    middles = middles[~left_out(middles)]
+    if len(middles) == 0:
+        return []
+    away = (middles - origin_W) * [1.0, 1.0, 0.0]
+    away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
+    deep = np.concatenate([middles + n * CELL_M * away for n in range(_SHADOW_CELLS)])
+    deep = deep[np.linalg.norm(deep - origin_W, axis=1) < reach_m]
+    X_BW = X_WB.inverse()
+    solid = np.floor(deep[~left_out(deep)] / CELL_M).astype(np.int64)
+    return [_box(low, high, X_BW) for low, high in merged(solid)]
+
+
+def boxes_of(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArray], NDArray[np.bool_]]) -> list[Box]:
+    """Boxes in the body frame about those cells alone whose middles p_W (N, 3) are `chosen`."""
+    X_BW = X_WB.inverse()
+    return [_box(low, high, X_BW) for low, high in merged(cells[chosen(_middles(cells))])]
+
+
+def _middles(cells: Cells) -> FloatArray:
+    """The middles (N, 3) of cells, m."""
+    return np.asarray((cells + 0.5) * CELL_M, dtype=np.float64)
+
+
+def _unique(cells: Cells) -> Cells:
+    """Each cell once, in order."""
+    return _cells(np.unique(((cells + _OFFSET) * _STRIDES).sum(axis=1)))
+
+
+def _cells(keys: NDArray[np.int64]) -> Cells:
+    """The cells (N, 3) of keys (N,)."""
+    return np.stack([keys // _STRIDES[0], keys // _STRIDES[1] % _SPAN, keys % _SPAN], axis=1) - _OFFSET
+
+
+def with_view(views: Sequence[View], image: Image, X_WO: RigidTransform) -> tuple[View, ...]:
+    """The last views with one more, of which each eighth row and column of the depth is kept."""
+    lens, thin = image.depth_intrinsics, _THINNED
+    depth_m = image.depth_m[thin // 2 :: thin, thin // 2 :: thin]
+    kept = Intrinsics(
+        width=depth_m.shape[1],
+        height=depth_m.shape[0],
+        fx=lens.fx / thin,
+        fy=lens.fy / thin,
+        cx=(lens.cx - thin // 2) / thin,
+        cy=(lens.cy - thin // 2) / thin,
+    )
+    nothing = np.empty((0, 0), dtype=np.uint8)
+    thinned = replace(image, colour=None, grey=nothing, depth_m=depth_m, depth_intrinsics=kept)
+    return (*views[1 - _VIEWS_KEPT :], (thinned, X_WO))
+
+
+def never_seen(points_W: FloatArray, views: Iterable[View]) -> NDArray[np.bool_]:
+    """Which world points (N, 3) lie in no view, or far behind what it shows: just behind it all counts as solid."""
+    unseen = np.ones(len(points_W), dtype=np.bool_)
+    for image, X_WO in views:
+        inside, z, depth = _at_pixels(points_W, image, X_WO)
+        unseen &= ~(inside & ((depth == 0.0) | (depth > z - _SHADOW_CELLS * CELL_M)))
+    return unseen
+
+
+def _seen_past(cells: Cells, image: Image, X_WO: RigidTransform) -> NDArray[np.bool_]:
+    """Which cells lie clearly before what the picture shows at their pixel."""
+    inside, z, depth = _at_pixels(_middles(cells), image, X_WO)
+    return np.asarray(inside & (depth > z + _SEEN_PAST_M))
+
+
+def _at_pixels(
+    points_W: FloatArray, image: Image, X_WO: RigidTransform
+) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+    """Which points (N, 3) a depth picture covers, how far ahead of the camera they are, and its depth there (m)."""
+    X_CW = camera_pose_W(image, X_WO).inverse()
+    p_C = points_W @ X_CW.rotation().matrix().T + X_CW.translation()
+    lens = image.depth_intrinsics
+    z = np.maximum(p_C[:, 2], 1e-6)
+    u = np.rint(p_C[:, 0] / z * lens.fx + lens.cx).astype(np.int64)
+    v = np.rint(p_C[:, 1] / z * lens.fy + lens.cy).astype(np.int64)
+    inside = (p_C[:, 2] > _NEAREST_M) & (u >= 0) & (u < lens.width) & (v >= 0) & (v < lens.height)
+    depth = np.zeros(len(points_W))
+    depth[inside] = image.depth_m[v[inside], u[inside]]
+    return inside, z, depth
+
+
+def merged(cells: Cells) -> list[tuple[Cells, Cells]]:
+    """Few boxes (first cell, cell after the last) that cover exactly these cells: runs, joined where they are equal."""
+    boxes = np.concatenate([cells, cells + 1], axis=1)
+    for axis, others in ((2, (0, 1, 3, 4)), (1, (0, 2, 3, 5)), (0, (1, 4, 2, 5))):
+        boxes = _joined(boxes, axis, others)
+    return [(low, high) for low, high in zip(boxes[:, :3], boxes[:, 3:], strict=True)]
+
+
+def _joined(boxes: Cells, axis: int, others: Sequence[int]) -> Cells:
+    """Boxes (N, 6) joined along an axis where one begins in the other's last cell or after it and `others` are equal.
+
+    They come in the order of the columns `others`, then along the axis.
+    """
+    boxes = boxes[np.lexsort([boxes[:, each] for each in (axis, *reversed(others))])]
+    begins = np.ones(len(boxes), dtype=np.bool_)
+    begins[1:] = (boxes[1:, others] != boxes[:-1, others]).any(axis=1) | (boxes[1:, axis] > boxes[:-1, axis + 3])
+    firsts = np.flatnonzero(begins)
+    joined, lasts = boxes[firsts], np.append(firsts[1:], len(boxes))[: len(firsts)] - 1
+    joined[:, axis + 3] = boxes[lasts, axis + 3]
+    return joined
+
+
+def _box(low: Cells, high: Cells, X_BW: RigidTransform) -> Box:
+    size = (high - low) * CELL_M
+    middle = 0.5 * (low + high) * CELL_M
+    return Box(X_BW @ RigidTransform(middle), (float(size[0]), float(size[1]), float(size[2])))

@@ -1,0 +1,147 @@
+"""What a picture from near shows of the object to grasp, and of what is around it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.api import LocalisationEstimate, ObjectObservation, Surface, Thing
+from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
+from skills.manipulation.arm.collision import Box
+from skills.manipulation.grasp.candidates import Target
+from skills.manipulation.grasp.planning import Obstacle
+from skills.perception.class_forms import THING
+from skills.perception.detection_3d import Detection3D
+from skills.perception.point_cloud import camera_pose_W
+from skills.perception.surface_segmentation import Cluster, SurfaceView, apart, cluster_of, parted, view_surface
+from skills.robot import FloatArray, Image
+
+LOOK_HALF_SIDE_M, SURFACE_AROUND_M = 0.4, 0.2
+_SURFACE_YIELDS_M = 0.003
+
+
+@dataclass(frozen=True)
+class CloseView:
+    """The object and what is around it, seen closely; X_WB at that time. `others` are objects among the boxes."""
+
+    target: Target
+    boxes: tuple[Box, ...]
+    target_box: Box
+    X_WB: RigidTransform
+    others: tuple[Obstacle, ...] = ()
+
+    def moved(self, offset_B: FloatArray) -> CloseView:
+        """The same with the object offset_B (3,), level, beside where it was."""
+        x, y = np.array(self.target.centre_B) + offset_B[:2]
+        target = replace(self.target, points_B=self.target.points_B + offset_B, centre_B=(float(x), float(y)))
+        box = Box(RigidTransform(offset_B) @ self.target_box.X_FG, self.target_box.size_m)
+        return replace(self, target=target, target_box=box)
+
+
+def square(
+    position_W: tuple[float, float, float], height_m: float, name: str, half: float = LOOK_HALF_SIDE_M
+) -> Surface:
+    """A square patch about a point."""
+    x, y, _ = position_W
+    corners = ((x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half))
+    return Surface(name, corners, height_m)
+
+
+def examine(
+    image: Image,
+    X_WB: RigidTransform,
+    surface: Surface,
+    seen: ObjectObservation,
+    place: LocalisationEstimate,
+    found: tuple[Detection3D, ...],
+    within_m: float,
+) -> CloseView | None:
+    """The object of a class, looked for within a distance (m) of where it was seen; None: it is not there."""
+    view = view_surface(image, place.X_WO, surface, margin_m=0.0)
+    if view is None:
+        return None
+    own = [each for each in found if seen.thing.name in (THING, each.detection.class_name)]
+    view = reduce(parted, own, view)
+    if seen.thing.name == THING:
+        view, own = apart(view, camera_pose_W(image, place.X_WO).translation()), []
+    cluster = _same_thing(view, seen, own, within_m)
+    if cluster is None:
+        return None
+    names = {id(cluster_of(view.clusters, each)): each.class_name for each in found}
+    others = tuple(
+        Obstacle(_observed(each, names.get(id(each), THING), seen, image), tuple(cluster_boxes([each], X_WB)))
+        for each in view.clusters
+        if each is not cluster
+    )
+    surfaces = surface_boxes([_seen_surface(view, surface, cluster.shape.centre)], X_WB)
+    boxes = (*surfaces, *(box for other in others for box in other.boxes))
+    return CloseView(_target(cluster, X_WB), boxes, cluster_box(cluster, X_WB), X_WB, others)
+
+
+def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, float]) -> Surface:
+    """The surface as far as its own points show it, and as much all around the object, since its edge may be unseen.
+
+    It lies a little low: fingers that take something thin come within a millimetre of it, and feel for it.
+    """
+    xy = view.plane_points.p_W[:, :2]
+    low, high = np.percentile(xy, [0.2, 99.8], axis=0)
+    low, high = (
+        np.minimum(low, np.array(centre) - SURFACE_AROUND_M),
+        np.maximum(high, np.array(centre) + SURFACE_AROUND_M),
+    )
+    corners = ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))
+    top_m = view.plane.height_m - _SURFACE_YIELDS_M
+    return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), top_m)
+
+
+def _same_thing(
+    view: SurfaceView, seen: ObjectObservation, found: Sequence[Detection3D], within_m: float
+) -> Cluster | None:
+    """The cluster that is the object: detected as of its class and nearest, else nearest of all; None: all are far."""
+    expected = np.array(seen.position_W[:2])
+
+    def off(cluster: Cluster) -> float:
+        return float(np.linalg.norm(np.array(cluster.shape.centre) - expected))
+
+    classed = [cluster for each in found if (cluster := cluster_of(view.clusters, each)) is not None]
+    for clusters in (classed, view.clusters):
+        near = [cluster for cluster in clusters if off(cluster) < within_m]
+        if near:
+            return min(near, key=off)
+    return None
+
+
+def _observed(cluster: Cluster, name: str, beside: ObjectObservation, image: Image) -> ObjectObservation:
+    """Another object than the one looked at, as it was seen; it rests on the same surface."""
+    (x, y), shape = cluster.shape.centre, cluster.shape
+    return ObjectObservation(
+        stamp_s=image.stamp_s,
+        thing=Thing(name),
+        position_W=(float(x), float(y), cluster.base_m + 0.5 * shape.height_m),
+        size_m=(shape.length_m, shape.width_m, shape.height_m),
+        yaw_rad=shape.yaw_rad,
+        score=1.0,
+        surface=beside.surface,
+    )
+
+
+def _target(cluster: Cluster, X_WB: RigidTransform) -> Target:
+    X_BW = X_WB.inverse()
+    shape = cluster.shape
+    points_B = cluster.points.p_W @ X_BW.rotation().matrix().T + X_BW.translation()
+    centre_B = X_BW @ np.array([*shape.centre, cluster.base_m])
+    axis_B = X_BW.rotation().matrix() @ np.array([np.cos(shape.yaw_rad), np.sin(shape.yaw_rad), 0.0])
+    return Target(
+        points_B=points_B,
+        centre_B=(float(centre_B[0]), float(centre_B[1])),
+        yaw_rad=float(np.arctan2(axis_B[1], axis_B[0])),
+        length_m=shape.length_m,
+        width_m=shape.width_m,
+        height_m=shape.height_m,
+        base_m=float(centre_B[2]),
+        round=shape.round,
+    )

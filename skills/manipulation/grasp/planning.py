@@ -1,0 +1,250 @@
+"""From candidates to motions: the first grasp that the arm can reach, approach and lift."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.manipulation.arm.collision import ArmScene, Box, gaps_m
+from skills.manipulation.arm.kinematics import ArmModel
+from skills.manipulation.arm.motion import ArmPlanner
+from skills.manipulation.arm.poses import towards_shoulder
+from skills.manipulation.grasp.candidates import GraspCandidate, Target, grasp_candidates
+from skills.quantities import Margin, TurnRate
+from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities
+from skills.world_model import IN_THE_WAY, ObjectObservation, PlanningError
+
+PREGRASPS_M = (0.12, 0.07, 0.045)
+"""How far before the grasp the straight approach begins, the best first."""
+LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0), (0.03, 0.0))
+"""Ways to lift, up and back towards the shoulder, the best first."""
+_SLOW_POINTS, _OTHERS_TRIED, _ASKED, _OUT_OF_REACH = 3, 3, 40, "out of reach"
+_OFF_M, _LIFT_STEP_M, _LIFT_MARGIN_M = 0.015, 0.01, 0.002
+_LEVEL = 0.5
+_ALIKE_RAD = 0.3
+"""What cannot be lifted from one posture of an arm with a joint to spare cannot be from one so near to it."""
+
+
+@dataclass(frozen=True)
+class GraspPlan:
+    """A grasp with the motions to its pre-grasp and from there to the grasp, the last bit slowly; how to lift (B)."""
+
+    candidate: GraspCandidate
+    to_pregrasp: ArmTrajectory
+    to_grasp: ArmTrajectory
+    last_bit: ArmTrajectory
+    lift_B: FloatArray
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """An object beside the one to grasp, as it was seen, its class or "thing", and its boxes in B."""
+
+    seen: ObjectObservation
+    boxes: tuple[Box, ...]
+
+    @property
+    def centre_B(self) -> FloatArray:
+        """The middle of its boxes."""
+        return np.asarray(np.mean([box.X_FG.translation() for box in self.boxes], axis=0))
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What stands around the object, and the object itself, as boxes in B; `up_B` points up in the body frame.
+
+    `others` are the objects among the boxes. `thing` and `reach_m`, the arm's furthest reach, serve to say why there is
+    no grasp.
+    """
+
+    boxes: Sequence[Box]
+    target: Box
+    up_B: FloatArray
+    others: Sequence[Obstacle] = ()
+    thing: str = "object"
+    reach_m: float = np.inf
+
+    def lets_rise(self, lift_B: FloatArray) -> bool:
+        """Whether the object meets nothing on a straight way up.
+
+        It is taken a little smaller than its box, so that what it stands on and beside is off it. What overlaps it all
+        the same is a part of it: seen from high up, a screwdriver's shaft is an object of its own beside the handle.
+        """
+        steps = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(lift_B) / _LIFT_STEP_M))
+        x, y, z = (max(side - 2.0 * _OFF_M, 0.005) for side in self.target.size_m)
+        gaps = gaps_m(Box(self.target.X_FG, (x, y, z)), self.boxes, steps[:, None] * lift_B)
+        return bool(np.all((gaps > _LIFT_MARGIN_M) | (gaps[0] < 0.0)))
+
+    def without(self, others: Sequence[Obstacle]) -> Surroundings:
+        """As if some of the other objects were not there."""
+        gone = {id(box) for other in others for box in other.boxes}
+        return replace(self, boxes=[box for box in self.boxes if id(box) not in gone])
+
+
+@dataclass(frozen=True)
+class GeometricGraspPlanner:
+    """Grasps from the object's outline, the first that the arm can reach, approach and lift.
+
+    The hand keeps `padding_m` from all around on its way and `final_padding_m` on the straight approach, on which no
+    joint is faster than `approach_rad_s`, on its last bit than `last_rad_s`. Beside the fixed finger `beside_fixed_m`
+    are left, `beside_fixed_low_m` about objects that lie low, since a finger that comes down on top of one is stopped.
+    """
+
+    padding_m: Margin = 0.01
+    final_padding_m: Margin = 0.002
+    approach_rad_s: TurnRate = 0.4
+    last_rad_s: TurnRate = 0.15
+    beside_fixed_m: Margin = 0.010
+    beside_fixed_low_m: Margin = 0.017
+
+    def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
+        """Grasps, the best first; empty when it is too wide or too flat. p_BS is the shoulder."""
+        return grasp_candidates(target, p_BS, gripper, (self.beside_fixed_m, self.beside_fixed_low_m))
+
+    def plan(
+        self,
+        scene: ArmScene,
+        q_start_rad: FloatArray,
+        candidates: Sequence[GraspCandidate],
+        around: Surroundings,
+        arm_planner: ArmPlanner,
+        rng: np.random.Generator,
+    ) -> GraspPlan:
+        """The best candidate that can be carried out. Raises PlanningError, which says why, when there is none."""
+        reasons = list[str]()
+        for candidate in candidates:
+            try:
+                approach, lift_B = self._reached(scene, q_start_rad, candidate, around, arm_planner)
+                scene.set_boxes([*around.boxes, around.target])
+                scene.set_padding(self.padding_m)
+                path = arm_planner.path(scene, q_start_rad, approach[0], rng)
+            except PlanningError as error:
+                reasons.append(str(error))
+                continue
+            to_grasp = arm_planner.timed(approach[:-_SLOW_POINTS], speed_rad_s=self.approach_rad_s)
+            last_bit = arm_planner.timed(approach[-_SLOW_POINTS - 1 :], speed_rad_s=self.last_rad_s)
+            return GraspPlan(candidate, arm_planner.timed(path, scene=scene), to_grasp, last_bit, lift_B)
+        if reasons and set(reasons) == {_OUT_OF_REACH}:
+            raise PlanningError(_out_of_reach(scene.model, around))
+        in_the_way = self._in_the_way(scene, q_start_rad, candidates, around, arm_planner)
+        if in_the_way:
+            outputs = {IN_THE_WAY: tuple(other.seen for other in in_the_way)}
+            raise PlanningError(_behind(scene.model, around, in_the_way), outputs)
+        last = f": {max(sorted(set(reasons)), key=reasons.count)}" if reasons else ""
+        raise PlanningError(f"none of {len(candidates)} grasps of the {around.thing} is within reach and free{last}")
+
+    def _in_the_way(
+        self,
+        scene: ArmScene,
+        q_near_rad: FloatArray,
+        candidates: Sequence[GraspCandidate],
+        around: Surroundings,
+        arm_planner: ArmPlanner,
+    ) -> tuple[Obstacle, ...]:
+        """The other object, or all that are near, without which there were a grasp; empty: none is in the way.
+
+        The nearest come first; only the best candidates are asked again.
+        """
+
+        def graspable(space: Surroundings) -> bool:
+            for candidate in candidates[:_ASKED]:
+                try:
+                    self._reached(scene, q_near_rad, candidate, space, arm_planner)
+                except PlanningError:
+                    continue
+                return True
+            return False
+
+        p_BT = around.target.X_FG.translation()
+        near = sorted(around.others, key=lambda other: float(np.linalg.norm(other.centre_B - p_BT)))[:_OTHERS_TRIED]
+        if not near or graspable(around) or not graspable(around.without(near)):
+            return ()
+        return next(((other,) for other in near if graspable(around.without([other]))), tuple(near))
+
+    def _reached(
+        self,
+        scene: ArmScene,
+        q_near_rad: FloatArray,
+        candidate: GraspCandidate,
+        around: Surroundings,
+        arm_planner: ArmPlanner,
+    ) -> tuple[FloatArray, FloatArray]:
+        """The straight approach path from the pre-grasp, and the lift (frame B). Raises PlanningError."""
+        scene.set_boxes(around.boxes)
+        scene.set_padding(self.final_padding_m)
+        reason, no_lift_rad = _OUT_OF_REACH, list[FloatArray]()
+        for distance in PREGRASPS_M:
+            solutions = scene.model.inverse(candidate.retreated(distance), margin_rad=0.06)
+            turned = [scene.model.turned_near(q, q_near_rad) for q in solutions]
+            for q in sorted(turned, key=lambda q: float(np.max(np.abs(q - q_near_rad)))):
+                if not scene.free(q):
+                    reason = "the hand would touch something before the grasp"
+                    continue
+                try:
+                    approach = arm_planner.line(scene.model, q, candidate.X_BH, scene)
+                    if not any(np.max(np.abs(approach[-1] - other)) < _ALIKE_RAD for other in no_lift_rad):
+                        no_lift_rad.append(approach[-1])
+                        return approach, _lift(scene, approach[-1], around, arm_planner)
+                except PlanningError as error:
+                    reason = str(error)
+        raise PlanningError(reason)
+
+
+def _out_of_reach(model: ArmModel, around: Surroundings) -> str:
+    off_m = float(np.linalg.norm(around.target.X_FG.translation() - model.p_BS))
+    where = f"the {around.thing} is out of reach: {off_m:.2f} m from the shoulder"
+    if off_m > around.reach_m:
+        return f"{where}, and the arm reaches {around.reach_m:.2f} m"
+    return f"{where}, and the arm does not turn the hand there as a grasp needs it"
+
+
+def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -> str:
+    """Which other objects are in the way: before the object as the shoulder sees it, or close beside it."""
+    p_ST = around.target.X_FG.translation() - model.p_BS
+    before = any((other.centre_B - model.p_BS) @ p_ST < p_ST @ p_ST for other in others)
+    names = " and ".join(f"the {other.seen.thing}" for other in others)
+    return f"the {around.thing} is {'behind' if before else 'too near'} {names}"
+
+
+def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, margin_rad: float = 0.08) -> bool:
+    """Whether the arm reaches a grasp, its pre-grasp and the end of its lift; contact is not looked at."""
+    X_BH, distance = candidate.X_BH, PREGRASPS_M[-1]
+    if not (model.reaches(X_BH, margin_rad) and model.reaches(candidate.retreated(distance), margin_rad)):
+        return False
+    lifted = (X_BH.translation() + offset for offset in lifts(model, X_BH, up_B))
+    return any(model.reaches(RigidTransform(X_BH.rotation(), p), margin_rad) for p in lifted)
+
+
+def lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[FloatArray]:
+    """Ways to lift from a grasp, the best first."""
+    back = towards_shoulder(model.p_BS, X_BH.translation())
+    return [up_m * up_B + back_m * back for up_m, back_m in LIFTS_M]
+
+
+def _lift(scene: ArmScene, q_rad: FloatArray, around: Surroundings, arm_planner: ArmPlanner) -> FloatArray:
+    """The first way to lift that the arm can follow, on which neither it nor the object touches anything.
+
+    Raises PlanningError.
+    """
+    X_BH = scene.model.X_BH(q_rad)
+    for lift_B in lifts(scene.model, X_BH, around.up_B):
+        if not around.lets_rise(lift_B):
+            continue
+        try:
+            lifted = RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B)
+            arm_planner.line(scene.model, q_rad, lifted, scene)
+        except PlanningError:
+            continue
+        return lift_B
+    raise PlanningError("the arm cannot lift the object from there")
+
+
+def pull_back_B(X_BH: RigidTransform, p_BS: FloatArray) -> FloatArray:
+    """The level direction out of a grasp: against the fingers, or towards the shoulder where they point down."""
+    against = -X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
+    if np.linalg.norm(against) < _LEVEL:
+        against = (p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
+    return np.asarray(against / np.linalg.norm(against))

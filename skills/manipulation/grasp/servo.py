@@ -1,0 +1,188 @@
+"""Where the object is now, as the hand camera sees it from just before the grasp.
+
+The object's points, as seen before, are shifted until their outline fits the picture best (analysis by synthesis). What
+is nearer than the camera's least depth has no depth, and counts as part of what is seen.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+
+from skills.manipulation.arm.collision import ArmScene
+from skills.manipulation.arm.kinematics import ArmModel
+from skills.manipulation.grasp.candidates import Target
+from skills.manipulation.grasp.planning import GraspPlan
+from skills.robot import ArmTrajectory, FloatArray, Image, Intrinsics
+
+SEARCHED_M: Final = 0.06
+_WIDTH_PX, _POINTS, _LEVELS = 80, 300, 4
+_STEPS_M: Final = ((0.01, SEARCHED_M), (0.0025, 0.0075))
+_BEHIND_M, _NEAREST_M = 0.03, 0.22
+_OF_HEIGHT, _LEAST_HEIGHT_M, _WINDOW_PX = 0.3, 0.004, 9
+_LOOKS_DOWN, _PER_M = 0.5, 0.5
+"""A camera whose axis is as far below level sees shifts in both level directions, else only those across."""
+_AIMED_M, _FAR_OFF_M, _LEAST_OVERLAP = 0.003, 0.05, 0.5
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class SeenShift:
+    """How far (3,) in B, level, an object is from where it was; the overlap of its outline with what is seen there."""
+
+    offset_B: FloatArray
+    overlap: float
+
+
+def seen_shift(target: Target, image: Image, X_BC: RigidTransform) -> SeenShift | None:
+    """How far the object has moved since `target` was seen, by the depth of a picture taken at X_BC.
+
+    None where the picture does not show its place. The body is level: its z axis points up.
+    """
+    picture = _Picture.of(target, image, X_BC)
+    if not picture.shows_place:
+        return None
+    best = SeenShift(np.zeros(3), picture.overlap(np.zeros(3)))
+    for step_m, reach_m in _STEPS_M:
+        middle_B = best.offset_B
+        for offset_B in _offsets(X_BC, step_m, reach_m):
+            overlap = picture.overlap(middle_B + offset_B)
+            if overlap - _PER_M * _length(middle_B + offset_B) > best.overlap - _PER_M * _length(best.offset_B):
+                best = SeenShift(middle_B + offset_B, overlap)
+    return best
+
+
+Aim = tuple[FloatArray, tuple[ArmTrajectory, ArmTrajectory] | None]
+"""The offset (3,) in B by which to shift the hand, and the approach from there, or None where that is not free."""
+
+
+def aimed_approach(
+    found: SeenShift | None, plan: GraspPlan, model: ArmModel, scene_now: Callable[[], ArmScene]
+) -> Aim | None:
+    """Aims a grasp across the fingers at where the object was seen now; None when the object is not there any more."""
+    if found is None:
+        return np.zeros(3), None
+    if found.overlap < _LEAST_OVERLAP or np.linalg.norm(found.offset_B) > _FAR_OFF_M:
+        return None
+    closing_B = plan.candidate.X_BH.rotation().col(2)
+    offset_B = (found.offset_B @ closing_B) * closing_B * [1.0, 1.0, 0.0]
+    if np.linalg.norm(offset_B) < _AIMED_M:
+        return np.zeros(3), None
+    approach = [shifted(model, each, offset_B) for each in (plan.to_grasp, plan.last_bit)]
+    scene = scene_now()
+    scene.set_padding(0.0)
+    free = [each for each in approach if each is not None and scene.path_free(each.positions_rad)]
+    return offset_B, (free[0], free[1]) if len(free) == len(approach) else None
+
+
+def shifted(model: ArmModel, trajectory: ArmTrajectory, offset_B: FloatArray) -> ArmTrajectory | None:
+    """A trajectory with the hand at each time offset_B (3,) beside where it was; None beyond the arm's reach."""
+    positions = list[FloatArray]()
+    for q_rad in trajectory.positions_rad:
+        X_BH = model.X_BH(q_rad)
+        beside = RigidTransform(X_BH.rotation(), X_BH.translation() + offset_B)
+        q = model.nearest_inverse(beside, positions[-1] if positions else q_rad)
+        if q is None:
+            return None
+        positions.append(q)
+    return ArmTrajectory(trajectory.times_s, np.array(positions))
+
+
+def _length(offset_B: FloatArray) -> float:
+    return float(np.linalg.norm(offset_B))
+
+
+def _offsets(X_BC: RigidTransform, step_m: float, reach_m: float) -> Iterator[FloatArray]:
+    """Level shifts (3,) that a camera can tell, a grid of them in all directions or across where it looks ahead."""
+    axis = X_BC.rotation().matrix()[:, 2]
+    ahead = np.array([axis[0], axis[1], 0.0])
+    ahead = ahead / np.linalg.norm(ahead) if np.linalg.norm(ahead) > 1e-3 else np.array([1.0, 0.0, 0.0])
+    left = np.array([-ahead[1], ahead[0], 0.0])
+    steps = np.arange(-reach_m, reach_m + 0.5 * step_m, step_m)
+    for across, along in itertools.product(steps, steps if axis[2] < -_LOOKS_DOWN else (0.0,)):
+        yield across * left + along * ahead
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """A depth picture made small: what stands at the object's place (`solid`), which pixels tell (`known`)."""
+
+    solid: Mask
+    known: Mask
+    points_B: FloatArray
+    X_CB: RigidTransform
+    lens: Intrinsics
+    stride: int
+
+    @classmethod
+    def of(cls, target: Target, image: Image, X_BC: RigidTransform) -> _Picture:
+        """What a picture shows about a target's place."""
+        lens = image.depth_intrinsics
+        stride = max(1, lens.width // _WIDTH_PX)
+        depth = image.depth_m[::stride, ::stride].astype(np.float64)
+        rays_B = _rays(lens, stride) @ X_BC.rotation().matrix().T
+        points_B = _filled(target)
+        with np.errstate(divide="ignore"):
+            surface = (target.base_m - X_BC.translation()[2]) / rays_B[..., 2]
+        surface = np.where(surface > 0.0, surface, np.inf)
+        valid = (depth > 0.0) & np.isfinite(depth)
+        above = X_BC.translation()[2] + depth * rays_B[..., 2] - target.base_m
+        farthest = float((X_BC.inverse() @ points_B.T)[2].max()) + _BEHIND_M
+        seen = valid & (above > _lowest_m(target)) & (depth < farthest)
+        near = ~valid & (surface > _NEAREST_M)
+        small = cv2.morphologyEx((seen | near).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+        return cls(small > 0, valid | near, points_B, X_BC.inverse(), lens, stride)
+
+    @property
+    def shows_place(self) -> bool:
+        """Whether pixels that tell show half of where the object was, at least."""
+        outline = self._outline(np.zeros(3))
+        return bool(outline.sum() > 0 and (outline & self.known).sum() > 0.5 * outline.sum())
+
+    def overlap(self, offset_B: FloatArray) -> float:
+        """Intersection over union of the outline of the shifted object with what is seen about there."""
+        outline = self._outline(offset_B)
+        about = cv2.dilate(outline.astype(np.uint8), np.ones((_WINDOW_PX, _WINDOW_PX), np.uint8)) > 0
+        both = (outline & self.solid & self.known).sum()
+        either = ((outline | (self.solid & about)) & self.known).sum()
+        return float(both / max(either, 1))
+
+    def _outline(self, offset_B: FloatArray) -> Mask:
+        """The pixels that the shifted object covers."""
+        p_C = self.X_CB @ (self.points_B + offset_B).T
+        ahead = p_C[:, p_C[2] > 0.02]
+        u = np.rint((ahead[0] / ahead[2] * self.lens.fx + self.lens.cx) / self.stride).astype(np.int64)
+        v = np.rint((ahead[1] / ahead[2] * self.lens.fy + self.lens.cy) / self.stride).astype(np.int64)
+        inside = (u >= 0) & (v >= 0) & (u < self.solid.shape[1]) & (v < self.solid.shape[0])
+        mask = np.zeros(self.solid.shape, np.uint8)
+        mask[v[inside], u[inside]] = 1
+        return cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8)) > 0
+
+
+def _rays(lens: Intrinsics, stride: int) -> FloatArray:
+    """Directions (H, W, 3) in the camera's frame with z = 1, of each pixel of the small picture."""
+    x = (np.arange(0, lens.width, stride) - lens.cx) / lens.fx
+    y = (np.arange(0, lens.height, stride) - lens.cy) / lens.fy
+    return np.stack([*np.meshgrid(x, y), np.ones((len(y), len(x)))], axis=-1)
+
+
+def _lowest_m(target: Target) -> float:
+    """From what height over its surface on an object counts as seen: below, its surface is too near to tell."""
+    return max(_OF_HEIGHT * target.height_m, _LEAST_HEIGHT_M)
+
+
+def _filled(target: Target) -> FloatArray:
+    """Points (N, 3) all over an object: those that were seen, and what is below them as far as it counts as seen."""
+    low_m = target.base_m + _lowest_m(target)
+    seen = target.points_B[target.points_B[:, 2] > low_m]
+    seen = seen[:: max(1, len(seen) // _POINTS)]
+    heights = [low_m + part * (seen[:, 2] - low_m) for part in np.linspace(0.0, 1.0, _LEVELS)]
+    return np.concatenate([np.column_stack([seen[:, :2], height]) for height in heights])

@@ -1,0 +1,323 @@
+"""The hand-over skill: hold the object out to a person, and let go when they pull at it or the operator says so."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+
+from skills.api import Cause, PlanningError, Question, Running, Succeeded
+from skills.geometry import wrap
+from skills.manipulation.approach.standing import go_to_one
+from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N
+from skills.manipulation.arm.collision import ArmScene, Box
+from skills.manipulation.arm.hold import Grip
+from skills.manipulation.arm.pull import PullWatch
+from skills.manipulation.hand_over.given import Seen, release_from, release_of
+from skills.manipulation.hand_over.ports import HandOverInputs, HandOverPorts
+from skills.manipulation.hand_over.verification import HandOverVerification
+from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.footprint import footprint_clear
+from skills.navigate.ports import NavigateInputs
+from skills.patience import Patience
+from skills.perception.people import SeenPerson, people_in_scan
+from skills.quantities import Duration, Force, Height, Length
+from skills.robot import FloatArray, Pose2D
+from skills.routine import Routine, SkillFailure
+
+_FACING_RAD = 0.5
+_SCANS = 3
+_SCAN_PATIENCE_S, _SCAN_AGE_S = 2.0, 1.0
+_PERSON_SIZE_M = (0.6, 0.6, 1.8)
+_STILL_S = 0.5
+_FREE_S = 2.0
+_LETS_GO, _KEEPS = "let go", "hold on"
+_POINTS_DOWN = 0.8
+_TRIES = 2
+_WIDE, _SHAKE_RAD, _SHAKE_RAD_S = 0.75, (0.35, -0.35, 0.35, -0.35), 3.0
+
+
+@dataclass(frozen=True)
+class HandOverOptions:
+    """Where the robot stands and holds the object.
+
+    The robot stands `stand_off_m` from the person's axis, or stays within `stand_off_range_m`. The object is held out
+    at `height_m`, at the first of `gaps_m` from the person's axis that the arm can reach, `furthest_m` at most. It lets
+    go when the hand feels a pull beyond `pull_n`, and draws the object in when nobody has taken it within `wait_s`.
+    """
+
+    stand_off_m: Length = 1.5
+    stand_off_range_m: tuple[Length, Length] = (1.25, 1.65)
+    height_m: Height = 1.0
+    gaps_m: tuple[Length, ...] = (0.55, 0.5, 0.45, 0.62, 0.7, 0.8)
+    furthest_m: Length = 0.85
+    pull_n: Force = 7.0
+    wait_s: Duration = 20.0
+
+
+class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
+    """The skill that `HandOverPorts` declares."""
+
+    Options: ClassVar[type] = HandOverOptions
+    options: HandOverOptions
+
+    def begin(self, inputs: HandOverInputs) -> None:
+        """Forget an earlier attempt."""
+        self._watch, self.checkpoint = None, {}
+        super().begin(inputs)
+
+    def resume(self, inputs: HandOverInputs) -> None:
+        """Go on after a pause or a restart; what happened meanwhile is no slip."""
+        self._watch = None if self._watch is None else self.hold_watch()
+        super().resume(inputs)
+
+    def end(self) -> None:
+        """Withdraw the offer."""
+        self.context.payload.offered = False
+        super().end()
+
+    def trouble(self) -> SkillFailure | None:
+        """Failure when the object is lost before the offer; grips again what begins to slip."""
+        return self.lost("the object was lost before it was held out")
+
+    def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
+        """Find, go, hold out, wait, let go; what the closing gripper feels again is held out once more."""
+        if not self.context.robot.gripper().holding:
+            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to hand over")
+        for _ in range(_TRIES):
+            seen = yield from self._give(inputs)
+            if seen is not Seen.IN_GRIPPER:
+                break
+            self.checkpoint = {}
+        return self._given(inputs, seen)
+
+    def _give(self, inputs: HandOverInputs) -> Routine[Seen]:
+        """Hold the object out and let go of it; what became of it."""
+        self._watch = self.hold_watch()
+        person = yield from self._find(inputs.person)
+        if not _well_placed(self._ahead(person), self.options.stand_off_range_m):
+            yield from self._go_before(person, inputs.person)
+            person = yield from self._find(inputs.person)
+        q_carrying_rad = self.q_rad()
+        yield from self._hold_out(person, inputs.person)
+        self._check(person, inputs.person)
+        yield from self.pause(_STILL_S, f"holding the {inputs.thing} out to {inputs.person}")
+        held_kg = yield from self.weigh(self.p_HT, f"weighing the {inputs.thing}")
+        self._watch, self.context.payload.offered = None, True
+        if not (yield from self._taken(inputs)):
+            yield from self.move_to(lambda scene, q: q_carrying_rad, f"drawing the {inputs.thing} in")
+            why = f"{inputs.person} did not take the {inputs.thing} within {self.options.wait_s:g} s"
+            raise SkillFailure(Cause.TIMEOUT, why)
+        return (yield from self._let_go(inputs, held_kg))
+
+    def run_again(self, inputs: HandOverInputs) -> Routine[Succeeded]:
+        """Go on from an attempt that was broken off; what was let go of is looked for with the person."""
+        self._watch = None
+        if not self.checkpoint.get("lets_go"):
+            return (yield from self.run(inputs))
+        seen = yield from self._let_go(inputs, None)
+        if seen is not Seen.IN_GRIPPER:
+            return self._given(inputs, seen)
+        self.checkpoint = {}
+        return (yield from self.run(inputs))
+
+    def _given(self, inputs: HandOverInputs, seen: Seen) -> Succeeded:
+        """Success where the person has the object, at rest. Raises SkillFailure with cause POSTCONDITION otherwise."""
+        thing, person = inputs.thing, inputs.person
+        why = {
+            Seen.IN_GRIPPER: f"the {thing} is still in the gripper",
+            Seen.FELL: f"the {thing} fell to the floor before {person}",
+            Seen.NOT_SEEN: f"the {thing} is not seen where it was let go of before {person}",
+            Seen.MOVES: f"the {thing} still moves where it was let go of before {person}",
+        }
+        if seen in why:
+            raise SkillFailure(Cause.POSTCONDITION, why[seen])
+        return Succeeded(f"gave the {thing} to {person}")
+
+    def _taken(self, inputs: HandOverInputs) -> Routine[bool]:
+        """Wait for a pull at the object, or for the operator's word; False when the time is over.
+
+        True as well when the object is out of the gripper: somebody pulled it out, or it has fallen.
+        """
+        message, robot = f"holding the {inputs.thing} out to {inputs.person}", self.context.robot
+        watch, hold = PullWatch(self.model, self.p_HT, self.options.pull_n), self.hold_watch()
+        text = f"{robot.name} holds the {inputs.thing} out to {inputs.person}. Let go?"
+        question = Question(f"hand-over/{robot.name}", text, (_LETS_GO, _KEEPS), _KEEPS, self.options.wait_s)
+        asked, end_s = self.context.ask(question), self.context.clock.now() + self.options.wait_s
+        try:
+            while self.context.clock.now() < end_s:
+                joints = robot.joints()
+                efforts_nm = np.array([joints.effort_nm[name] for name in self.model.names])
+                confirmed = asked.done() and asked.result() == _LETS_GO
+                gone = hold.judge(robot.gripper(), self.context.clock.now()) is Grip.LOST
+                if gone or confirmed or watch.felt(joints.stamp_s, self.q_rad(), efforts_nm):
+                    return True
+                yield Running(message)
+            return False
+        finally:
+            asked.withdraw()
+
+    def _let_go(self, inputs: HandOverInputs, held_kg: float | None) -> Routine[Seen]:
+        """Open, wait until the gripper feels nothing, leave the object without dragging it, and see who has it."""
+        thing, message = (
+            inputs.thing,
+            f"giving the {inputs.thing} to {inputs.person}",
+        )
+        if not self.checkpoint.get("lets_go"):
+            corners_H = self.context.payload.corners_H
+            release = release_of(self.X_WB() @ self.model.X_BH(self.q_rad()), self.p_HT, corners_H)
+            self.checkpoint = {"lets_go": True, "release": release.state()}
+        yield from self.move_gripper(self.release_rad(), GRIPPER_FORCE_N, message)
+        free = yield from self._feels_nothing(message)
+        yield from self.pause(_STILL_S, message)
+        if not free or (yield from self.hangs_on_hand(held_kg, message)):
+            yield from self._shake(f"shaking the {thing} off the fingers")
+            if not (yield from self._feels_nothing(message)):
+                raise SkillFailure(Cause.POSTCONDITION, f"the {thing} is still in the open gripper")
+        yield from self.leave_object()
+        return (yield from self.verify(thing, inputs.person, release_from(self.checkpoint["release"])))
+
+    def _feels_nothing(self, message: str) -> Routine[bool]:
+        """Wait until the gripper feels nothing; False when it still does after a while."""
+        end_s = self.context.clock.now() + _FREE_S
+        while self.context.robot.gripper().holding:
+            if self.context.clock.now() > end_s:
+                return False
+            yield Running(message)
+        return True
+
+    def _shake(self, message: str) -> Routine[None]:
+        """Open wide, and turn the hand to and fro: what sticks to a finger comes off."""
+        yield from self.move_gripper(_WIDE * self.widest, GRIPPER_FORCE_N, message)
+        q, wrist = self.q_rad(), np.eye(len(self.model.names))[-1]
+        turns = [q + turn_rad * wrist for turn_rad in _SHAKE_RAD]
+        inside = [each for each in turns if np.all((each > self.model.lower_rad) & (each < self.model.upper_rad))]
+        path = np.array([q, *inside, q])
+        yield from self.follow(self.context.stack.arm_planner.timed(path, speed_rad_s=_SHAKE_RAD_S), message)
+        yield from self.pause(_STILL_S, message)
+
+    def _find(self, name: str) -> Routine[SeenPerson]:
+        """The nearest person that is seen in several scans, ahead rather than behind; missing scans are waited for.
+
+        Raises SkillFailure: there are no new scans, or nobody is seen in them.
+        """
+        clock, patience, seen = self.context.clock, Patience(self.context.clock), list[SeenPerson]()
+        stamp_s, end_s = -math.inf, clock.now() + _SCAN_PATIENCE_S
+        while len(seen) < _SCANS and clock.now() < end_s:
+            scan = self.context.robot.scan()
+            if scan is None or scan.stamp_s < clock.now() - _SCAN_AGE_S:
+                if not patience.is_left():
+                    raise SkillFailure(Cause.PRECONDITION, f"there is no new scan to see {name} in")
+                end_s = clock.now() + _SCAN_PATIENCE_S
+                yield Running(f"looking for {name}; waits for a scan")
+                continue
+            patience.over()
+            if scan.stamp_s > stamp_s:
+                stamp_s = scan.stamp_s
+                people = people_in_scan(scan, self.X_WB(), self.context.robot.capabilities().footprint_m)
+                seen += people[:1] if not seen else _same(people, seen[0])
+            yield Running(f"looking for {name}")
+        if len(seen) < _SCANS:
+            raise SkillFailure(Cause.PRECONDITION, f"nobody is seen near, so {name} cannot be handed anything")
+        x, y = (float(np.median([p.place_W[axis] for p in seen])) for axis in (0, 1))
+        return replace(seen[-1], place_W=(x, y))
+
+    def _go_before(self, person: SeenPerson, name: str) -> Routine[None]:
+        """Drive to the nearest free pose that faces the person."""
+        poses = facing_poses(person.place_W, self.context.pose(), self.options.stand_off_m)
+        footprint = ArmFootprint(self.context).now()
+        free = [pose for pose in poses if footprint_clear(self.context.costmap, footprint, pose)]
+        if not free:
+            raise SkillFailure(Cause.PLANNING, f"there is no free place to stand before {name}")
+        yield from go_to_one(self, [NavigateInputs(pose, 0.08, 0.1, 0.5) for pose in free[:3]])
+
+    def _hold_out(self, person: SeenPerson, name: str) -> Routine[None]:
+        """Stretch the arm towards the person, with the object as it stood or lay, or else as it is carried.
+
+        What lies on a finger as it is carried would stay there when the gripper opens.
+        """
+        taken_R_BH, R_BH = self.context.payload.R_BH, self.model.X_BH(self.q_rad()).rotation()
+        rotations = [R_BH] if taken_R_BH is None else [taken_R_BH, R_BH]
+        p_BP = self._ahead(person)
+        axis = RigidTransform([*p_BP, 0.5 * _PERSON_SIZE_M[2] - self._height_m()])
+        self.boxes = [Box(axis, _PERSON_SIZE_M)]
+        level_m = self.options.height_m - self._height_m()
+
+        def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
+            return hold_out_configuration(scene, rotations, p_BP, self.p_HT, level_m, self.options.gaps_m, q)
+
+        yield from self.move_to(goal, f"holding the object out to {name}", speed_rad_s=0.8)
+
+    def _check(self, person: SeenPerson, name: str) -> None:
+        """Raise SkillFailure unless the object is held out near the person."""
+        if not self.context.robot.gripper().holding:
+            raise SkillFailure(Cause.POSTCONDITION, f"the object was lost while it was held out to {name}")
+        p_BT = self.model.X_BH(self.q_rad()) @ self.p_HT
+        off = float(np.linalg.norm(p_BT[:2] - self._ahead(person)))
+        if off > self.options.furthest_m:
+            raise SkillFailure(Cause.EXECUTION, f"the object is held {off:.2f} m from {name}, which is too far")
+
+    def _ahead(self, person: SeenPerson) -> FloatArray:
+        """The person's axis (x, y) in the body frame."""
+        return np.asarray((self.X_WB().inverse() @ np.array([*person.place_W, 0.0]))[:2])
+
+
+def facing_poses(point_W: tuple[float, float], here: Pose2D, stand_off_m: float, count: int = 24) -> list[Pose2D]:
+    """Poses stand_off_m from a point that face it, the ones that cost least to reach first."""
+    poses = []
+    for k in range(count):
+        yaw = math.atan2(point_W[1] - here.y_m, point_W[0] - here.x_m) + 2 * math.pi * k / count
+        x, y = point_W[0] - stand_off_m * math.cos(yaw), point_W[1] - stand_off_m * math.sin(yaw)
+        poses.append(Pose2D(x, y, wrap(yaw)))
+    return sorted(poses, key=lambda pose: math.hypot(pose.x_m - here.x_m, pose.y_m - here.y_m))
+
+
+def hold_out_configuration(
+    scene: ArmScene,
+    rotations: Sequence[RotationMatrix],
+    p_BP: FloatArray,
+    p_HT: FloatArray,
+    level_m: float,
+    gaps_m: Sequence[float],
+    q_near_rad: FloatArray,
+) -> FloatArray:
+    """Arm angles with the object before the person; level_m is its height in B.
+
+    The hand is turned as in the first R_BH of `rotations` that does, about the vertical towards the person. The
+    person's axis is at p_BP (2,), the middle of the object at p_HT. Raises PlanningError out of the arm's reach.
+    """
+    direction = math.atan2(p_BP[1], p_BP[0])
+    heading = np.array([math.cos(direction), math.sin(direction), 0.0])
+    turned = (each for R_BH in rotations for each in _towards(R_BH, direction))
+    for rotation, gap, lower in itertools.product(turned, gaps_m, (0.0, 0.1, 0.2)):
+        p_BT = (float(np.linalg.norm(p_BP)) - gap) * heading + np.array([0.0, 0.0, level_m - lower])
+        X_BH = RigidTransform(rotation, p_BT - rotation.matrix() @ p_HT)
+        found = (scene.model.turned_near(q, q_near_rad) for q in scene.model.inverse(X_BH, margin_rad=0.05))
+        free = [q for q in found if scene.free(q)]
+        if free:
+            return min(free, key=lambda q: float(np.max(np.abs(q - q_near_rad))))
+    raise PlanningError("the arm cannot hold the object out near enough to the person from here")
+
+
+def _towards(R_BH: RotationMatrix, direction_rad: float) -> list[RotationMatrix]:
+    """The hand turned about the vertical so that it points in a direction; one that points down in any of four."""
+    x_axis = R_BH.matrix()[:, 0]
+    ahead = direction_rad - math.atan2(x_axis[1], x_axis[0])
+    turns = (0.0, math.pi / 2, -math.pi / 2, math.pi) if x_axis[2] < -_POINTS_DOWN else (0.0,)
+    return [RotationMatrix.MakeZRotation(ahead + turn) @ R_BH for turn in turns]
+
+
+def _well_placed(p_BP: FloatArray, range_m: tuple[float, float]) -> bool:
+    near = range_m[0] <= float(np.linalg.norm(p_BP)) <= range_m[1]
+    return near and abs(math.atan2(p_BP[1], p_BP[0])) < _FACING_RAD
+
+
+def _same(people: list[SeenPerson], other: SeenPerson) -> list[SeenPerson]:
+    """The person among some who stands where another was seen, if there is one."""
+    near = [p for p in people if math.dist(p.place_W, other.place_W) < 0.25]
+    return near[:1]

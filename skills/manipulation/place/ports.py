@@ -1,0 +1,37 @@
+"""What the place skill takes and gives: all that a tree is compiled from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from skills.api import Cause, Skill, Surface
+from skills.quantities import Coordinate, Length
+
+
+@dataclass(frozen=True)
+class PlaceInputs:
+    """The surface to put the object on; its middle comes to rest on none of the circles (x, y, radius) of the world."""
+
+    surface: Surface
+    clear_of: tuple[tuple[Coordinate, Coordinate, Length], ...] = ()
+
+
+class PlacePorts(Skill[PlaceInputs]):
+    """Puts the held object down on a surface and stows the arm. Goes nearer when no free spot is in reach."""
+
+    done_by: ClassVar[str] = "skills.manipulation.place.skill:Place"
+    name = "place"
+    Inputs = PlaceInputs
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "nothing is held",
+        Cause.PLANNING: "no free spot is seen within reach, or the arm finds no path to it",
+        Cause.EXECUTION: "the robot or its arm did not reach its goal",
+        Cause.POSTCONDITION: "the object is not seen at rest where it was put down, or is still in the gripper",
+    }
+    default_timeout_s = 150.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
+    changes_world = True
+    gripper_before = True
+    gripper_after = False

@@ -1,0 +1,39 @@
+"""What the hand holds is weighed by the arm's efforts."""
+
+import numpy as np
+import pytest
+
+from plant.spot.kind import spot_capabilities
+from skills.manipulation.arm.arm_skill import held_mass_kg
+from skills.manipulation.arm.collision import ArmScene
+from skills.manipulation.arm.kinematics import arm_model
+
+CAPABILITIES = spot_capabilities()
+MODEL = arm_model(CAPABILITIES)
+AHEAD = np.array([0.0, -1.6, 1.6, 0.0, 0.4, 0.0])
+ASIDE = np.array([0.9, -2.2, 1.9, 0.4, 0.3, 0.2])
+GRIP = np.array([0.19, 0.0, 0.0])
+
+
+def _efforts_of(mass_kg, q):
+    """By virtual work, from another difference than the code's."""
+    up = [(MODEL.X_BH(q + 2e-6 * e) @ GRIP - MODEL.X_BH(q) @ GRIP)[2] / 2e-6 for e in np.eye(len(q))]
+    return mass_kg * 9.81 * np.array(up)
+
+
+@pytest.mark.parametrize("q", [AHEAD, ASIDE])
+@pytest.mark.parametrize("mass_kg", [0.0, 0.4, 2.4, 7.0])
+def test_the_mass_follows_from_the_extra_efforts(mass_kg, q):
+    assert held_mass_kg(MODEL, q, GRIP, _efforts_of(mass_kg, q)) == pytest.approx(mass_kg, abs=1e-3)
+
+
+def test_a_twist_about_the_vertical_weighs_nothing():
+    assert held_mass_kg(MODEL, AHEAD, GRIP, np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.0])) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_an_arm_held_out_ahead_needs_efforts_against_its_own_weight():
+    # the shoulder carries the whole arm: about 8 kg whose middle is a few decimetres ahead, up being negative pitch
+    efforts = ArmScene(CAPABILITIES, MODEL, {}).gravity_efforts(AHEAD)
+    assert efforts[0] == pytest.approx(0.0, abs=1e-6)
+    assert -20.0 < efforts[1] < -5.0
+    assert -20.0 < efforts[2] < -5.0

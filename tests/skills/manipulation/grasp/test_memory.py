@@ -1,0 +1,92 @@
+"""Another grasp after one that failed."""
+
+import dataclasses
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+from scripted_robot import GRIPPER, MODEL, ScriptedRobot, context_of, outcome
+
+from skills.api import Cause, Failed, ObjectObservation, Thing
+from skills.manipulation.grasp.candidates import Target, grasp_candidates
+from skills.manipulation.grasp.memory import others_first, same_grasp, tried_grasp
+from skills.manipulation.grasp.skill import Grasp, GraspInputs
+from skills.routine import SkillFailure
+
+CENTRE = (0.85, 0.0)
+
+
+def candidates():
+    s, t = np.meshgrid(np.linspace(-0.5, 0.5, 60), np.linspace(-0.5, 0.5, 20))
+    points = np.column_stack([s.ravel() * 0.2 + CENTRE[0], t.ravel() * 0.03, np.full(s.size, 0.23)])
+    return grasp_candidates(Target(points, CENTRE, 0.0, 0.2, 0.03, 0.03, 0.2, False), MODEL.p_BS, GRIPPER)
+
+
+def test_the_best_grasp_falls_behind_all_that_are_unlike_it():
+    found, X_WB = candidates(), RigidTransform()
+    tried = (tried_grasp(found[0], CENTRE, X_WB),)
+    ordered = others_first(found, tried, CENTRE, X_WB)
+    assert sorted(map(id, ordered)) == sorted(map(id, found))
+    assert not same_grasp(tried_grasp(ordered[0], CENTRE, X_WB), tried[0])
+    assert ordered.index(found[0]) > len(found) // 2 or len(found) < 4
+
+
+def test_nothing_tried_changes_nothing():
+    found = candidates()
+    assert others_first(found, (), CENTRE, RigidTransform()) == found
+
+
+def test_when_all_were_tried_the_best_comes_first_again():
+    found, X_WB = candidates(), RigidTransform()
+    tried = tuple(tried_grasp(candidate, CENTRE, X_WB) for candidate in found)
+    assert others_first(found, tried, CENTRE, X_WB) == found
+
+
+def test_a_grasp_is_known_again_from_where_the_body_stands_later():
+    first = candidates()[0]
+    X_WB = RigidTransform()
+    X_WC = RigidTransform(RollPitchYaw(0.0, 0.0, 0.7), [0.3, -0.2, 0.0])
+    X_CB = X_WC.inverse() @ X_WB
+    centre = X_CB @ np.array([*CENTRE, 0.0])
+    moved = dataclasses.replace(first, X_BH=X_CB @ first.X_BH)
+    assert same_grasp(tried_grasp(first, CENTRE, X_WB), tried_grasp(moved, (float(centre[0]), float(centre[1])), X_WC))
+
+
+def test_a_gripper_that_is_turned_over_takes_the_same_grasp():
+    found = candidates()[0]
+    over = dataclasses.replace(found, X_BH=found.X_BH @ RigidTransform(RollPitchYaw(np.pi, 0.0, 0.0), np.zeros(3)))
+    assert same_grasp(tried_grasp(found, CENTRE, RigidTransform()), tried_grasp(over, CENTRE, RigidTransform()))
+
+
+class Slippery(Grasp):
+    """Sees and plans as scripted; what it takes slips."""
+
+    def _look_closely(self, seen):
+        yield from self.pause(0.1, "looking")
+        s, t = np.meshgrid(np.linspace(-0.5, 0.5, 30), np.linspace(-0.5, 0.5, 10))
+        points = np.column_stack([s.ravel() * 0.2 + CENTRE[0], t.ravel() * 0.03, np.full(s.size, 0.23)])
+        target = Target(points, CENTRE, 0.0, 0.2, 0.03, 0.03, 0.2, False)
+        return type("View", (), {"target": target, "X_WB": RigidTransform(), "boxes": ()})()
+
+    def _plan(self, view, thing, avoid):
+        yield from self.pause(0.1, "planning")
+        chosen = others_first(grasp_candidates(view.target, MODEL.p_BS, GRIPPER), avoid, CENTRE, view.X_WB)[0]
+        return type("Plan", (), {"candidate": chosen})()
+
+    def _reach(self, view, plan, thing):
+        yield from self.pause(0.1, "reaching")
+        return view, plan
+
+    def _take(self, view, plan, seen):
+        yield from self.pause(0.1, "taking")
+        raise SkillFailure(Cause.POSTCONDITION, "it slipped")
+
+
+def test_a_failed_grasp_tells_what_it_tried_and_the_next_one_tries_another():
+    seen = ObjectObservation(0.0, Thing("hammer"), (0.85, 0.0, 0.215), (0.2, 0.03, 0.03), 0.0, 1.0, "table")
+    avoid = ()
+    for count in (1, 2):
+        step = outcome(Slippery(context_of(ScriptedRobot())), GraspInputs(seen, avoid))
+        assert isinstance(step, Failed)
+        assert (step.cause, len(step.outputs["tried"])) == (Cause.POSTCONDITION, count)
+        avoid = step.outputs["tried"]
+    assert not same_grasp(*avoid)

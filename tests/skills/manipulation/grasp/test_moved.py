@@ -1,0 +1,80 @@
+"""A can that is moved after the close look, before the hand gets to it."""
+
+from dataclasses import replace
+from functools import partial
+
+import pytest
+
+from executive.testing.bench import SkillBench
+from plant.spot.kind import spot_capabilities
+from skills.api import Cause, ObjectObservation, Thing
+from skills.manipulation.grasp.skill import Grasp
+from skills.manipulation.grasp.skill import GraspInputs as Inputs
+from skills.robot import Pose2D
+from skills.testing.blocks import ROOM, TABLE_CAN
+from skills.testing.clock import VirtualClock
+from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.robot import ScriptedRobot, Start
+
+HERE = Pose2D(0.45, 0.0, 0.0)
+AT = (0.5 * (TABLE_CAN.x0 + TABLE_CAN.x1), 0.5 * (TABLE_CAN.y0 + TABLE_CAN.y1), TABLE_CAN.z0)
+SEEN = Inputs(ObjectObservation(0.0, Thing("coke"), (AT[0], AT[1], 0.807), (0.066, 0.066, 0.115), 0.0, 1.0, "table"))
+
+
+class Disturbed(Grasp):
+    """Something happens each time that the hand is at its pre-grasp."""
+
+    happens = ()
+
+    def _aimed(self, view, plan, thing):
+        *self.happens, next_one = self.happens or (lambda: None,)
+        next_one()
+        return (yield from super()._aimed(view, plan, thing))
+
+
+def ran(*moves):
+    """The skill's run when the can is moved by (x, y) m at the first, second, ... pre-grasp; None takes it away."""
+    clock = VirtualClock()
+    robot = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=(*ROOM, TABLE_CAN), start=Start(HERE))
+
+    def move(by):
+        (can,) = (block for block in robot.blocks if block.loose)
+        robot.blocks.remove(can)
+        if by is not None:
+            robot.blocks.append(
+                replace(can, x0=can.x0 + by[0], x1=can.x1 + by[0], y0=can.y0 + by[1], y1=can.y1 + by[1])
+            )
+
+    skill = type("Disturbed", (Disturbed,), {"happens": [partial(move, by) for by in reversed(moves)]})
+    bench = SkillBench(robot, clock, localiser=KnownPlace(HERE), costmap=BlockCostmap(robot.blocks))
+    run = bench.run(skill, SEEN)
+    return run, robot
+
+
+# how far the can is pushed across the fingers before the hand closes -> it is taken all the same
+@pytest.mark.parametrize("by", [(0.0, 0.0), (0.0, 0.025), (0.0, -0.03)])
+def test_a_can_that_is_pushed_a_little_is_taken_at_the_first_attempt(by):
+    run, robot = ran(by)
+    assert (run.outcome, run.message) == ("success", "holding the coke")
+    assert robot.held is not None
+    assert sum("looking closely" in message for _, message in run.messages) == 1
+
+
+def test_a_can_that_is_pushed_far_is_looked_at_again_and_taken():
+    run, robot = ran((0.0, 0.1))
+    assert (run.outcome, run.message) == ("success", "holding the coke")
+    assert robot.held is not None
+    assert sum("looking closely" in message for _, message in run.messages) == 2
+
+
+def test_a_can_that_is_taken_away_is_gone_and_the_hand_closes_on_nothing():
+    run, _ = ran(None)
+    assert (run.outcome, run.cause) == ("failure", Cause.PRECONDITION)
+    assert "no longer where it was seen" in run.message
+    assert not any("closing on" in message for _, message in run.messages)
+
+
+def test_a_can_that_is_pushed_again_and_again_is_left_alone():
+    run, _ = ran((0.0, 0.1), (0.0, -0.1))
+    assert (run.outcome, run.cause) == ("failure", Cause.PRECONDITION)
+    assert "moves while the hand reaches for it" in run.message

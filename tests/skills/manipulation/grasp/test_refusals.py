@@ -1,0 +1,58 @@
+"""Why an object is not grasped."""
+
+import numpy as np
+import pytest
+from scripted_robot import MODEL, ScriptedRobot, context_of, failed
+
+from plant.spot.kind import spot_capabilities
+from skills.api import Cause, ObjectObservation, Thing
+from skills.manipulation.grasp.candidates import Target, grasp_candidates
+from skills.manipulation.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
+from skills.manipulation.grasp.skill import Grasp, GraspInputs
+
+SMALL, LARGE = (0.11, 0.11, 0.38), (0.18, 0.16, 0.52)
+GRIPPER = spot_capabilities().gripper
+
+
+def _target(length, width, height, *, is_round=False):
+    s, t = np.meshgrid(np.linspace(-0.5, 0.5, 60), np.linspace(-0.5, 0.5, 20))
+    points = np.column_stack([s.ravel() * length + 0.85, t.ravel() * width, np.full(s.size, 0.2 + height)])
+    return Target(points, (0.85, 0.0), 0.0, length, width, height, 0.2, is_round)
+
+
+def seen(name, size_m):
+    return ObjectObservation(0.0, Thing(name), (0.9, 0.0, 0.26), size_m, 0.0, 1.0, "floor")
+
+
+def test_a_large_extinguisher_is_refused_before_the_arm_moves():
+    robot = ScriptedRobot()
+    why = "the extinguisher weighs 6.7 kg at least, and the arm carries 5.0 kg at most"
+    failed(Grasp(context_of(robot)), GraspInputs(seen("extinguisher", LARGE)), Cause.PRECONDITION, why)
+    assert robot.arm_commands == []
+
+
+def test_a_small_extinguisher_is_left_to_the_weighing():
+    assert known_too_heavy(seen("extinguisher", SMALL), 5.0) is None
+
+
+def test_a_class_is_refused_by_an_arm_that_carries_less_than_its_lightest():
+    why = "the extinguisher weighs 2.3 kg at least, and the arm carries 1.0 kg at most"
+    assert known_too_heavy(seen("extinguisher", SMALL), 1.0) == why
+
+
+@pytest.mark.parametrize("name", ["thing", "cube", "unheard of"])
+def test_nothing_is_known_of_the_mass_of_what_has_no_class_knowledge(name):
+    assert least_mass_kg(seen(name, LARGE)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("target", "why"),
+    [
+        (_target(0.25, 0.2, 0.05), "too wide for the gripper: 200 mm where it is narrowest"),
+        (_target(0.2, 0.2, 0.12, is_round=True), "too wide for the gripper: 200 mm where it is narrowest"),
+        (_target(0.25, 0.02, 0.002), "too flat for the gripper: 2 mm high, and the fingers need"),
+    ],
+)
+def test_what_has_no_grasp_says_which_measure_is_at_fault(target, why):
+    assert grasp_candidates(target, MODEL.p_BS, GRIPPER) == []
+    assert why in without_grasp(target, MODEL.p_BS, GRIPPER, "plank")

@@ -1,0 +1,129 @@
+"""What the grasp skill does when things go wrong."""
+
+import numpy as np
+from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
+
+from skills.api import Cause, Failed, ObjectObservation, PlanningError, Running, Succeeded, Thing
+from skills.manipulation.grasp.skill import Grasp, GraspInputs
+from skills.robot import CommandState, CommandStatus
+
+SEEN = GraspInputs(ObjectObservation(0.0, Thing("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "table"))
+BEER = ObjectObservation(0.0, Thing("beer"), (0.8, 0.0, 0.8), (0.066, 0.066, 0.2), 0.0, 1.0, "table")
+
+
+def test_a_full_gripper_is_a_failed_precondition():
+    robot = ScriptedRobot(holding=True, opening=0.3)
+    failed(Grasp(context_of(robot)), SEEN, Cause.PRECONDITION, "holds something already")
+    assert robot.arm_commands == []
+
+
+def test_a_thing_that_is_gone_is_a_failed_precondition_and_the_arm_is_stowed():
+    robot = ScriptedRobot()
+    failed(Grasp(context_of(robot)), SEEN, Cause.PRECONDITION, "no longer where it was seen")
+    assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
+    assert robot.opening == 0.0
+
+
+def test_a_refused_arm_is_a_failed_execution_with_the_robots_reason():
+    refused = CommandStatus(CommandState.REFUSED, "the arm is out of order")
+    robot = ScriptedRobot(arm_answers=dict.fromkeys(range(1, 99), refused))
+    failed(Grasp(context_of(robot)), SEEN, Cause.EXECUTION, "the arm is out of order")
+
+
+def test_a_second_attempt_starts_anew():
+    robot = ScriptedRobot(holding=True, opening=0.3)
+    skill = Grasp(context_of(robot))
+    failed(skill, SEEN, Cause.PRECONDITION, "holds something already")
+    robot.holding, robot.opening = False, 0.0
+    failed(skill, SEEN, Cause.PRECONDITION, "no longer where it was seen")
+
+
+def test_after_a_failure_the_body_stands_at_its_usual_height():
+    robot = ScriptedRobot()
+    high = GraspInputs(ObjectObservation(0.0, Thing("coke"), (0.9, 0.0, 0.96), (0.066, 0.066, 0.115), 0.0, 1.0))
+    heights = []
+    stand = robot.stand
+    robot.stand = lambda height_m, *args, **kwargs: heights.append(height_m) or stand(height_m, *args, **kwargs)
+    failed(Grasp(context_of(robot)), high, Cause.PRECONDITION, "no longer where it was seen")
+    assert heights[0] > 0.55
+    assert robot.height_m == 0.52
+
+
+class Heavy(Grasp):
+    """Has lifted something of a mass."""
+
+    def __init__(self, context, mass_kg):
+        super().__init__(context)
+        self._mass_kg = mass_kg
+
+    def run(self, inputs):
+        yield from self._refuse_heavy(self._mass_kg, np.array([0.0, 0.0, 0.1]), str(inputs.observation.thing))
+        return Succeeded("lifted")
+
+
+def test_what_weighs_more_than_the_arm_carries_is_set_down_and_refused_with_its_mass():
+    robot = ScriptedRobot(q=np.array([0.0, -1.6, 1.6, 0.0, 0.4, 0.0]), holding=True, opening=0.3)
+    before = MODEL.X_BH(robot.q).translation()
+    why = "the coke weighs 5.6 kg, and the arm carries 5.0 kg at most"
+    failed(Heavy(context_of(robot), 5.6), SEEN, Cause.PRECONDITION, why)
+    assert (MODEL.X_BH(robot.q).translation() - before)[2] < -0.09
+
+
+def test_what_the_arm_carries_is_not_set_down():
+    robot = ScriptedRobot(holding=True, opening=0.3)
+    skill = Heavy(context_of(robot), 4.9)
+    skill.begin(SEEN)
+    assert isinstance(skill.step(), Succeeded)
+    assert robot.arm_commands == []
+
+
+def resumed(skill, inputs):
+    """Go on to the end of a skill that a restart broke off."""
+    skill.resume(inputs)
+    while isinstance(step := skill.step(), Running):
+        skill.context.clock.advance(0.05)
+    skill.end()
+    return step
+
+
+def test_a_thing_that_is_held_after_a_restart_is_not_taken_again():
+    robot = ScriptedRobot(holding=True, opening=0.3, gripper_stops_rad=0.3)
+    step = resumed(Grasp(context_of(robot)), SEEN)
+    assert isinstance(step, Succeeded), step
+    assert step.message == "the coke was in the gripper already; holding it"
+    assert (robot.opening, robot.holding) == (0.3, True)
+
+
+def test_after_a_restart_with_an_empty_gripper_the_robot_looks_before_it_takes():
+    robot = ScriptedRobot()
+    step = resumed(Grasp(context_of(robot)), SEEN)
+    assert isinstance(step, Failed)
+    assert "no longer where it was seen" in step.message
+
+
+def test_what_the_gripper_has_lost_is_undone():
+    robot = ScriptedRobot()
+    skill = Grasp(context_of(robot))
+    assert skill.undone(SEEN) == "the coke is not in the gripper"
+    robot.holding = True
+    assert skill.undone(SEEN) is None
+
+
+class Behind(Grasp):
+    """Finds no grasp because of another object."""
+
+    def _plan_from_a_height(self, seen, avoid):
+        def plan():
+            raise PlanningError("the coke is behind the beer", {"in_the_way": (BEER,)})
+
+        return (yield from self.compute(plan, latency_s=0.1, name="plan grasp", message="planning"))
+
+
+def test_a_failure_to_plan_tells_what_is_in_the_way():
+    step = outcome(Behind(context_of(ScriptedRobot())), SEEN)
+    assert (step.cause, step.message) == (Cause.PLANNING, "the coke is behind the beer")
+    assert step.outputs == {"tried": (), "in_the_way": (BEER,)}
+
+
+def test_another_failure_tells_that_nothing_is_in_the_way():
+    assert outcome(Grasp(context_of(ScriptedRobot())), SEEN).outputs == {"tried": (), "in_the_way": ()}

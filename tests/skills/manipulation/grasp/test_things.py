@@ -1,0 +1,41 @@
+"""An object without a class, seen closely: its points alone say where it is."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+from table_scene import GREEN, TABLE, Can, scene
+
+from skills.api import LocalisationEstimate, ObjectObservation, Thing
+from skills.manipulation.grasp.close_view import examine
+
+PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
+ONE, OTHER = Can(1.0, 0.0, 0.033, 0.115, GREEN), Can(1.0, 0.067, 0.033, 0.115, GREEN)
+
+
+def examined(things, at, p_WB=(0.0, 0.0, 0.0)):
+    seen = ObjectObservation(0.0, Thing("thing"), (at.x, at.y, 0.81), (0.066, 0.066, 0.115), 0.0, 0.7, "table")
+    return examine(scene(things), RigidTransform(p_WB), TABLE, seen, PLACE, (), 0.12)
+
+
+@pytest.mark.parametrize("at", [ONE, OTHER])
+def test_of_two_that_touch_the_one_that_was_seen_is_taken_and_the_other_is_in_the_way(at):
+    view = examined([ONE, OTHER], at)
+    assert view.target.centre_B == pytest.approx((at.x, at.y), abs=0.012)
+    assert view.target.width_m == pytest.approx(0.066, abs=0.012)
+    assert len(view.boxes) == 2  # the table and the other can
+    (other,) = view.others
+    assert (str(other.seen.thing), other.seen.surface, len(other.boxes)) == ("thing", "table", 1)
+
+
+def test_what_stands_beside_is_known_by_its_place_in_the_world_and_its_size():
+    p_WB = (0.2, 0.1, 0.3)
+    (other,) = examined([ONE, OTHER], ONE, p_WB).others
+    x, y, z = other.seen.position_W
+    assert (x, y) == pytest.approx((OTHER.x, OTHER.y), abs=0.012)
+    assert z == pytest.approx(TABLE.height_m + 0.5 * other.seen.size_m[2], abs=0.01)
+    assert other.seen.size_m == pytest.approx((0.066, 0.066, 0.115), abs=0.015)
+    assert p_WB + other.centre_B == pytest.approx(other.seen.position_W, abs=0.02)
+
+
+def test_a_thing_that_is_gone_is_not_seen():
+    assert examined([], ONE) is None

@@ -1,0 +1,224 @@
+"""Whether what was let go of is seen with the person: by a robot whose camera is on its head."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from analytic_scan import scan_of
+from head_robot import HEAD_CAPABILITIES, HEAD_MODEL, HeadRobot
+from pydrake.math import RigidTransform, RotationMatrix
+from scripted_robot import context_of, failed, outcome
+from table_scene import BLUE, GREY, RED, Can, scene
+
+from skills.api import Cause, Succeeded
+from skills.detection import Detection
+from skills.manipulation.arm.pull import levers_m
+from skills.manipulation.hand_over.given import (
+    Release,
+    Seen,
+    lies_at,
+    names_in,
+    release_from,
+    release_of,
+    seen_given,
+    stands_at,
+)
+from skills.manipulation.hand_over.skill import HandOver, HandOverInputs
+from skills.perception.detection_3d import Detection3D
+from skills.robot import Gripper, Scan
+
+COKE = HandOverInputs("Robin", "coke")
+PULL_S = 8.0
+AHEAD_M, LEVEL_M = 0.85, 1.0
+P_HT = np.array([HEAD_CAPABILITIES.gripper.grip_x_m, 0.0, 0.0])
+CARRYING = next(
+    q
+    for q in HEAD_MODEL.inverse(RigidTransform(RotationMatrix.MakeXRotation(np.pi / 2), [0.6, 0.0, 0.6]))
+    if HEAD_MODEL.within_limits(q)
+)
+RELEASE = Release(1.05, 0.0, 0.95, 1.07)
+
+
+class _BeforeRobin(HeadRobot):
+    """Robin stands before it and pulls from a time on."""
+
+    def scan(self):
+        return Scan(**{**scan_of([(1.4, 0.0, 0.2)]).__dict__, "stamp_s": self.now_s})
+
+    def joints(self):
+        pull_B = np.array([15.0 if self.now_s >= PULL_S else 0.0, 0.0, 0.0])
+        efforts = (-pull_B @ levers_m(HEAD_MODEL, self.q, P_HT)).tolist()
+        return replace(super().joints(), effort_nm=dict(zip(HEAD_MODEL.names, efforts, strict=True)))
+
+
+def _robot(*things, **how):
+    return _BeforeRobin(q=CARRYING.copy(), holding=True, opening=0.06, things=things, **how)
+
+
+def _at_release(colour, base_m=LEVEL_M - 0.06):
+    return Can(AHEAD_M, 0.0, 0.033, 0.115, colour, base=base_m)
+
+
+def test_what_is_seen_where_it_was_let_go_of_is_given():
+    assert outcome(HandOver(context_of(_robot(_at_release(RED)))), COKE) == Succeeded("gave the coke to Robin")
+
+
+def test_two_fingers_are_drawn_straight_back_from_what_they_let_go_of():
+    robot = _robot(_at_release(RED))
+    skill = HandOver(context_of(robot))
+    skill.begin(COKE)
+    while "holding the coke out" not in skill.step().message:
+        robot.advance(0.1)
+    X_BH = HEAD_MODEL.X_BH(robot.q)
+    moved = len(robot.arm_commands)
+    while not hasattr(skill.step(), "outputs"):
+        robot.advance(0.1)
+    way_H = X_BH.inverse() @ HEAD_MODEL.X_BH(robot.arm_commands[moved].positions_rad[-1]).translation()
+    assert way_H == pytest.approx([-0.16, 0.0, 0.0], abs=0.003)  # not aside first: both fingers are off it
+
+
+def test_the_arm_is_stowed_around_what_bears_the_object_now():
+    robot = _robot(_at_release(RED))
+    context = context_of(robot)
+    around_m = ((-0.033, 0.033), (-0.06, 0.055), (-0.033, 0.033))  # the can, gripped in its middle; y of the hand is up
+    context.payload.corners_H = P_HT + np.array(list(itertools.product(*around_m)))
+    assert isinstance(outcome(HandOver(context), COKE), Succeeded)
+    for q in np.vstack([each.positions_rad for each in robot.arm_commands[-2:]]):
+        for x_m in (0.0, 0.1, 0.2):
+            x, y, z = HEAD_MODEL.X_BH(q) @ np.array([x_m, 0.0, 0.0])
+            over_m = z + HEAD_CAPABILITIES.standing_height_m - (LEVEL_M - 0.06)
+            assert max(abs(x - AHEAD_M), abs(y)) > 0.20 or not -0.10 < over_m < 0.02, "through the tray"
+    assert HEAD_MODEL.X_BH(robot.arm_commands[-2].positions_rad[-1]).translation()[0] < 0.61  # near the body first
+    assert robot.q == pytest.approx(HEAD_MODEL.stowed_rad, abs=0.06)
+
+
+def test_what_is_seen_nowhere_is_not_given():
+    failed(HandOver(context_of(_robot())), COKE, Cause.POSTCONDITION, "not seen where it was let go of before Robin")
+
+
+def test_what_lies_on_the_floor_fell():
+    robot = _robot(_at_release(RED, base_m=0.0))
+    failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "the coke fell to the floor before Robin")
+
+
+def test_something_else_that_is_not_as_high_is_not_the_object():
+    robot = _robot(_at_release(BLUE, base_m=0.80))
+    failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "not seen where it was let go of")
+
+
+def test_what_the_closing_gripper_feels_again_is_still_in_it():
+    robot = _robot(_at_release(RED))
+    opened = []
+
+    def feels():
+        """Nothing while the fingers are open, and the object again once they close."""
+        opened.extend([robot.opening] if robot.opening > 0.07 else [])
+        return Gripper(robot.now_s, robot.opening, 5.0, not opened or robot.opening < 0.03)
+
+    robot.gripper = feels
+    context = replace(context_of(robot), ask=_LetsGo)
+    failed(HandOver(context), COKE, Cause.POSTCONDITION, "the coke is still in the gripper")
+    assert len(opened) > 1
+
+
+class _LetsGo:
+    """The operator says at once that it lets go."""
+
+    def __init__(self, question):
+        self.question = question
+
+    def done(self):
+        return True
+
+    def result(self):
+        return "let go"
+
+    def withdraw(self):
+        pass
+
+
+def test_a_head_that_does_not_turn_is_told_in_one_sentence():
+    robot = _robot(_at_release(RED), head_refuses=True)
+    failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "the coke is let go of, but not seen: the head")
+
+
+@pytest.mark.parametrize(("things", "given"), [((_at_release(RED),), True), ((), False)])
+def test_after_a_restart_it_looks_where_it_let_go(things, given):
+    robot = _robot(*things)
+    robot.holding = False
+    skill = HandOver(context_of(robot))
+    skill.checkpoint = {"lets_go": True, "release": Release(AHEAD_M, 0.0, 0.94, 1.06).state()}
+    skill.resume(COKE)
+    while not hasattr(step := skill.step(), "outputs"):
+        robot.advance(0.1)
+    assert isinstance(step, Succeeded) is given
+
+
+def _seen(thing, p_W):
+    image = scene(())
+    detection = Detection(thing, 0.9, (0.0, 0.0, 9.0, 9.0))
+    none = np.empty((0, 2), np.int64)
+    colours = np.empty((0, 3), np.uint8)
+    eye_W = np.zeros(3)
+    return image, Detection3D(
+        0.0, detection, np.array(p_W), np.eye(3), np.eye(3), (0.1, 0.1, 0.1), 0.0, eye_W, none, colours, None
+    )
+
+
+@pytest.mark.parametrize(
+    ("thing", "p_W", "seen"),
+    [
+        ("wrench", (1.05, 0.1, 0.94), Seen.GIVEN),
+        ("wrench", (1.30, 0.1, 0.75), Seen.GIVEN),  # taken towards the person
+        ("coke", (1.05, 0.1, 0.94), Seen.NOT_SEEN),  # another class
+        ("wrench", (1.05, 0.6, 0.94), Seen.NOT_SEEN),  # too far aside
+        ("wrench", (1.05, 0.6, 0.02), Seen.FELL),
+        ("wrench", (3.05, 0.6, 0.02), Seen.NOT_SEEN),  # lay elsewhere before
+    ],
+)
+def test_a_flat_object_is_known_by_its_class_and_place(thing, p_W, seen):
+    image, found = _seen(thing, p_W)
+    assert seen_given(image, RigidTransform(), [found], ("wrench",), RELEASE).seen is seen
+
+
+@pytest.mark.parametrize(
+    ("things", "stands"),
+    [
+        ((Can(1.05, 0.0, 0.033, 0.12, GREY, base=0.93),), True),
+        ((Can(1.05, 0.0, 0.18, 0.01, GREY, base=0.92),), False),  # a tray without anything on it
+        ((Can(1.05, 0.3, 0.033, 0.12, GREY, base=0.93),), False),
+        ((), False),
+    ],
+)
+def test_depth_shows_a_tall_object_whatever_its_class(things, stands):
+    assert stands_at(scene(things), RigidTransform(), RELEASE) is stands
+
+
+# What is on a plate 2 cm below where a flat object was let go of -> whether something lies there
+@pytest.mark.parametrize(
+    ("things", "lies"),
+    [((Can(1.05, 0.0, 0.04, 0.025, GREY, base=0.93),), True), ((), False)],
+)
+def test_depth_shows_a_flat_object_on_a_level_plate(things, lies):
+    plate = Can(1.05, 0.0, 0.18, 0.01, GREY, base=0.92)
+    assert lies_at(scene((plate, *things)), RigidTransform(), Release(1.05, 0.0, 0.95, 0.97)) is lies
+
+
+def test_depth_does_not_tell_a_flat_object_from_what_bears_it():
+    tray = Can(1.05, 0.0, 0.18, 0.01, GREY, base=0.945)
+    assert not stands_at(scene((tray,)), RigidTransform(), Release(1.05, 0.0, 0.95, 0.97))
+
+
+def test_where_it_is_let_go_of_is_told_by_its_box_in_the_hand():
+    corners_H = np.array([[x, y, z] for x in (0.13, 0.20) for y in (-0.05, 0.06) for z in (-0.03, 0.03)])
+    X_WH = RigidTransform(RotationMatrix.MakeXRotation(np.pi / 2), [2.0, 1.0, 1.1])  # y of the hand is up
+    release = release_of(X_WH, P_HT, corners_H)
+    assert (release.x_m, release.y_m) == pytest.approx((2.0 + P_HT[0], 1.0))
+    assert (release.low_m, release.top_m) == pytest.approx((1.05, 1.16))
+    assert release_from(release.state()) == release
+
+
+def test_the_classes_that_a_text_names():
+    assert names_in("red wrench", ("wrench", "beer")) == ("wrench",)
+    assert names_in("drink", ("wrench", "beer")) == ()

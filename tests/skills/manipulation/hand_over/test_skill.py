@@ -1,0 +1,251 @@
+"""The hand-over skill with a scripted arm and analytic scans."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from analytic_scan import scan_of
+from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
+from table_scene import BLUE, GREY, Can
+
+from skills.api import Cause, Failed, Running, Succeeded
+from skills.manipulation.arm.pull import levers_m
+from skills.manipulation.hand_over.given import Release
+from skills.manipulation.hand_over.skill import HandOver, HandOverInputs, facing_poses
+from skills.robot import CommandState, Gripper, Pose2D, Scan
+
+CARRYING = np.array([0.0, -3.0, 2.85, 0.0, 0.1, 1.57])
+P_HT = np.array([0.18, 0.0, 0.0])
+BEER = HandOverInputs("Robin", "beer")
+PULL_S = 8.0
+
+
+class _Person(ScriptedRobot):
+    """Somebody stands before it and pulls from a time on; each scan has a new stamp, efforts are noisy."""
+
+    pull_n, pull_s, lost_s = 15.0, PULL_S, math.inf
+    noise = np.random.default_rng(3)
+
+    def scan(self):
+        return None if self.scan_now is None else Scan(**{**self.scan_now.__dict__, "stamp_s": self.now_s})
+
+    def joints(self):
+        force_B = np.array([self.pull_n if self.now_s >= self.pull_s else 0.0, 0.0, 0.0])
+        efforts = self.noise.normal(0.0, 0.3, len(MODEL.names)) - force_B @ levers_m(MODEL, self.q, P_HT)
+        return replace(super().joints(), effort_nm=dict(zip(MODEL.names, efforts.tolist(), strict=True)))
+
+    def gripper(self):
+        return replace(super().gripper(), holding=self.holding and self.now_s < self.lost_s)
+
+
+def _holding(**scripted):
+    return _Person(q=CARRYING.copy(), holding=True, opening=0.3, **scripted)
+
+
+ON_TRAY = (Can(0.85, 0.0, 0.033, 0.115, BLUE, base=0.94), Can(0.85, 0.0, 0.17, 0.01, GREY, base=0.93))
+"""A beer on a tray, where Robin takes it."""
+
+
+def _before_robin(things=ON_TRAY, **how):
+    robot = _holding(scan_now=scan_of([(1.4, 0.0, 0.2)]), things=things)
+    for name, value in how.items():
+        setattr(robot, name, value)
+    return robot
+
+
+class _Operator:
+    """Answers the question at a time, and keeps what was asked."""
+
+    def __init__(self, clock, answer, at_s):
+        self.clock, self.answer, self.at_s, self.question, self.withdrawn = clock, answer, at_s, None, False
+
+    def __call__(self, question):
+        self.question = question
+        return self
+
+    def done(self):
+        return self.clock.now() >= self.at_s
+
+    def result(self):
+        return self.answer
+
+    def withdraw(self):
+        self.withdrawn = True
+
+
+def test_an_empty_gripper_is_a_failed_precondition():
+    failed(HandOver(context_of(_Person())), HandOverInputs("Robin"), Cause.PRECONDITION, "nothing in the gripper")
+
+
+def test_nobody_in_sight_is_a_failed_precondition():
+    robot = _holding(scan_now=scan_of())
+    failed(HandOver(context_of(robot)), HandOverInputs("Robin"), Cause.PRECONDITION, "Robin cannot be handed anything")
+
+
+@pytest.mark.parametrize("y", [-0.4, 0.0, 0.4])
+def test_the_thing_is_held_out_near_the_person_but_does_not_touch(y):
+    robot = _holding(scan_now=scan_of([(1.4, y, 0.2)]))
+    skill = HandOver(context_of(robot))
+    skill.begin(BEER)
+    while "holding the beer out" not in skill.step().message:
+        robot.advance(0.1)
+    p_BT = MODEL.X_BH(robot.q) @ P_HT
+    off = math.hypot(p_BT[0] - 1.4, p_BT[1] - y)
+    assert 0.35 < off < 0.75
+    assert 0.7 < p_BT[2] + 0.52 < 1.1
+    assert robot.holding
+
+
+def test_a_pull_opens_the_gripper_and_the_hand_is_drawn_in():
+    robot = _before_robin()
+    assert outcome(HandOver(context_of(robot)), BEER) == Succeeded("gave the beer to Robin")
+    assert not robot.holding
+    assert robot.q == pytest.approx(MODEL.stowed_rad, abs=0.06)
+
+
+class _Rolling(_Person):
+    """The beer rolls on the tray until a time."""
+
+    rests_s = math.inf
+
+    def image(self, source, *, visual=True, depth=True):
+        off_m = 0.03 * math.sin(7.0 * min(self.now_s, self.rests_s))
+        self.things = (replace(ON_TRAY[0], y=off_m), ON_TRAY[1])
+        return super().image(source, visual=visual, depth=depth)
+
+
+@pytest.mark.parametrize("rests_s", [15.0, math.inf])
+def test_nothing_is_given_as_long_as_it_moves(rests_s):
+    robot = _Rolling(q=CARRYING.copy(), holding=True, opening=0.3, scan_now=scan_of([(1.4, 0.0, 0.2)]))
+    robot.rests_s = rests_s
+    step = outcome(HandOver(context_of(robot)), BEER)
+    if math.isfinite(rests_s):
+        assert step == Succeeded("gave the beer to Robin")
+        assert robot.now_s > rests_s
+    else:
+        assert (step.cause, step.message) == (
+            Cause.POSTCONDITION,
+            "the beer still moves where it was let go of before Robin",
+        )
+
+
+def test_the_hand_camera_looks_whether_the_person_has_it():
+    robot = _before_robin(things=())
+    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "the beer is not seen where it was let go of")
+    assert robot.q == pytest.approx(MODEL.stowed_rad, abs=0.06)
+
+
+def test_the_hand_camera_stays_below_the_face_of_a_person():
+    robot, cameras_m = _before_robin(), []
+    image = robot.image
+
+    def taken(source, **what):
+        picture = image(source, **what)
+        cameras_m.append(picture.frames.pose("hand_camera").translation())
+        return picture
+
+    robot.image = taken
+    assert isinstance(outcome(HandOver(context_of(robot)), BEER), Succeeded)
+    assert max(z for _, _, z in cameras_m) < 1.4
+    assert max(x for x, _, _ in cameras_m) < 1.4 - 0.7
+
+
+@pytest.mark.parametrize("pull_n", [0.0, 4.0])
+def test_noise_and_a_light_touch_are_no_pull(pull_n):
+    robot = _before_robin(pull_n=pull_n)
+    failed(HandOver(context_of(robot)), BEER, Cause.TIMEOUT, "Robin did not take the beer within 20 s")
+    assert robot.holding
+    assert robot.q == pytest.approx(CARRYING, abs=0.01)
+
+
+def test_an_object_pulled_out_of_the_closed_gripper_is_given_when_seen_with_the_person():
+    robot = _before_robin(pull_n=0.0, lost_s=PULL_S)
+    assert isinstance(outcome(HandOver(context_of(robot)), BEER), Succeeded)
+
+
+def test_an_object_lost_while_held_out_and_not_seen_is_not_given():
+    robot = _before_robin(things=(), pull_n=0.0, lost_s=PULL_S)
+    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "the beer is not seen where it was let go of")
+
+
+def test_what_stays_in_the_open_gripper_is_told():
+    robot = _before_robin()
+    robot.gripper = lambda: Gripper(robot.now_s, robot.opening, 5.0, True)
+    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "still in the open gripper")
+
+
+@pytest.mark.parametrize(("answer", "given"), [("let go", True), ("hold on", False)])
+def test_the_operator_may_say_that_it_lets_go(answer, given):
+    robot = _before_robin(pull_n=0.0)
+    operator = _Operator(robot, answer, at_s=PULL_S)
+    step = outcome(HandOver(replace(context_of(robot), ask=operator)), BEER)
+    assert isinstance(step, Succeeded if given else Failed)
+    assert operator.question.text == "Alice holds the beer out to Robin. Let go?"
+    assert operator.withdrawn
+
+
+def _ticks(robot, skill):
+    """Begin and give the number of each tick before it is done."""
+    skill.begin(BEER)
+    tick = 0
+    while isinstance(skill.step(), Running):
+        yield (tick := tick + 1)
+        robot.advance(0.1)
+        assert robot.now() < 60.0
+
+
+TICKS = pytest.mark.parametrize("every", [13, pytest.param(3, marks=pytest.mark.nightly)])
+
+
+@TICKS
+def test_cancelled_at_any_tick_nothing_is_under_way(every):
+    whole = _before_robin()
+    count = sum(1 for _ in _ticks(whole, HandOver(context_of(whole))))
+    for end in range(1, count + 1, every):
+        robot = _before_robin()
+        operator = _Operator(robot, "hold on", at_s=math.inf)
+        skill = HandOver(replace(context_of(robot), ask=operator))
+        next(tick for tick in _ticks(robot, skill) if tick == end)
+        skill.end()
+        running = {command for command, each in robot.status.items() if each.state is CommandState.RUNNING}
+        assert running <= set(robot.stopped)
+        assert operator.withdrawn or operator.question is None
+
+
+@TICKS
+def test_paused_at_any_tick_it_goes_on_and_gives_it(every):
+    whole = _before_robin()
+    count = sum(1 for _ in _ticks(whole, HandOver(context_of(whole))))
+    for pause in range(1, count + 1, every):
+        robot = _before_robin()
+        skill = HandOver(context_of(robot))
+        next(tick for tick in _ticks(robot, skill) if tick == pause)
+        skill.suspend()
+        robot.advance(30.0)
+        robot.pull_s = robot.now() + 6.0
+        skill.resume(BEER)
+        while isinstance(step := skill.step(), Running):
+            robot.advance(0.1)
+            assert robot.now() < 120.0
+        assert step == Succeeded("gave the beer to Robin"), (pause, step)
+        assert not robot.holding
+
+
+def test_after_a_restart_what_was_let_go_is_given():
+    robot = _before_robin(holding=False)
+    skill = HandOver(context_of(robot))
+    skill.checkpoint = {"lets_go": True, "release": Release(0.85, 0.0, 0.94, 1.05).state()}
+    skill.resume(BEER)
+    while isinstance(step := skill.step(), Running):
+        robot.advance(0.1)
+    assert step == Succeeded("gave the beer to Robin")
+
+
+def test_poses_before_a_person_face_them_and_the_nearest_comes_first():
+    here = Pose2D(0.0, 0.0, 0.0)
+    poses = facing_poses((3.0, 0.0), here, 1.5)
+    assert math.hypot(poses[0].x_m - 1.5, poses[0].y_m) < 0.01
+    for pose in poses:
+        off = math.atan2(-pose.y_m, 3.0 - pose.x_m) - pose.yaw_rad
+        assert math.remainder(off, 2 * math.pi) == pytest.approx(0.0, abs=1e-6)

@@ -1,0 +1,120 @@
+"""What the place skill does when it cannot put the thing down."""
+
+import math
+
+import numpy as np
+import pytest
+from pydrake.math import RotationMatrix
+from scripted_robot import ScriptedRobot, context_of, failed
+from table_scene import RED, Can
+from table_scene import TABLE as TOP
+
+from plant.spot.kind import spot_capabilities
+from skills.api import Cause, Failed, Running, Succeeded, Surface
+from skills.manipulation.arm.kinematics import arm_model
+from skills.manipulation.place.placement import HeldObject
+from skills.manipulation.place.skill import Place, PlaceInputs
+from skills.robot import Pose2D
+
+MODEL = arm_model(spot_capabilities())
+LEVEL_FORWARD = RotationMatrix.MakeXRotation(np.pi / 2)
+"""A hand that points ahead and closes level, as after a grasp from the side."""
+TABLE = Surface("kitchen table", ((0.75, -0.5), (1.3, -0.5), (1.3, 0.5), (0.75, 0.5)), 0.7)
+CARRYING = np.array([0.0, -3.0, 2.85, 0.0, 0.1, 1.57])
+
+
+def test_an_empty_gripper_is_a_failed_precondition():
+    failed(Place(context_of(ScriptedRobot())), PlaceInputs(TABLE), Cause.PRECONDITION, "nothing in the gripper")
+
+
+def test_a_surface_that_is_not_seen_is_a_failed_planning_and_the_thing_is_kept():
+    robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening=0.3)
+    failed(Place(context_of(robot)), PlaceInputs(TABLE), Cause.PLANNING, "the kitchen table is not seen from here")
+    assert robot.holding
+    assert robot.opening == 0.3
+
+
+def test_a_surface_without_a_spot_out_of_the_way_is_a_failed_planning_before_anything_moves():
+    robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening=0.3)
+    inputs = PlaceInputs(TABLE, clear_of=((1.0, 0.0, 2.0),))
+    failed(Place(context_of(robot)), inputs, Cause.PLANNING, "the kitchen table has no room out of the way")
+    assert (robot.arm_commands, robot.holding) == ([], True)
+
+
+def resumed(robot, checkpoint, surface=TABLE):
+    """Go on to the end of putting down, which a restart broke off."""
+    skill = Place(context_of(robot))
+    skill.checkpoint = checkpoint
+    skill.resume(PlaceInputs(surface))
+    while isinstance(step := skill.step(), Running):
+        robot.advance(0.05)
+    skill.end()
+    return step
+
+
+def test_after_a_restart_an_empty_gripper_that_was_not_yet_over_the_spot_is_a_failed_precondition():
+    step = resumed(ScriptedRobot(), {})
+    assert isinstance(step, Failed)
+    assert (step.cause, "not yet over its place" in step.message) == (Cause.PRECONDITION, True)
+
+
+def test_after_a_restart_an_empty_gripper_makes_the_robot_look_whether_the_thing_stands_there():
+    robot = ScriptedRobot()
+    step = resumed(robot, {"spot_W": [0.9, 0.0]})
+    assert isinstance(step, Failed)  # the scripted camera is dark
+    assert "not seen" in step.message
+    assert robot.arm_commands
+
+
+class _Rolling(ScriptedRobot):
+    """A can stands on the table, and rolls to and fro until a time."""
+
+    rests_s = 0.0
+
+    def image(self, source, *, visual=True, depth=True):
+        off_m = 0.02 * math.sin(7.0 * min(self.now_s, self.rests_s))
+        self.things = (Can(0.95, off_m, 0.033, 0.115, RED),)
+        return super().image(source, visual=visual, depth=depth)
+
+
+@pytest.mark.parametrize(("rests_s", "why"), [(0.0, None), (3.0, None), (math.inf, "the object still moves on the")])
+def test_what_was_put_down_is_to_be_at_rest(rests_s, why):
+    robot = _Rolling()
+    robot.rests_s = rests_s
+    step = resumed(robot, {"spot_W": [0.95, 0.0]}, TOP)
+    assert isinstance(step, Succeeded) is (why is None), step
+    assert robot.now_s > rests_s or why is not None
+    assert why is None or (step.cause is Cause.POSTCONDITION and why in step.message)
+
+
+def test_a_thing_still_held_after_a_restart_is_put_down_as_it_was_brought():
+    robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening=0.3)
+    skill = Place(context_of(robot))
+    skill.checkpoint = {"carried": np.eye(3).tolist()}
+    assert np.array_equal(skill._carried().matrix(), np.eye(3))
+
+
+def test_what_is_still_in_the_gripper_is_not_put_down():
+    robot = ScriptedRobot(holding=True)
+    assert Place(context_of(robot)).undone(PlaceInputs(TABLE)) is not None
+
+
+BENCH = Surface("bench", ((0.0, -0.5), (0.6, -0.5), (0.6, 0.5), (0.0, 0.5)), 0.82)
+FROM_ABOVE = HeldObject(RotationMatrix.MakeYRotation(np.pi / 2), np.array([[0.19, -0.02, -0.02], [0.24, 0.02, 0.02]]))
+FROM_THE_SIDE = HeldObject(LEVEL_FORWARD, np.array([[0.15, -0.05, -0.03], [0.22, 0.06, 0.03]]))
+
+
+# Held, and how far the body is from the spot (m) -> whether the arm can put it down there
+@pytest.mark.parametrize(
+    ("held", "off_m", "reached"),
+    [(FROM_ABOVE, 0.85, True), (FROM_ABOVE, 1.0, False), (FROM_THE_SIDE, 1.0, True), (FROM_THE_SIDE, 1.4, False)],
+)
+def test_what_is_held_from_above_is_put_down_nearer(held, off_m, reached):
+    skill = Place(context_of(ScriptedRobot(holding=True)))
+    cost = skill._reach_cost(BENCH, held, np.array([0.1, 0.0]))
+    assert (cost(Pose2D(0.1 - off_m, 0.0, 0.0)) is not None) is reached
+
+
+def test_before_a_high_surface_the_body_stands_up():
+    skill = Place(context_of(ScriptedRobot(holding=True)))
+    assert skill._heights_m(BENCH)[0] > spot_capabilities().standing_height_m == skill._heights_m(TABLE)[0]

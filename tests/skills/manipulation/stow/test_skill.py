@@ -1,0 +1,71 @@
+"""The stow skill: stowed when empty, near the body when holding."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
+
+from skills.api import Cause, Succeeded
+from skills.manipulation.stow.skill import Stow, StowInputs
+from skills.robot import CommandState, CommandStatus
+
+OUT = np.array([0.4, -1.6, 1.6, 0.0, 0.4, 0.0])
+
+
+def test_a_stowed_arm_is_left_alone():
+    robot = ScriptedRobot()
+    assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
+    assert robot.arm_commands == []
+
+
+def test_an_arm_that_is_out_is_stowed():
+    robot = ScriptedRobot(q=OUT.copy())
+    assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
+    assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
+
+
+def test_an_open_empty_gripper_is_closed_first():
+    robot = ScriptedRobot(q=OUT.copy(), opening=1.4)
+    outcome(Stow(context_of(robot)), StowInputs())
+    assert robot.opening == 0.0
+
+
+def test_a_held_thing_is_drawn_in_and_kept():
+    robot = ScriptedRobot(q=OUT.copy(), holding=True, opening=0.3)
+    assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
+    hand = MODEL.X_BH(robot.q).translation()
+    assert hand[0] < 0.52
+    assert abs(hand[1]) < 0.2
+    assert robot.opening == 0.3
+
+
+def test_an_arm_that_is_stopped_is_a_failed_execution():
+    stopped = dict.fromkeys(range(1, 99), CommandStatus(CommandState.STOPPED, "held fast"))
+    failed(Stow(context_of(ScriptedRobot(q=OUT.copy(), arm_answers=stopped))), StowInputs(), Cause.EXECUTION, "held")
+
+
+def test_an_arm_that_is_stopped_once_goes_on():
+    robot = ScriptedRobot(q=OUT.copy(), arm_answers={1: CommandStatus(CommandState.STOPPED, "an emergency stop")})
+    assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
+
+
+@dataclass
+class Raised(ScriptedRobot):
+    """Notes where the hand is ahead of the body whenever the body is sent to another height."""
+
+    hand_x_m: list[float] = field(default_factory=list)
+
+    def stand(self, height_m, pitch_rad, *, until_s, lease):
+        self.hand_x_m.append(float(MODEL.X_BH(self.q).translation()[0]))
+        return super().stand(height_m, pitch_rad, until_s=until_s, lease=lease)
+
+
+@pytest.mark.parametrize("holding", [True, False])
+def test_the_arm_comes_near_before_a_raised_body_is_lowered(holding):
+    """Over a table, it would be pressed onto it."""
+    robot = Raised(q=OUT.copy(), holding=holding, opening=0.3 if holding else 0.0, height_m=0.62)
+    assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
+    assert robot.height_m == pytest.approx(0.52)
+    assert len(robot.hand_x_m) == 1
+    assert robot.hand_x_m[0] < 0.56 < MODEL.X_BH(OUT).translation()[0]

@@ -47,7 +47,7 @@ class Carried:
         self._spins = np.array([range(start, start + 3) for start in starts], dtype=np.int64).reshape(-1, 3)
 
     def after_step(self, hand: RigidBody, dt_s: float) -> None:
-        """Move what the hand carries along its arc; dt_s is the length of the step."""
+        """Moves what the hand carries along its arc; dt_s is the length of the step."""
         plant, context = self._plant, self._context
         p_WH = plant.EvalBodyPoseInWorld(context, hand).translation()
         places_W = plant.GetPositions(context)[self._places]
@@ -71,7 +71,7 @@ class Carried:
         return np.asarray(bias.translational())
 
     def limit_spin(self) -> None:
-        """Slow down the free bodies that spin faster than `FASTEST_SPIN_RAD_S`."""
+        """Slows down the free bodies that spin faster than `FASTEST_SPIN_RAD_S`."""
         velocities = self._plant.GetVelocities(self._context)
         spins = velocities[self._spins]
         if spins.size and np.abs(spins).max() > _FASTEST_ALONG_RAD_S:

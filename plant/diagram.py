@@ -166,7 +166,7 @@ def build_diagram(
 
 
 def try_geometry(directives: Path | None, models: Iterable[Path]) -> None:
-    """Build a world's geometry and some models, and throw them away. Raises InputError: Drake cannot use a file."""
+    """Builds a world's geometry and some models, and throw them away. Raises InputError: Drake cannot use a file."""
     plant, _ = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
     parser, logger = parser_of(plant), logging.getLogger("drake")
     level = logger.level
@@ -212,7 +212,7 @@ def _add_tray(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> Rigid
 
 
 def _let_slide(plant: MultibodyPlant, frame: Frame, model: LooseModel) -> None:
-    """Hold a model upright at its height, by a planar joint."""
+    """Holds a model upright at its height, by a planar joint."""
     x, y, z = model.X_WM.translation()
     level = RigidTransform(np.array([0.0, 0.0, z]))
     floor = plant.AddFrame(FixedOffsetFrame(f"{model.name}_floor", plant.world_frame(), level))

@@ -104,7 +104,7 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
         return self._sleepers.asleep
 
     def observe(self, observer: Callable[[float], None], *, every: int = 1) -> None:
-        """Call `observer(now_s)` after every step, or every so many."""
+        """Calls `observer(now_s)` after every step, or every so many."""
         self._observers.append((every, observer))
 
     def now(self) -> float:
@@ -112,12 +112,12 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
         return self._steps * TIME_STEP_S
 
     def advance(self, dt_s: float) -> None:
-        """Step the plant by dt_s, rounded to whole steps (at least one), and take readings."""
+        """Steps the plant by dt_s, rounded to whole steps (at least one), and takes readings."""
         self.step(dt_s)
         self.sense()
 
     def step(self, dt_s: float) -> None:
-        """Step the plant by dt_s, rounded to whole steps (at least one); the robots' readings stay as they are."""
+        """Steps the plant by dt_s, rounded to whole steps (at least one); the robots' readings stay as they are."""
         holding = [name for name, robot in self._robots.items() if robot.gripper().holding]
         until = self._steps + max(1, round(dt_s / TIME_STEP_S))
         while self._steps < until:
@@ -135,7 +135,7 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
             self._do_steps(steps, holding)
 
     def _before_step(self, later: int, holding: Sequence[str]) -> None:
-        """Move people, doors and what somebody moves, before the next step or a `later` one."""
+        """Moves people, doors and what somebody moves, before the next step or a `later` one."""
         now_s = (self._steps + later) * TIME_STEP_S
         self.walkers.before_step(TIME_STEP_S, standing=self.receivers.busy)
         self.receivers.before_step(now_s, TIME_STEP_S, holding)
@@ -144,13 +144,13 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
             self.moves.before_step(now_s, self._hands_W, holding)
 
     def _only_robots_move(self, holding: Sequence[str]) -> bool:
-        """Whether nothing is to be done or seen between two steps of one control period."""
+        """Returns whether nothing is to be done or seen between two steps of one control period."""
         seen = any(every % CONTROL_STEPS for every, _ in self._observers)
         still = self.walkers.still and self.doors.still and self.moves is None and not self.receivers.busy
         return still and not seen and not holding and self._sleepers.all_asleep
 
     def _do_steps(self, steps: int, holding: Sequence[str]) -> None:
-        """Let the plant do one step, or several in one go where nothing is to be done between them."""
+        """Lets the plant do one step, or several in one go where nothing is to be done between them."""
         self._steps += steps
         self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
         if not self._sleepers.all_asleep:
@@ -163,14 +163,14 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
                 observer(self.now())
 
     def sense(self) -> None:
-        """Let all robots take readings."""
+        """Lets all robots take readings."""
         for robot in self._robots.values():
             robot.sense(self.now())
         for listener in self._after_advance:
             listener()
 
     def after_advance(self, listener: Callable[[], None]) -> None:
-        """Call `listener` whenever time has been advanced and all robots have sensed."""
+        """Calls `listener` whenever time has been advanced and all robots have sensed."""
         self._after_advance.append(listener)
 
     def world_state(self) -> Mapping[str, FloatArray]:
@@ -184,7 +184,7 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
         return {**super().state(), "robots": robots, "moves": None if self.moves is None else self.moves.state()}
 
     def go_on(self, state: State, world: Mapping[str, FloatArray]) -> None:
-        """Go on from such a state; the robots have powered up in it.
+        """Goes on from such a state; the robots have powered up in it.
 
         Raises:
             ValueError: the state is that of another Diagram.
@@ -205,7 +205,7 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
         self._simulator.Initialize()
 
     def note(self, sentence: str) -> None:
-        """Note what happens now."""
+        """Notes what happens now."""
         self._happened.append((round(self.now(), 6), sentence))
 
     def _hands_W(self) -> Mapping[str, FloatArray]:

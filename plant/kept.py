@@ -29,7 +29,7 @@ class Kept:
         return {key: _state(getattr(self, name)) for key, name in self._kept_names().items()}
 
     def restore(self, state: State) -> None:
-        """Go on from such a state. Raises KeyError: a part of it is missing."""
+        """Goes on from such a state. Raises KeyError: a part of it is missing."""
         for key, name in self._kept_names().items():
             value = getattr(self, name)
             if isinstance(value, Kept):

@@ -43,7 +43,7 @@ class RobotBody(ABC):
         gains: Mapping[str, tuple[float, float]],
         packages: Mapping[str, Path] = MappingProxyType({}),
     ) -> None:
-        """Add the robot to `plant` (before Finalize), with the gains (p, d) of its joints' servos.
+        """Adds the robot to `plant` (before Finalize), with the gains (p, d) of its joints' servos.
 
         `packages` are the folders of meshes that the URDF names.
         """
@@ -71,7 +71,7 @@ class RobotBody(ABC):
         return (self.instance,)
 
     def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
-        """Let links of this robot pass each other, and what never touches the floor pass it."""
+        """Lets links of this robot pass each other, and what never touches the floor pass it."""
         from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 
         filters.Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(self.geometries())))
@@ -84,7 +84,7 @@ class RobotBody(ABC):
 
     @abstractmethod
     def place(self, context: Context, pose: Pose2D) -> None:
-        """Set the robot standing at a pose (world frame) with its arm stowed."""
+        """Sets the robot standing at a pose (world frame) with its arm stowed."""
 
     @abstractmethod
     def opening(self, context: Context) -> float:
@@ -98,16 +98,16 @@ class PlantRobot(Robot, Protocol):
         """Command all servos for the next dt_s of simulated time."""
 
     def sense(self, now_s: float) -> None:
-        """Take new sensor readings."""
+        """Takes new sensor readings."""
 
     def state(self) -> State:
         """What the robot itself keeps: servos and sensors. Commands and leases do not outlive its computer."""
 
     def restore(self, state: State) -> None:
-        """Have such a state, before it powers up."""
+        """Has such a state, before it powers up."""
 
     def power_up(self, now_s: float) -> None:
-        """Begin again where it stands: nobody has the lease, no command runs; take readings."""
+        """Begins again where it stands: nobody has the lease, no command runs; take readings."""
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ class Pipeline:
         return self._engine.now() if self._now_s is None else self._now_s
 
     def advance(self, dt_s: float) -> None:
-        """Let dt_s pass: end the step under way, take readings, begin what was commanded, and step on by as much.
+        """Lets dt_s pass: end the step under way, takes readings, begins what was commanded, and step on by as much.
 
         Raises what went wrong in the step. Raises ValueError: that step is longer than dt_s.
         """
@@ -72,7 +72,7 @@ class Pipeline:
         return self._engine.now()
 
     def settle(self) -> None:
-        """Wait until no step is under way. Raises what went wrong in it."""
+        """Waits until no step is under way. Raises what went wrong in it."""
         under_way, self._under_way = self._under_way, None
         if under_way is not None:
             under_way.result()
@@ -92,7 +92,7 @@ class PipelinedRobot:
         self._running: dict[CommandId, CommandId] = {}  # by the ids given here, those of the robot
 
     def begin_commands(self) -> None:
-        """Give the robot what was commanded; no step may be under way."""
+        """Gives the robot what was commanded; no step may be under way."""
         for command, begin in self._commanded:
             self._running[command] = begin()
         self._commanded = []
@@ -125,7 +125,7 @@ class PipelinedRobot:
         return self._later(partial(verb, *given, **named))
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
-        """Follow a joint trajectory; done when its end is reached and the arm is still."""
+        """Follows a joint trajectory; done when its end is reached and the arm is still."""
         commanded_s = self._pipeline.now()
 
         def begin() -> CommandId:
@@ -135,7 +135,7 @@ class PipelinedRobot:
         return self._later(begin)
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
-        """Stop all motion, or only the given command if it still runs."""
+        """Stops all motion, or only the given command if it still runs."""
         return self._later(lambda: self._stop(lease, only))
 
     def _stop(self, lease: Lease, only: CommandId | None) -> CommandId:
@@ -147,15 +147,15 @@ class PipelinedRobot:
         return self._statuses.status(command)
 
     def acquire_lease(self, holder: str) -> Lease:
-        """Take a free lease. Raises LeaseError when another holds it."""
+        """Takes a free lease. Raises LeaseError when another holds it."""
         return self._settled().acquire_lease(holder)
 
     def take_lease(self, holder: str) -> Lease:
-        """Take the lease from the one that holds it; the robot stops."""
+        """Takes the lease from the one that holds it; the robot stops."""
         return self._settled().take_lease(holder)
 
     def return_lease(self, lease: Lease) -> None:
-        """Give the lease back; the robot stops. A lease that was taken away is ignored."""
+        """Gives the lease back; the robot stops. A lease that was taken away is ignored."""
         self._settled().return_lease(lease)
 
 
@@ -168,7 +168,7 @@ def _taken_up(trajectory: ArmTrajectory, late_s: float) -> ArmTrajectory:
 
 
 def _at_once(work: Callable[[], None]) -> Future[None]:
-    """Do the work now."""
+    """Does the work now."""
     done: Future[None] = Future()
     try:
         work()

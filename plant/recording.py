@@ -53,7 +53,7 @@ class Recorder:
         self._most = most_frames or max(_FEWEST_FRAMES, round(_MOST_BYTES / (_BODY_BYTES * world.plant.num_bodies())))
 
     def __call__(self, now_s: float) -> None:
-        """Keep a frame when one is due."""
+        """Keeps a frame when one is due."""
         if not self._frames or now_s - self._frames[-1].time_s >= self._period_s - 1e-9:
             self._frames.append(Frame(now_s, self._plant.GetPositions(self._context).copy()))
         if len(self._frames) > self._most:
@@ -120,12 +120,12 @@ def prepare_view(meshcat: Meshcat, view: View | None) -> None:
 
 
 def set_camera(meshcat: Meshcat, view: View) -> None:
-    """Put the camera of all browsers there."""
+    """Puts the camera of all browsers there."""
     meshcat.SetCameraPose(np.array(view.p_WCamera), np.array(view.p_WTarget))
 
 
 def save_html(world: WorldDiagram, frames: Sequence[Frame], path: Path, view: View | None = None) -> None:
-    """Write an animation of `frames` as one HTML file that needs no server and opens on `view`."""
+    """Writes an animation of `frames` as one HTML file that needs no server and opens on `view`."""
     meshcat = Meshcat()
     prepare_view(meshcat, view)
     shown = world.rebuild(meshcat)
@@ -153,7 +153,7 @@ class LiveScene:
     """
 
     def __init__(self, world: WorldDiagram, context: Context, view: View | None = None) -> None:
-        """Show the plant of `context`, seen from `view`, with the camera behind the first robot where one is followed.
+        """Shows the plant of `context`, seen from `view`, with the camera behind the first robot where one is followed.
 
         Raises RuntimeError when no port is free.
         """
@@ -184,7 +184,7 @@ class LiveScene:
         self._period_s = EASY_PERIOD_WALL_S
 
     def follow(self, wanted: bool) -> None:
-        """Let the camera go along with the first robot, or show the whole world again; from any thread."""
+        """Lets the camera go along with the first robot, or shows the whole world again; from any thread."""
         self._follows = wanted
 
     def publish(self) -> None:

@@ -160,7 +160,7 @@ def draw_map(
 
 
 def draw_path(picture: Picture, pixels: FloatArray, ink: Colour = PATH_COLOUR) -> None:
-    """Draw a way given in pixels (N, 2): a light seam below the line, a dot at its start, an arrow at its end."""
+    """Draws a way given in pixels (N, 2): a light seam below the line, a dot at its start, an arrow at its end."""
     if len(pixels) < 1:
         return
     thick = max(3, picture.shape[1] // 320)
@@ -185,7 +185,7 @@ def draw_detection(picture: Picture, box: tuple[float, float, float, float], nam
 
 
 def label(picture: Picture, text: str, origin: tuple[int, int], *, ground: Colour = PLATE) -> None:
-    """Write text with its lower left corner at a pixel, moved inside the picture where needed, on a plate."""
+    """Writes text with its lower left corner at a pixel, moved inside the picture where needed, on a plate."""
     width, height = _text_size(text, picture)
     pad = 5
     x = int(np.clip(origin[0], pad, max(pad, picture.shape[1] - width - pad)))
@@ -205,7 +205,7 @@ def png_bytes(picture: Picture, compression: int = 1) -> bytes:
 
 
 def save_png(path: Path, picture: Picture, compression: int = 1) -> None:
-    """Write an RGB picture as PNG, making its folder. Raises OSError when it cannot be written."""
+    """Writes an RGB picture as PNG, making its folder. Raises OSError when it cannot be written."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(png_bytes(picture, compression))
 
@@ -217,7 +217,7 @@ def _centred_intrinsics(size: tuple[int, int], focal_px: float) -> Intrinsics:
 def _render(
     query_object: QueryObject, X_WC: RigidTransform, intrinsics: Intrinsics, renderer: str, near_m: float, far_m: float
 ) -> Picture:
-    """Render at twice the size and shrink, since the renderer leaves jagged edges."""
+    """Renders at twice the size and shrinks, since the renderer leaves jagged edges."""
     k = intrinsics
     double = Intrinsics(2 * k.width, 2 * k.height, 2 * k.fx, 2 * k.fy, 2 * k.cx + 0.5, 2 * k.cy + 0.5)
     camera = colour_render_camera(double, renderer, near_m=near_m, far_m=far_m)

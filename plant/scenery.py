@@ -41,7 +41,7 @@ _RELATIVE_URI = re.compile(r"<uri>\s*(?![a-z]+://)([^<\s]+)\s*</uri>")
 def add_scenery(
     plant: MultibodyPlant, directives: Path, parser_of: Callable[[MultibodyPlant], Parser]
 ) -> dict[GeometryId, str]:
-    """Add the directives' world to `plant` (before Finalize); returns the model each collision shape comes from.
+    """Adds the directives' world to `plant` (before Finalize); returns the model each collision shape comes from.
 
     Raises:
         InputError: Drake cannot use the directives or a model.
@@ -66,7 +66,7 @@ def add_scenery(
 
 
 def add_model(parser: Parser, path: Path) -> ModelInstanceIndex:
-    """Add the model of a file. Of SDF the text is parsed: for each file that it opens itself, the parser takes 50 ms.
+    """Adds the model of a file. Of SDF the text is parsed: for each file that it opens itself, the parser takes 50 ms.
 
     Raises:
         InputError: Drake cannot use the file.
@@ -97,7 +97,7 @@ def _only(instances: Sequence[ModelInstanceIndex]) -> ModelInstanceIndex:
 
 
 def _process(directives: Sequence[ModelDirective], plant: MultibodyPlant, parser: Parser) -> None:
-    """Carry out directives one by one."""
+    """Carries out directives one by one."""
     for each in directives:
         model, weld = each.add_model, each.add_weld
         if model is not None and not (model.default_joint_positions or model.default_free_body_pose):
@@ -114,7 +114,7 @@ def _process(directives: Sequence[ModelDirective], plant: MultibodyPlant, parser
 def _copy_fixed(
     scratch: MultibodyPlant, inspector: SceneGraphInspector, moving: set[str], plant: MultibodyPlant
 ) -> dict[GeometryId, str]:
-    """Register the shapes of all models that do not move on the world body of `plant`."""
+    """Registers the shapes of all models that do not move on the world body of `plant`."""
     context, world, pieces = scratch.CreateDefaultContext(), plant.world_body(), {}
     for geometry in inspector.GetAllGeometryIds():
         body = scratch.GetBodyFromFrameId(inspector.GetFrameId(geometry))
@@ -135,7 +135,7 @@ def _copy_fixed(
 
 
 def _copy_appearance(inspector: SceneGraphInspector, geometry: GeometryId, visual: GeometryInstance) -> None:
-    """Give a shape the appearance of another, but for the label, which names a body of the other's plant."""
+    """Gives a shape the appearance of another, but for the label, which names a body of the other's plant."""
     illustration = inspector.GetIllustrationProperties(geometry)
     if illustration is not None:
         visual.set_illustration_properties(illustration)

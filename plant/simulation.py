@@ -48,7 +48,7 @@ class Simulation:
         variation: Variation = NO_VARIATION,
         spared: Collection[str] = (),
     ) -> None:
-        """Build the plant of `world`; things and people stand where the seed puts them.
+        """Builds the plant of `world`; things and people stand where the seed puts them.
 
         `robots` names the kind of each. They stand at their `starts`, one alone by default at the world's, and charge
         at their `docks`, by default the world's. Batteries begin at `charge` (0 to 1). `extra_models` stand in the
@@ -134,7 +134,7 @@ class Simulation:
         return {**self.engine.work, "contact_points": self.referee.contact_points}
 
     def keep_in(self, path: Path, *, label: str = "") -> Callable[[], None]:
-        """Write the whole state to a file now, once a second, and when what is given back is called.
+        """Writes the whole state to a file now, once a second, and when what is given back is called.
 
         `label` says what it is for.
         """
@@ -144,7 +144,7 @@ class Simulation:
         return writer
 
     def restore(self, path: Path, *, label: str | None = "") -> None:
-        """Take up the state in a file, as after a power failure: nobody commands the robots, which come to a stop.
+        """Takes up the state in a file, as after a power failure: nobody commands the robots, which come to a stop.
 
         With `label` None it may have been written for anything, and the referee begins a new chapter.
 
@@ -187,13 +187,13 @@ class Simulation:
         return np.asarray(self.recorder.at(time_s).positions)
 
     def show_live(self) -> LiveScene:
-        """Show the world in a browser from now on. Raises RuntimeError when no port is free."""
+        """Shows the world in a browser from now on. Raises RuntimeError when no port is free."""
         scene = LiveScene(self.engine.world, self.engine.context, self._overview())
         self.engine.after_advance(lambda: scene(self.engine.now()))
         return scene
 
     def save_recording(self, path: Path) -> None:
-        """Write what was recorded as one HTML file. Raises LookupError when nothing was."""
+        """Writes what was recorded as one HTML file. Raises LookupError when nothing was."""
         if self.recorder is None or not self.recorder.frames:
             raise LookupError("nothing was recorded: build the simulation with record=True and advance its clock")
         save_html(self.engine.world, self.recorder.frames, path, self._overview())

@@ -110,7 +110,7 @@ class Sleepers:
         return frozenset(each.name for each, asleep in zip(self._objects, self._asleep, strict=True) if asleep)
 
     def update(self, now_s: float) -> None:
-        """Wake whom something is about to reach, and put to sleep who has been still for long enough."""
+        """Wakes whom something is about to reach, and puts to sleep who has been still for long enough."""
         if not self._objects:
             return
         poses = self._plant.GetPositions(self._context)[self._places]
@@ -131,7 +131,7 @@ class Sleepers:
             self._turn(int(number))
 
     def wake_all(self) -> None:
-        """Wake all objects, as when the plant's state is replaced."""
+        """Wakes all objects, as when the plant's state is replaced."""
         for number in np.flatnonzero(self._asleep):
             self._turn(int(number))
         self._still_s = np.zeros(len(self._objects))
@@ -154,7 +154,7 @@ class Sleepers:
         return near
 
     def _turn(self, number: int) -> None:
-        """Wake a sleeper, or put to sleep who is awake."""
+        """Wakes a sleeper, or puts to sleep who is awake."""
         each, graph, plant = self._objects[number], self._scene_graph, self._plant
         source = plant.get_source_id()
         if self._asleep[number]:
@@ -187,7 +187,7 @@ def _objects(
 
 
 def _slides(body: RigidBody, models: Mapping[str, ModelInstanceIndex]) -> bool:
-    """Whether a moving body is a model of its own that is not loose: a person who walks."""
+    """Returns whether a moving body is a model of its own that is not loose: a person who walks."""
     return body.model_instance() in models.values() and not body.is_floating_base_body()
 
 

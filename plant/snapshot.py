@@ -118,14 +118,14 @@ class SnapshotFile:
         self.bytes_written = 0
 
     def append(self, rows: FloatArray) -> None:
-        """Write rows (N, width) after those so far. Raises OSError when the disk is full: they can be given again."""
+        """Writes rows (N, width) after those so far. Raises OSError when the disk is full: they can be given again."""
         content, kept = rows.tobytes(), self.rows
         self._write(kept.file, content, kept.count * kept.width * 8)
         checksum = zlib.crc32(content, kept.checksum)
         self.rows = replace(kept, count=kept.count + len(rows), checksum=checksum)
 
     def write(self, content: bytes) -> None:
-        """Write one whole snapshot. Raises OSError when the disk is full: the one before stays whole."""
+        """Writes one whole snapshot. Raises OSError when the disk is full: the one before stays whole."""
         self._write(self._slots[0], content, 0)
         self._slots.reverse()
         self.next_number += 1
@@ -137,7 +137,7 @@ class SnapshotFile:
         self.bytes_written += done
 
     def close(self) -> None:
-        """Close the files; idempotent."""
+        """Closes the files; idempotent."""
         while self._files:
             os.close(self._files.popitem()[1])
 
@@ -173,13 +173,13 @@ class SnapshotWriter:
         return self._file.bytes_written
 
     def __call__(self) -> None:
-        """Write it."""
+        """Writes it."""
         self._due_s = self._engine.now() + PERIOD_S
         self._append_points()
         self._file.write(self.content())
 
     def when_due(self) -> None:
-        """Write it when the last time was a while ago."""
+        """Writes it when the last time was a while ago."""
         if self._engine.now() >= self._due_s:
             self()
 
@@ -191,7 +191,7 @@ class SnapshotWriter:
         return encoded(self._file.next_number, {**values, "paths": paths}, world, self._file.rows)
 
     def _append_points(self) -> None:
-        """Append what the paths have grown by; paths that began again are written as a whole after the old ones."""
+        """Appends what the paths have grown by; paths that began again are written as a whole after the old ones."""
         if any(len(self._referee.points(robot)) < count for robot, count in self._points.items()):
             self._from = self._file.rows.count
             self._points = dict.fromkeys(self._robots, 0)
@@ -204,7 +204,7 @@ class SnapshotWriter:
 
 
 def restore(snapshot: Snapshot, engine: Engine, referee: Referee, facts: Mapping[str, Any]) -> None:
-    """Bring a plant to a snapshot's state; all of `facts` must be as they were.
+    """Brings a plant to a snapshot's state; all of `facts` must be as they were.
 
     Raises:
         SnapshotError: the snapshot is one of another world, of other robots or of another version of the plant.

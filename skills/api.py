@@ -110,7 +110,7 @@ class Job(Protocol[ResultT_co]):
         """The result. Raises what the job raised, or RuntimeError before it is done."""
 
     def withdraw(self) -> None:
-        """Drop the job: nobody waits for its result. Idempotent."""
+        """Drops the job: nobody waits for its result. Idempotent."""
 
 
 class Worker(Protocol):
@@ -121,7 +121,7 @@ class Worker(Protocol):
     """
 
     def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
-        """Start `work`, which takes latency_s on the robot's clock."""
+        """Starts `work`, which takes latency_s on the robot's clock."""
 
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
@@ -334,20 +334,20 @@ class Skill(ABC, Generic[InputsT]):
 
     @abstractmethod
     def step(self) -> Step:
-        """Do one tick's work without blocking."""
+        """Does one tick's work without blocking."""
 
     def end(self) -> None:
         """Clean up on every exit; idempotent. Stops only this skill's own commands (`Robot.stop(only=...)`)."""
 
     def suspend(self) -> None:
-        """Stop this skill's motion for a while and keep its state. `resume` or `end` follows.
+        """Stops this skill's motion for a while and keeps its state. `resume` or `end` follows.
 
         By default this ends the attempt.
         """
         self.end()
 
     def resume(self, inputs: InputsT) -> None:
-        """Continue after `suspend`. Time has passed, and the robot may have moved.
+        """Continues after `suspend`. Time has passed, and the robot may have moved.
 
         After a restart of the executive this is called on a new object in place of `begin`, with the last `checkpoint`
         set. By default the attempt starts again. Override it where that would undo or repeat what is done already.

@@ -326,7 +326,7 @@ def without_unit(name: str) -> str:
 
 
 def in_range(value: float, hint: Any) -> bool:
-    """Whether a number keeps the bounds of an annotated type; NaN keeps none."""
+    """Returns whether a number keeps the bounds of an annotated type; NaN keeps none."""
     return all(getattr(operator, name)(value, limit) for name, limit in bounds(hint).items())
 
 

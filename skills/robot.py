@@ -160,7 +160,7 @@ class CameraCapabilities:
 
     @property
     def on_hand(self) -> bool:
-        """Whether the arm moves it."""
+        """Returns whether the arm moves it."""
         return self.mount is Mount.HAND
 
     @property
@@ -293,7 +293,7 @@ class Scan:
     X_OB: RigidTransform
 
     def repeats(self, other: Scan) -> bool:
-        """Whether all ranges are those of another scan, noise and all."""
+        """Returns whether all ranges are those of another scan, noise and all."""
         ranges, others = self.ranges_m, other.ranges_m
         if ranges is others:
             return True
@@ -421,7 +421,7 @@ class Clock(Protocol):
         """Seconds since the clock began."""
 
     def advance(self, dt_s: float) -> None:
-        """Let dt_s seconds pass."""
+        """Lets dt_s seconds pass."""
 
 
 class Robot(Protocol):
@@ -444,7 +444,7 @@ class Robot(Protocol):
         """Latest LiDAR revolution, None before the first."""
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        """Take a picture with depth now, or only one of the two; may block.
+        """Takes a picture with depth now, or only one of the two; may block.
 
         Raises ValueError: no such source. Raises NoImageError: the camera gives none just now.
         """
@@ -462,25 +462,25 @@ class Robot(Protocol):
         """Present faults, empty when well."""
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Walk at a body-frame velocity (m/s, m/s, rad/s) until the clock reads until_s."""
+        """Walks at a body-frame velocity (m/s, m/s, rad/s) until the clock reads until_s."""
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Hold the body origin at a height above the floor and a pitch (positive looks down)."""
+        """Holds the body origin at a height above the floor and a pitch (positive looks down)."""
 
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
-        """Lower the body to the floor."""
+        """Lowers the body to the floor."""
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
-        """Follow a joint trajectory; done when its end is reached and the arm is still."""
+        """Follows a joint trajectory; done when its end is reached and the arm is still."""
 
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Turn the head, if there is one, to angles of `HeadCapabilities`; done when it is there and still."""
+        """Turns the head, if there is one, to angles of `HeadCapabilities`; done when it is there and still."""
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move the gripper to an opening with at most force_n at its tip, which stays; done when there or blocked."""
+        """Moves the gripper to an opening with at most force_n at its tip, which stays; done when there or blocked."""
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
-        """Stop all motion, or only the given command if it still runs; the gripper keeps its clamp force."""
+        """Stops all motion, or only the given command if it still runs; the gripper keeps its clamp force."""
 
     def command_status(self, command: CommandId) -> CommandStatus:
         """What became of a command. Raises KeyError for an id never given."""
@@ -489,13 +489,13 @@ class Robot(Protocol):
         """The lease that counts now; None while it is free."""
 
     def acquire_lease(self, holder: str) -> Lease:
-        """Take a free lease. Raises LeaseError when another holds it."""
+        """Takes a free lease. Raises LeaseError when another holds it."""
 
     def take_lease(self, holder: str) -> Lease:
-        """Take the lease from whoever holds it; the robot stops."""
+        """Takes the lease from whoever holds it; the robot stops."""
 
     def return_lease(self, lease: Lease) -> None:
-        """Give the lease back; the robot stops. A lease that was taken away is ignored."""
+        """Gives the lease back; the robot stops. A lease that was taken away is ignored."""
 
 
 class NoImageError(RuntimeError):

@@ -94,16 +94,16 @@ class RoutineSkill(Skill[InputsT]):
         """One attempt. Raises SkillFailure."""
 
     def begin(self, inputs: InputsT) -> None:
-        """Forget an earlier attempt and prepare a new one."""
+        """Forgets an earlier attempt and prepares a new one."""
         self.end()
         self._routine = self.run(inputs)
 
     def run_again(self, inputs: InputsT) -> Routine[Succeeded]:
-        """Go on from an attempt that was broken off; looks first what is done already. Raises SkillFailure."""
+        """Goes on from an attempt that was broken off; looks first what is done already. Raises SkillFailure."""
         return self.run(inputs)
 
     def suspend(self) -> None:
-        """Stop the motion under way; what was found out and planned so far is kept."""
+        """Stops the motion under way; what was found out and planned so far is kept."""
         if self._routine is None:
             return
         self._stance = self._stance_now()
@@ -114,7 +114,7 @@ class RoutineSkill(Skill[InputsT]):
         self._interrupted |= set(stopped)
 
     def resume(self, inputs: InputsT) -> None:
-        """Go on after a pause or a restart."""
+        """Goes on after a pause or a restart."""
         if self.can_go_on():
             self._stance = None
             if self._inner is not None:
@@ -150,7 +150,7 @@ class RoutineSkill(Skill[InputsT]):
         return None
 
     def step(self) -> Step:
-        """Go on to the routine's next yield. Raises RuntimeError before `begin`."""
+        """Goes on to the routine's next yield. Raises RuntimeError before `begin`."""
         if self._routine is None:
             raise RuntimeError(f"skill {self.name}: step before begin")
         trouble = self.trouble()
@@ -163,7 +163,7 @@ class RoutineSkill(Skill[InputsT]):
             return Failed(failure.cause, failure.message, failure.outputs, failure.final)
 
     def end(self) -> None:
-        """Drop the routine and stop its commands that still run."""
+        """Drops the routine and stops its commands that still run."""
         if self._routine is not None:
             self._routine.close()
         self._routine = self._stance = None
@@ -171,7 +171,7 @@ class RoutineSkill(Skill[InputsT]):
         self._commands, self._interrupted = [], set()
 
     def _stop_commands(self) -> None:
-        """Stop this attempt's commands that still run."""
+        """Stops this attempt's commands that still run."""
         for command in self._commands:
             if self._state(command) is CommandState.RUNNING:
                 self.context.robot.stop(lease=self.context.lease, only=command)
@@ -185,7 +185,7 @@ class RoutineSkill(Skill[InputsT]):
         return command
 
     def compute(self, work: Callable[[], ResultT], *, latency_s: float, name: str, message: str) -> Routine[ResultT]:
-        """Let the Worker do `work`. A PlanningError becomes a SkillFailure with cause PLANNING."""
+        """Lets the Worker do `work`. A PlanningError becomes a SkillFailure with cause PLANNING."""
         return (yield from self._awaited(self.context.worker.submit(work, latency_s=latency_s, name=name), message))
 
     def _awaited(self, job: Job[ResultT], message: str) -> Routine[ResultT]:
@@ -226,7 +226,7 @@ class RoutineSkill(Skill[InputsT]):
     def follow(
         self, trajectory: ArmTrajectory, message: str, guard: Callable[[FloatArray], bool] | None = None
     ) -> Routine[bool]:
-        """Move the arm along a trajectory; whether `guard` stopped it before its end.
+        """Moves the arm along a trajectory; whether `guard` stopped it before its end.
 
         `guard` is asked at each tick with the joint angles that the arm should have then. After a command that was
         stopped or lost the arm goes on from where it is. Raises SkillFailure with cause EXECUTION when the arm does
@@ -279,7 +279,7 @@ class RoutineSkill(Skill[InputsT]):
                 yield from self.pause(_AGAIN_S, f"{failure.message}; {message} again")
 
     def move_gripper(self, opening: float, force_n: float, message: str) -> Routine[None]:
-        """Move the gripper with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
+        """Moves the gripper with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
 
         def attempt() -> Routine[None]:
             stopped_s: float | None = 0.0
@@ -291,7 +291,7 @@ class RoutineSkill(Skill[InputsT]):
         yield from self.persist(attempt, message)
 
     def gripper_command(self, opening: float, force_n: float) -> CommandId:
-        """Give the gripper its command, and do not wait for it."""
+        """Gives the gripper its command, and do not wait for it."""
         context = self.context
         if opening > context.robot.gripper().opening:
             context.payload.corners_H = context.payload.R_BH = context.payload.thing = None
@@ -299,7 +299,7 @@ class RoutineSkill(Skill[InputsT]):
         return context.robot.set_gripper(opening, force_n, until_s=until_s, lease=context.lease)
 
     def stand_at(self, height_m: float, message: str) -> Routine[None]:
-        """Bring the body to a height, level; nothing is done where it is there already.
+        """Brings the body to a height, level; nothing is done where it is there already.
 
         Raises SkillFailure with cause EXECUTION when the body does not get there.
         """
@@ -315,7 +315,7 @@ class RoutineSkill(Skill[InputsT]):
         yield from self.persist(attempt, message)
 
     def perform(self, skill: Skill[OtherT], inputs: OtherT) -> Routine[Succeeded]:
-        """Let another skill do its work as part of this one. Raises SkillFailure with its cause and message."""
+        """Lets another skill do its work as part of this one. Raises SkillFailure with its cause and message."""
         skill.begin(inputs)
         self._inner_skill, self._inner = skill, lambda: skill.resume(inputs)
         try:
@@ -337,7 +337,7 @@ class RoutineSkill(Skill[InputsT]):
         *,
         until_s: float,
     ) -> Routine[float | None]:
-        """Wait until a command is done, and give None; or, when a pause stopped it, the time (s) of its last tick.
+        """Waits until a command is done, and gives None; or, when a pause stopped it, the time (s) of its last tick.
 
         Once `enough` holds the command is stopped, and the time is given as well. Raises SkillFailure with cause
         EXECUTION when it expired at `until_s`; CommandFailure when it was stopped otherwise, was refused, or is lost:
@@ -364,14 +364,14 @@ class RoutineSkill(Skill[InputsT]):
         raise CommandFailure(told)
 
     def pause(self, duration_s: float, message: str) -> Routine[None]:
-        """Wait on the robot's clock."""
+        """Waits on the robot's clock."""
         end_s = self.context.clock.now() + duration_s
         while self.context.clock.now() < end_s:
             yield Running(message)
 
 
 def _meets(guard: Callable[[FloatArray], bool], trajectory: ArmTrajectory, clock: Clock, begun_s: float) -> bool:
-    """Whether a guard wants the arm stopped, given where a trajectory has it now."""
+    """Returns whether a guard wants the arm stopped, given where a trajectory has it now."""
     elapsed_s, times = clock.now() - begun_s, trajectory.times_s
     return guard(np.array([np.interp(elapsed_s, times, joint) for joint in trajectory.positions_rad.T]))
 

@@ -94,7 +94,7 @@ class GlobalPlanner(Protocol):
         max_speed_m_s: float,
         work: WorkCounter = ...,
     ) -> Callable[[], WayPath]:
-        """Sample the costmap now; the call that comes back plans on that sample, in any thread.
+        """Samples the costmap now; the call that comes back plans on that sample, in any thread.
 
         That call raises PlanningError, and counts in `work` what it computes.
         """
@@ -254,7 +254,7 @@ def _loaded(slot: str, name: str, group: str) -> type:
 
 
 def _is_ours(entry: EntryPoint) -> bool:
-    """Whether it is the project's own, whose name nobody else takes."""
+    """Returns whether it is the project's own, whose name nobody else takes."""
     return distribution_of(entry) == OURS
 
 
@@ -300,7 +300,7 @@ def _typed(path: tuple[str | int, ...], kind: type, given: Any) -> Any:
 
 
 def _check_keys(path: tuple[str | int, ...], kind: type, given: Any) -> None:
-    """Refuse keys that are no fields, also in the dataclasses inside. Raises StackError."""
+    """Refuses keys that are no fields, also in the dataclasses inside. Raises StackError."""
     _known(path, given, [each.name for each in dataclasses.fields(kind)])
     for name, inner in get_type_hints(kind).items():
         if dataclasses.is_dataclass(inner) and isinstance(inner, type) and name in given:

@@ -37,22 +37,22 @@ class Traffic(Protocol):
     """One robot's view of the others and of who goes first."""
 
     def claim(self) -> None:
-        """Ask for the right to go, from now on; whoever asked first goes first. One that is held already is kept."""
+        """Asks for the right to go, from now on; whoever asked first goes first. One that is held already is kept."""
 
     def announce(self, path: FloatArray, discs: FloatArray) -> None:
-        """Tell the poses (N, 3) that lie ahead, and the outline (discs in the body frame) for which they are meant.
+        """Tells the poses (N, 3) that lie ahead, and the outline (discs in the body frame) for which they are meant.
 
         With a claim, they are reserved against all who claimed later.
         """
 
     def release(self) -> None:
-        """Give claim and path back. Idempotent."""
+        """Gives claim and path back. Idempotent."""
 
     def others(self) -> Sequence[Neighbour]:
         """The other robots that were heard of lately, by name."""
 
     def let_pass(self, name: str) -> None:
-        """Change turns with a robot that we should have made way for and cannot."""
+        """Changes turns with a robot that we should have made way for and cannot."""
 
 
 class _Alone:

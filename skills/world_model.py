@@ -90,7 +90,7 @@ class Localiser(Protocol):
         """The latest estimate."""
 
     def update(self, robot: Robot) -> None:
-        """Update from the robot's newest sensor readings; the runner calls this before each tick."""
+        """Updates from the robot's newest sensor readings; the runner calls this before each tick."""
 
 
 @runtime_checkable
@@ -104,7 +104,7 @@ class SearchingLocaliser(Protocol):
         """
 
     def accept(self, estimate: LocalisationEstimate) -> None:
-        """Use this estimate from now on."""
+        """Uses this estimate from now on."""
 
 
 @runtime_checkable
@@ -126,10 +126,10 @@ class Costmap(FreeSpace, Protocol):
     """Free space by the surveyed keep-out grid, and by obstacles that the sensors see."""
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Take in the robot's newest sensor readings; called by the runner before each tick."""
+        """Takes in the robot's newest sensor readings; called by the runner before each tick."""
 
     def add_points(self, points_W: NDArray[np.float64], stamp_s: float) -> None:
-        """Take in (N, 3) points that a camera saw on objects in the way, the floor left out."""
+        """Takes in (N, 3) points that a camera saw on objects in the way, the floor left out."""
 
 
 @runtime_checkable
@@ -137,7 +137,7 @@ class ForgettingCostmap(Protocol):
     """A costmap whose layer of seen objects can be cleared; what the survey knows stays."""
 
     def forget_seen(self, within_W: NDArray[np.float64] | None = None) -> int:
-        """Forget what was seen and not surveyed; the number of cells that were blocked by it.
+        """Forgets what was seen and not surveyed; the number of cells that were blocked by it.
 
         With discs, rows of x, y and radius (m, world), only what lies within them.
         """
@@ -171,7 +171,7 @@ class WorkCounter(Protocol):
     """Counts what a run computes, so that a slower path is seen without a clock. Jobs may call it."""
 
     def count(self, name: str, amount: int = 1) -> None:
-        """Add to the counter of this name: "planner_expansions"."""
+        """Adds to the counter of this name: "planner_expansions"."""
 
 
 class NoWorkCounter:

@@ -78,7 +78,7 @@ class Artifacts(RunVisitor):
         return self._of_robot.setdefault(robot_name, RobotArtifacts())
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Take note of a message; an answer gets a picture."""
+        """Takes note of a message; an answer gets a picture."""
         own = self.of(str(message.get("robot", "")))
         if topic == DETECTIONS:
             own.looked.append(message)
@@ -108,7 +108,7 @@ class Artifacts(RunVisitor):
         return {**message, "image": self.answer}
 
     def recall(self, events: Iterable[Event]) -> None:
-        """Keep the pictures of answers that were logged before a restart."""
+        """Keeps the pictures of answers that were logged before a restart."""
         for event in events:
             if event.topic == ANSWER_TOPIC and event.data.get("format") == "jpeg" and "t" in event.data:
                 data = np.frombuffer(base64.b64decode(event.data["data"]), np.uint8)
@@ -117,7 +117,7 @@ class Artifacts(RunVisitor):
                     self._keep(event.data, np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8))
 
     def _keep(self, message: Mapping[str, Any], picture: Picture) -> None:
-        """Keep the small picture of an answer, once, as long as there is room."""
+        """Keeps the small picture of an answer, once, as long as there is room."""
         key = str(message["node"]), float(message.get("t", 0.0))
         if key in self.numbers or sum(map(len, self.pictures)) >= MOST_BYTES:
             return
@@ -133,7 +133,7 @@ def file_name(what: str, robot_name: str, robots: Sequence[str]) -> str:
 
 
 def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robots: Sequence[str], folder: Path) -> Sequence[Path]:
-    """Write the pictures of a recorded run into `folder` as PNG; gives their paths.
+    """Writes the pictures of a recorded run into `folder` as PNG; gives their paths.
 
     What happened before a restart was not recorded by this process, and is left out.
     """
@@ -155,7 +155,7 @@ def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robots: Sequenc
 
 
 def draw_answer(artifacts: Artifacts, folder: Path) -> Path | None:
-    """Write the picture that goes with an answer as `answer.png`; its path, or None where nothing was asked."""
+    """Writes the picture that goes with an answer as `answer.png`; its path, or None where nothing was asked."""
     if artifacts.answer is None:
         return None
     path = folder / "answer.png"

@@ -37,7 +37,7 @@ class Award:
 
 
 def award(bids: Iterable[Bid]) -> Sequence[Award]:
-    """Give each mission to one robot, one after another: always the one that is done first, by what the robots have
+    """Gives each mission to one robot, one after another: always the one that is done first, by what the robots have
     to do by then; among equals the lower number, then the name. Missions that nobody can do are not among them.
     """
     left = [bid for bid in bids if not bid.problems]

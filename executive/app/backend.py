@@ -54,7 +54,7 @@ class Scene(Protocol):
         """Refresh it less often."""
 
     def follow(self, wanted: bool) -> None:
-        """Let the camera go along with the robot, or show the whole world."""
+        """Lets the camera go along with the robot, or shows the whole world."""
 
 
 class Backend(Protocol):
@@ -81,7 +81,7 @@ class Backend(Protocol):
         """Time the backend's own subsystems."""
 
     def show_live(self) -> Scene | None:
-        """Begin to show the world, where that can be done."""
+        """Begins to show the world, where that can be done."""
 
     def judge(
         self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
@@ -89,4 +89,4 @@ class Backend(Protocol):
         """What a referee saw of a mission since it began, of which others did some `before`; None: there is none."""
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
-        """Write what was recorded into a folder; the recording's path, None where there is none."""
+        """Writes what was recorded into a folder; the recording's path, None where there is none."""

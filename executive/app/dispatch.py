@@ -122,7 +122,7 @@ class Dispatch(Assigner):
         return entries if len(refused) == len(given.refused) else [*entries, *self.assign()]
 
     def _split(self, number: int) -> bool:
-        """Have a mission done in two parts, as no robot can do it alone; whether two can."""
+        """Has a mission done in two parts, as no robot can do it alone; whether two can."""
         mission = self.missions[number]
         chain = None if number in self._parts else chained(mission, self._offers.new, self._offers.takes_from)
         if chain is None:
@@ -163,13 +163,13 @@ class Dispatch(Assigner):
                 self._auction.done(number)
 
     def _may_leave(self, name: str, seen: RobotStatus) -> bool:
-        """Whether a robot is low, can charge, and leaves nothing half done."""
+        """Returns whether a robot is low, can charge, and leaves nothing half done."""
         robot = self._robots[name]
         low = seen.charge is not None and seen.charge < self.battery.low
         return low and robot.dock is not None and not seen.holding and not robot.progress.begun
 
     def tick(self, progress: Progress) -> None:
-        """See how far the missions are."""
+        """Sees how far the missions are."""
         for name, note in progress.notes.items():
             journal = self._robots[name].journal
             if journal is not None:
@@ -218,7 +218,7 @@ class Dispatch(Assigner):
         self.tell(f"Mission {number} stays in the queue: {end.result.message}")
 
     def _given_to_another(self, name: str, end: MissionEnd) -> bool:
-        """Offer to the others, once, what one robot did not manage: it has nothing in its gripper, and has put nothing
+        """Offers to the others, once, what one robot did not manage: it has nothing in its gripper, and has put nothing
         down anywhere. Whether another can do it."""
         number, robot = self._auction.under_way[name], self._robots[name]
         mission = self.missions[number]
@@ -248,7 +248,7 @@ class Dispatch(Assigner):
         self._to_dock.append(name)
 
     def _look(self, robot: FleetRobot, end: MissionEnd) -> str | None:
-        """See where a robot is at the end of a mission; why nothing more can be asked of it (None: it can)."""
+        """Sees where a robot is at the end of a mission; why nothing more can be asked of it (None: it can)."""
         robot.free_at_s = self._now_s
         if end.seen is None:
             return end.gone
@@ -301,7 +301,7 @@ class Dispatch(Assigner):
         number = mission.stored.id
 
         def note(progress: MissionProgress) -> None:
-            """Keep how far the mission is."""
+            """Keeps how far the mission is."""
             self._given.progress(number, mission.done + progress.done, "it was begun" if progress.begun else None)
 
         robot.journal = ProgressJournal(prepared.tree, note)

@@ -89,7 +89,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
 
 
 def refuse_impossible(prepared: Prepared) -> None:
-    """Raise InputError for all that `errand check` finds, before anything moves."""
+    """Raises InputError for all that `errand check` finds, before anything moves."""
     refuse_unusable(prepared.world)
     problems = Problems()
     for error in (error for each in prepared.all for error in check_prepared(each).errors):
@@ -190,7 +190,7 @@ class RouteCache(RoutePlanner):
         return Route(*known)
 
     def _write(self) -> None:
-        """Write the file; another process sees the old one or the new one."""
+        """Writes the file; another process sees the old one or the new one."""
         self._file.parent.mkdir(parents=True, exist_ok=True)
         draft = self._file.with_suffix(f".{os.getpid()}")
         draft.write_text(json.dumps(self._routes), encoding="utf-8")

@@ -201,7 +201,7 @@ def _out_of_reach(prepared: Prepared, pose: Pose2D, planner: RoutePlanner) -> It
 
 
 def is_way(planner: RoutePlanner, start: Pose2D, goal: Pose2D) -> bool:
-    """Whether there is a route."""
+    """Returns whether there is a route."""
     try:
         planner.route(start, goal)
     except ValueError:
@@ -220,7 +220,7 @@ class MissionProgress:
 
 
 def is_plain(tree: CompiledTree) -> bool:
-    """Whether a mission is nothing but commands, one after the other."""
+    """Returns whether a mission is nothing but commands, one after the other."""
     commands = all(isinstance(step, Do | Say) for step in tree.steps) and len(tree.parts) == len(tree.commands)
     return commands and (len(tree.steps) == 1 or all(step.source is None for step in tree.steps))
 
@@ -244,7 +244,7 @@ def progress_of(tree: CompiledTree, statuses: Callable[[str], Status | None]) ->
 
 
 def is_lost(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> bool:
-    """Whether a mission ended because its robot did not find out where it is."""
+    """Returns whether a mission ended because its robot did not find out where it is."""
     watches = (node for node in tree.root.walk() if node.kind == "interrupt")
     lost = (node.path_id for node in watches if isinstance(node.options["condition"], KnowsPlace))
     return any(statuses(path_id) is Status.FAILURE for path_id in lost)
@@ -267,7 +267,7 @@ class ProgressJournal:
         self.progress = MissionProgress(0)
 
     def note(self, note: TickNote) -> None:
-        """Keep what a tick brought."""
+        """Keeps what a tick brought."""
         if not note.changes:
             return
         for change in note.changes:

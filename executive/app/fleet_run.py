@@ -52,7 +52,7 @@ def run_fleet(
     page: PageView | None = None,
     first: Prepared | None = None,
 ) -> None:
-    """Run until no mission can be given out any more; log, recording and report are written into a folder.
+    """Runs until no mission can be given out any more; log, recording and report are written into a folder.
 
     `page` shows it; the log begins with the map that `first` knows. Raises InputError.
     """
@@ -149,7 +149,7 @@ def _world_of(queued: Sequence[StoredMission]) -> World:
 def _write_report(
     dispatch: Dispatch, out: Path, artifacts: Artifacts, events: Sequence[Event], facts: Sequence[tuple[str, str]]
 ) -> None:
-    """Write the report of a fleet's run into a folder."""
+    """Writes the report of a fleet's run into a folder."""
     kinds = {name: robot.kind for name, robot in dispatch.robots.items()}
     values = missions_json(dispatch.store, list(dispatch.missions))
     rows: list[MissionRow] = []

@@ -40,7 +40,7 @@ class _Move:
     until_s: float
 
     def concerns(self, goal: GoalCondition) -> bool:
-        """Whether it may move what a condition is about."""
+        """Returns whether it may move what a condition is about."""
         return not self.classes or not goal.classes or not self.classes.isdisjoint(goal.classes)
 
 
@@ -191,7 +191,7 @@ def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str
 
 
 def _is_text(heard: str, text: str | Template | Expression | None) -> bool:
-    """Whether the robot said the text of a step, with any values in it."""
+    """Returns whether the robot said the text of a step, with any values in it."""
     return text.could_be(heard) if isinstance(text, Template) else not isinstance(text, str) or heard == text
 
 

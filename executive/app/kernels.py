@@ -50,7 +50,7 @@ def newly_compiled() -> int:
 
 
 def compile_kernels() -> None:
-    """Drive a little with each kind of robot and each component, bend an arm, and survey a little.
+    """Drives a little with each kind of robot and each component, bends an arm, and surveys a little.
 
     Takes some seconds where the cache already holds all of it.
     """
@@ -63,7 +63,7 @@ def compile_kernels() -> None:
 
 
 def _begin(kind: str, components: str | None, folder: Path) -> None:
-    """Drive for some seconds towards a place, as a mission does."""
+    """Drives for some seconds towards a place, as a mission does."""
     folder.mkdir()
     mission, stack = folder / "warm_up.yaml", None
     mission.write_text(_MISSION, encoding="utf-8")
@@ -76,7 +76,7 @@ def _begin(kind: str, components: str | None, folder: Path) -> None:
 
 
 def _bend_arm() -> None:
-    """Solve for the joints of an arm that has seven, and check it against a box."""
+    """Solves for the joints of an arm that has seven, and checks it against a box."""
     from pydrake.math import RigidTransform
 
     from plant.kinds import robot_kind
@@ -94,7 +94,7 @@ def _bend_arm() -> None:
 
 
 def _see_cells() -> None:
-    """Take in a depth picture for the arm."""
+    """Takes in a depth picture for the arm."""
     from pydrake.math import RigidTransform
 
     from skills.manipulation.arm.solid_cells import Outline, with_picture
@@ -107,7 +107,7 @@ def _see_cells() -> None:
 
 
 def _survey() -> None:
-    """Begin to make a map, and look for a place in it and, by comparing scans, in the map of a world."""
+    """Begins to make a map, and looks for a place in it and, by comparing scans, in the map of a world."""
     from executive.app.simulated import simulate
     from skills.estimate.grid_map import load_grid_map
     from skills.estimate.matching import score_poses

@@ -55,7 +55,7 @@ def pose_text(name: str, pose: SavedPose, *, world: str) -> str:
 
 
 def save_pose(folder: Path, name: str | None, pose: SavedPose, *, world: str) -> Path:
-    """Write a pose as NAME.yaml, `pose_1` and so on without a name. Raises InputError: there is one, or it cannot be.
+    """Writes a pose as NAME.yaml, `pose_1` and so on without a name. Raises InputError: there is one, or it cannot be.
 
     A file that is there is never overwritten.
     """

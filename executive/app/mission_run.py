@@ -68,7 +68,7 @@ def run_request(
     durable: Durable | None = None,
     profile: Profile | None = None,
 ) -> Finished:
-    """Run a request on a backend and write log, tree, report and what that has recorded into its folder.
+    """Runs a request on a backend and writes log, tree, report and what that has recorded into its folder.
 
     Without a backend it runs in the plant. The log and the other `visitors` watch it; through `control` the run is
     held, cancelled, and so on; `page` shows it; with `durable` another process can take it up, or this one takes up
@@ -160,7 +160,7 @@ def spoken_classes(prepared: Prepared) -> frozenset[str]:
 
 
 def log_map(log: EventLog, world: World, knowledge: Knowledge) -> None:
-    """Write the map into the log, so that the log stands alone."""
+    """Writes the map into the log, so that the log stands alone."""
     log(MAP, map_message(load_grid_map(world.scan_map_path), knowledge, world=world.name))
 
 
@@ -257,7 +257,7 @@ def robot_report(ended: RobotResult, kind: str, seen: RefereeReport | None) -> R
 
 
 def preload(entry: RunEntry) -> None:
-    """Take in the robot's first scan and plan a short way; the first time on a machine this takes some seconds."""
+    """Takes in the robot's first scan and plans a short way; the first time on a machine this takes some seconds."""
     robot, localiser, costmap = entry.robot, entry.localiser, entry.costmap
     localiser.update(robot)
     estimate = localiser.estimate()
@@ -331,7 +331,7 @@ class DisturbanceLog(RunVisitor):
         self._told = len(happened())
 
     def tick(self, progress: Progress) -> None:
-        """Log what has begun, ended or happened since the last tick."""
+        """Logs what has begun, ended or happened since the last tick."""
         for now_s, sentence in self._happened()[self._told :]:
             self._log(now_s, EVENT, sentence)
         self._told = len(self._happened())
@@ -352,7 +352,7 @@ _LIBRARY: Final = ctypes.CDLL(None)
 
 
 def return_memory() -> None:
-    """Return what no mission needs any more to the system.
+    """Returns what no mission needs any more to the system.
 
     The C library keeps what was freed, in pieces that the next mission hardly fits into; a worker would grow by some
     hundred megabytes with each mission. It does nothing where the C library has no `malloc_trim`.

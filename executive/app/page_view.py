@@ -64,7 +64,7 @@ class PageView(RunVisitor):
         self._watch: ControlWatch | None = None
 
     def serve(self, log: EventLog, scene: Scene | None) -> None:
-        """Serve the page and print its address. Raises InputError when the port is taken."""
+        """Serves the page and prints its address. Raises InputError when the port is taken."""
         from executive.view.server import PageContent, serve
 
         log.listen(self._feed)
@@ -81,7 +81,7 @@ class PageView(RunVisitor):
         self._tell(f"The page: {self._server.url}")
 
     def tick(self, progress: Progress) -> None:
-        """Tell how far the run is."""
+        """Tells how far the run is."""
         self._progress.tick(progress)
 
     def offer(self, recording: Path | None) -> None:
@@ -90,7 +90,7 @@ class PageView(RunVisitor):
             self._server.offer_recording(recording)
 
     def stay(self, limit_s: float | None) -> None:
-        """Keep serving until Ctrl-C or the limit (s, on the wall's clock), and close."""
+        """Keeps serving until Ctrl-C or the limit (s, on the wall's clock), and closes."""
         from executive.view.server import wait
 
         try:
@@ -101,14 +101,14 @@ class PageView(RunVisitor):
             self.close()
 
     def close(self) -> None:
-        """Serve no more; idempotent."""
+        """Serves no more; idempotent."""
         if self._watch is not None:
             self._watch.close()
         if self._server is not None:
             self._server.close()
 
     def _hear(self, sentence: str, robot: str | None) -> str:
-        """Have what was typed done, or answered; raises InputError with the reason where it cannot be."""
+        """Has what was typed done, or answered; raises InputError with the reason where it cannot be."""
         assert self.talk is not None
         reply = self.talk.hear(sentence, robot)
         if reply.kind in (ReplyKind.REFUSED, ReplyKind.IGNORED):

@@ -40,7 +40,7 @@ def drawn(picture: Picture, found: Sequence[Detection]) -> Picture:
 
 
 def draw_box(picture: Picture, box: tuple[float, float, float, float], text: str, colour: Colour) -> None:
-    """Draw a box and its name above it, or inside where there is no room, into a picture."""
+    """Draws a box and its name above it, or inside where there is no room, into a picture."""
     u0, v0, u1, v1 = (round(value) for value in box)
     line = max(1, round(max(picture.shape[:2]) * _LINE_PER_PX))
     size = 0.4 * line
@@ -64,7 +64,7 @@ def read_picture(file: Path) -> Picture:
 
 
 def write_picture(file: Path, picture: Picture) -> None:
-    """Write (H, W, 3) RGB in the form that the name's ending tells. Raises InputError when that does not work."""
+    """Writes (H, W, 3) RGB in the form that the name's ending tells. Raises InputError when that does not work."""
     encoded, content = cv2.imencode(file.suffix, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
     try:
         file.parent.mkdir(parents=True, exist_ok=True)

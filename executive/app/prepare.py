@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
-    """Understand a request, and compile it.
+    """Understands a request, and compiles it.
 
     Of several robots the first by name stands for all; `others` are the rest.
 
@@ -91,7 +91,7 @@ class Setting:
 
     @property
     def require_wake(self) -> bool:
-        """Whether the robot's name must be said: by the request, else by the world."""
+        """Returns whether the robot's name must be said: by the request, else by the world."""
         asked = self.request.require_wake
         return self.knowledge.robot.require_wake if asked is None else asked
 
@@ -330,7 +330,7 @@ def _waits(parts: Sequence[Part], robots: Mapping[str, PlacedRobot]) -> Mapping[
 
 
 def _refuse_rings(waits: Mapping[str, Collection[str]]) -> None:
-    """Raise InputError where robots would wait for each other."""
+    """Raises InputError where robots would wait for each other."""
     try:
         TopologicalSorter(waits).prepare()
     except CycleError as error:

@@ -68,7 +68,7 @@ class Prepared:
 
     @property
     def several(self) -> bool:
-        """Whether there are several robots in the run."""
+        """Returns whether there are several robots in the run."""
         return len(self.robots) > 1
 
 

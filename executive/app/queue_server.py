@@ -46,10 +46,10 @@ class Waiting(Protocol):
     """Waits for the next thing to do; `executive.store.wakeup.WakeupPipe` is one."""
 
     def wait(self, until: datetime | None) -> None:
-        """Block until somebody calls `wake` or, at the latest, a moment comes."""
+        """Blocks until somebody calls `wake` or, at the latest, a moment comes."""
 
     def wake(self) -> None:
-        """End the wait, from any thread or signal handler."""
+        """Ends the wait, from any thread or signal handler."""
 
 
 class QueueServer:
@@ -76,13 +76,13 @@ class QueueServer:
         self.stopped: str | None = None
 
     def stop(self, reason: str) -> None:
-        """Serve no longer; from any thread and from signal handlers."""
+        """Serves no longer; from any thread and from signal handlers."""
         self.stopped = self.stopped or reason
         self._runner.cancel(reason)
         self._waiting.wake()
 
     def serve(self, *, end: datetime | None = None, until_idle: bool = False) -> list[Ended]:
-        """Serve until it is stopped, until a moment (no mission begins after it), or until nothing is queued.
+        """Serves until it is stopped, until a moment (no mission begins after it), or until nothing is queued.
 
         Raises:
             InputError: a listener cannot be opened at the beginning, or the store cannot be used any more.
@@ -191,7 +191,7 @@ class Listeners:
         self._follow_topics(wanted)
 
     def close(self) -> None:
-        """Listen no more; idempotent."""
+        """Listens no more; idempotent."""
         self._follow_calls(False)
         self._follow_topics({})
 

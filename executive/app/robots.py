@@ -136,7 +136,7 @@ def _free_start(world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2
 
 
 def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRobot], world: World) -> None:
-    """Raise InputError where a robot would stand in another, or in something."""
+    """Raises InputError where a robot would stand in another, or in something."""
     own = _discs(robot.kind, start)
     for other in placed:
         theirs = _discs(other.kind, other.start)
@@ -147,7 +147,7 @@ def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRo
 
 
 def refuse_blocked(world: World, pose: Pose2D, name: str = "the robot", kind: str = DEFAULT_KIND) -> None:
-    """Raise InputError unless a robot's body is free at a pose on the world's surveyed map, which must be there."""
+    """Raises InputError unless a robot's body is free at a pose on the world's surveyed map, which must be there."""
     discs = _discs(kind, pose)
     if float(np.min(_free_ground(world).distance_m(discs[:, :2]) - discs[:, 2])) < 0.0:
         there = f"({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g})"

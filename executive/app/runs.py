@@ -45,16 +45,16 @@ class Screen(Protocol):
     """What people see of runs, and what they control them by."""
 
     def tell(self, line: str, *, title: bool = False) -> None:
-        """Show a line."""
+        """Shows a line."""
 
     def watching(self, prepared: Prepared) -> AbstractContextManager[Watching]:
-        """Show a run from before its beginning to its end."""
+        """Shows a run from before its beginning to its end."""
 
     def conclude(self, finished: Finished) -> None:
-        """Show how a run ended."""
+        """Shows how a run ended."""
 
     def name_files(self, out: Path) -> None:
-        """Name what a run has left in its folder."""
+        """Names what a run has left in its folder."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Ended:
 
     @property
     def hung_up(self) -> bool:
-        """Whether it ended since its terminal was closed."""
+        """Returns whether it ended since its terminal was closed."""
         return self.message == HUNG_UP
 
     def to_json(self) -> dict[str, Any]:
@@ -87,17 +87,17 @@ class Runner(Protocol):
     """Runs missions of the store."""
 
     def run(self, mission: StoredMission) -> Ended:
-        """Run one to its end, or set it aside. Raises InputError: no further one can be run."""
+        """Runs one to its end, or sets it aside. Raises InputError: no further one can be run."""
 
     def set_aside(self, mission: StoredMission, cause: str) -> Ended:
-        """End one that cannot be run with its cause."""
+        """Ends one that cannot be run with its cause."""
 
     def cancel(self, reason: str) -> None:
-        """Cancel the one under way, and any that begins later; from signal handlers."""
+        """Cancels the one under way, and any that begins later; from signal handlers."""
 
 
 def run_in_turn(missions: Iterable[StoredMission], runner: Runner, *, until_cancelled: bool = True) -> list[Ended]:
-    """Run missions as they come, the next one when one has ended; `until_cancelled`, none after one was cancelled.
+    """Runs missions as they come, the next one when one has ended; `until_cancelled`, none after one was cancelled.
 
     Raises InputError: as the runner.
     """
@@ -146,7 +146,7 @@ class MissionRuns:
         self._cancelled: str | None = None
 
     def run(self, mission: StoredMission, prepared: Prepared | None = None) -> Ended:
-        """Run a mission from its beginning, or go on with one that was broken off or cancelled, to its end.
+        """Runs a mission from its beginning, or goes on with one that was broken off or cancelled, to its end.
 
         One of a queue that cannot be run is set aside, so that the next one can. `prepared` is the mission where it is
         understood already.
@@ -186,7 +186,7 @@ class MissionRuns:
             self._screen.tell(f"Mission {broken.id} ({broken.request.name}) had been broken off; it is given up.")
 
     def set_aside(self, mission: StoredMission, cause: str) -> Ended:
-        """End a mission that cannot be run with its cause."""
+        """Ends a mission that cannot be run with its cause."""
         self._missions.finish(mission.id, MissionState.ERROR, cause)
         self._screen.tell(f"Mission {mission.id} ({mission.request.name}) is set aside: {cause}")
         again = f"errand resume --mission {mission.id} --store {self._missions.path}"
@@ -194,7 +194,7 @@ class MissionRuns:
         return Ended(mission.id, MissionState.ERROR.value, False, cause)
 
     def cancel(self, reason: str) -> None:
-        """Cancel the mission under way, and any that begins later; from signal handlers."""
+        """Cancels the mission under way, and any that begins later; from signal handlers."""
         self._cancelled = reason
         if self._control is not None:
             self._control.cancel(reason)
@@ -315,7 +315,7 @@ def _part_of(prepared: Prepared) -> str | None:
 
 
 def same_world(one: StoredMission, other: StoredMission) -> bool:
-    """Whether two missions are to be done by the same robots in one world."""
+    """Returns whether two missions are to be done by the same robots in one world."""
     a, b = one.request, other.request
     same = (a.world, a.world_name, a.seed, frozenset(a.robots)) == (b.world, b.world_name, b.seed, frozenset(b.robots))
     return same and (a.robots or a.robot == b.robot) and (a.scenario, a.variation) == (b.scenario, b.variation)

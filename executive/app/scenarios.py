@@ -105,7 +105,7 @@ def _wall_m(grid: GridMap, middle_W: FloatArray, along: FloatArray, width_m: flo
 
 
 def _occupied(grid: GridMap, points_W: FloatArray) -> Any:
-    """Whether each point (N, 2) is in an occupied cell; off the grid, all is."""
+    """Returns whether each point (N, 2) is in an occupied cell; off the grid, all is."""
     rows, columns = grid.cells(points_W).T
     inside = (rows >= 0) & (rows < grid.occupied.shape[0]) & (columns >= 0) & (columns < grid.occupied.shape[1])
     return ~inside | grid.occupied[np.where(inside, rows, 0), np.where(inside, columns, 0)]
@@ -226,7 +226,7 @@ class _Events:
         self.moves: list[Mapping[str, Any]] = []
 
     def take(self, event: EventFile, path: KeyPath) -> None:
-        """Take in one. Raises InputError."""
+        """Takes in one. Raises InputError."""
         if event.person is not None:
             self._walk(event, event.person, path)
         elif event.door is not None:

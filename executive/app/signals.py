@@ -18,7 +18,7 @@ HUNG_UP: Final = _REASON.format(signal.SIGHUP.name)
 
 @contextmanager
 def ended_by_signals(end: Callable[[str], None]) -> Iterator[None]:
-    """Have `end` called with the reason at Ctrl-C, a polite kill and closing the terminal; of several, the inner first.
+    """Has `end` called with the reason at Ctrl-C, a polite kill and closing the terminal; of several, the inner first.
 
     A second Ctrl-C breaks in at once. What is printed after the terminal is closed is dropped. Under `nohup` closing it
     ends nothing.
@@ -80,7 +80,7 @@ def interrupted_by_hang_up() -> Iterator[None]:
 
 
 def _drop_output(terminals: Sequence[int]) -> None:
-    """Turn these descriptors to nowhere: every write to a terminal that is gone fails."""
+    """Turns these descriptors to nowhere: every write to a terminal that is gone fails."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for terminal in terminals:
         os.dup2(nowhere, terminal)

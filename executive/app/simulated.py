@@ -135,7 +135,7 @@ class SimulatedBackend:
         return RefereeReport(**asdict(verdict), events=self._simulation.referee.events)
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
-        """Write recording and pictures, where the run was recorded."""
+        """Writes recording and pictures, where the run was recorded."""
         if not self._record:
             return None
         self._settled().save_recording(out / "recording.html")

@@ -25,7 +25,7 @@ from executive.words.step import Step
 
 
 def load_ahead() -> None:
-    """Begin to load the parser, in a thread of its own."""
+    """Begins to load the parser, in a thread of its own."""
     threading.Thread(target=lambda: load_parser().parse("go"), name="errand-parser", daemon=True).start()
 
 
@@ -40,7 +40,7 @@ class Talk(RunVisitor):
         self._each = {each.mission.robot_name: (each, conversation_of(each, control)) for each in prepared.all}
 
     def listen(self, listener: Callable[[str, Waiting | None], None]) -> None:
-        """Call `listener` after all that is said to a robot with its name and the question that it then asks."""
+        """Calls `listener` after all that is said to a robot with its name and the question that it then asks."""
         for name, (_, conversation) in self._each.items():
             conversation.listen(partial(listener, name))
 
@@ -50,12 +50,12 @@ class Talk(RunVisitor):
             conversation.set_mission(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
 
     def tick(self, progress: Progress) -> None:
-        """See how far the run is."""
+        """Sees how far the run is."""
         for _, conversation in self._each.values():
             conversation.tick(progress)
 
     def hear(self, text: str, robot: str | None = None) -> Reply:
-        """Do what was said, to a robot or to those that it names, and say what became of it. Never raises on text."""
+        """Does what was said, to a robot or to those that it names, and say what became of it. Never raises on text."""
         if robot is not None and robot not in self._each:
             return Reply(ReplyKind.REFUSED, f"{robot} has nothing to do in this run")
         names, said = ((robot,), text) if robot is not None else self._meant(text)

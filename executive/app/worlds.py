@@ -28,7 +28,7 @@ def _world_error(name: str, error: Exception) -> InputError:
 
 
 def refuse_unusable(world: World) -> None:
-    """Raise InputError unless the simulation can use the geometry of a world of the user's, and what is imported."""
+    """Raises InputError unless the simulation can use the geometry of a world of the user's, and what is imported."""
     is_ours = world.folder.is_relative_to(WORLDS_FOLDER)
     if is_ours and not world.imports:
         return
@@ -38,7 +38,7 @@ def refuse_unusable(world: World) -> None:
 
 @cache
 def _try(directives: Path | None, models: tuple[Path, ...]) -> None:
-    """Let the simulation read files that are good, once in a process."""
+    """Lets the simulation read files that are good, once in a process."""
     from plant.diagram import try_geometry
 
     try_geometry(directives, models)

@@ -33,7 +33,7 @@ def check(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object for all files on standard output.")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Show commands and trees, too.")] = False,
 ) -> None:
-    """Check mission files without running them: commands, tree, paths on the map, time and battery."""
+    """Checks mission files without running them: commands, tree, paths on the map, time and battery."""
     checker = Checker(request)
     checked = [checker.check_file(file) for file in files]
     for one in () if as_json else checked:

@@ -52,7 +52,7 @@ def detect(
     draw: Annotated[Path | None, typer.Option(help="A folder for the pictures with boxes drawn.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Find beer, coke, extinguishers, hammers, screwdrivers, wrenches, people, cylinders and cubes in pictures.
+    """Finds beer, coke, extinguishers, hammers, screwdrivers, wrenches, people, cylinders and cubes in pictures.
 
     A picture that cannot be read does not keep the others from being looked at; the exit status is 2 then.
     """

@@ -60,7 +60,7 @@ def evaluate(
     ] = None,
     as_json: AS_JSON = False,
 ) -> None:
-    """Run a scenario file, random missions, or a mission at many seeds; count claims and what the referee saw.
+    """Runs a scenario file, random missions, or a mission at many seeds; count claims and what the referee saw.
 
     A scenario file says what is run, where and with what varied. Results of scenarios and of random missions land in a
     file, and the same command goes on where it stopped. Of a mission, faults and scenarios are all in each run, unless
@@ -145,7 +145,7 @@ def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> 
 
 
 def _shown_seeds(cases: Sequence[Case], console: Console) -> dict[str, Any]:
-    """Show a mission at many seeds, a row for each run, under several conditions one for each of those; as JSON."""
+    """Shows a mission at many seeds, a row for each run, under several conditions one for each of those; as JSON."""
     from executive.app.evaluate.evaluation_file import CONDITION
     from executive.app.evaluate.summary import totals_of
 
@@ -186,7 +186,7 @@ def _seed_row(case: Case) -> tuple[str, ...]:
 
 
 def _shown(evaluation: Evaluation, found: Evaluated, kept_in: Path, console: Console) -> dict[str, Any]:
-    """Show a scenario or random missions: success by groups, claims against verdicts, what to look at; as JSON."""
+    """Shows a scenario or random missions: success by groups, claims against verdicts, what to look at; as JSON."""
     from executive.app.evaluate.evaluation_file import CONDITION
     from executive.app.evaluate.summary import groups_of, standings_json, totals_of
 
@@ -210,7 +210,7 @@ def _shown(evaluation: Evaluation, found: Evaluated, kept_in: Path, console: Con
 
 
 def _show_cases(console: Console, found: Evaluated) -> None:
-    """Show success by groups, claims against verdicts, and each run that is to be looked at with its log's folder."""
+    """Shows success by groups, claims against verdicts, and each run that is to be looked at with its log's folder."""
     from executive.app.evaluate.results import Standing
     from executive.app.evaluate.summary import groups_of, standing_rows, to_look_at
 
@@ -253,7 +253,7 @@ def report(
     against: Annotated[Path | None, typer.Option(metavar="RESULTS", help="Compare with another results file.")] = None,
     as_json: AS_JSON = False,
 ) -> None:
-    """Report the results of an evaluation: success with intervals, causes, where the time goes, each failure."""
+    """Reports the results of an evaluation: success with intervals, causes, where the time goes, each failure."""
     from executive.app.evaluate.results import ResultsFile
     from executive.app.evaluate.summary import summary_json, to_page
 

@@ -45,7 +45,7 @@ def run(
     view_port: VIEW_PORT = 0,
     as_json: AS_JSON = False,
 ) -> None:
-    """Run all that is queued, in one world, with several robots.
+    """Runs all that is queued, in one world, with several robots.
 
     A fault is for the robot named before it ("bob: robot dies at 20 s"), else for all.
     """
@@ -91,7 +91,7 @@ def run(
 
 @fleet.command()
 def status(queue: Queue, as_json: AS_JSON = False) -> None:
-    """Show which robot has which mission, also while they run."""
+    """Shows which robot has which mission, also while they run."""
     with MissionStore(_store(queue), create=False) as missions:
         from executive.app.fleet import missions_json
 

@@ -44,7 +44,7 @@ def log(
     robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
 ) -> None:
-    """Print what happened in a run: what each node did and why, detections, the outcome, tracebacks of defects."""
+    """Prints what happened in a run: what each node did and why, detections, the outcome, tracebacks of defects."""
     history = read_history(file)
     history = history if robot is None else history.of_robot(robot)
     if ros2 is not None:
@@ -104,7 +104,7 @@ def replay(
     port: Annotated[int, quantity_option(Port, help="Serve here; 0 takes a free port.")] = 0,
     view_for: Annotated[float | None, quantity_option(Wait, help="End after so many seconds.")] = None,
 ) -> None:
-    """Show what happened in a run, at any time of it: tree, map, pictures, events, 3D recording."""
+    """Shows what happened in a run, at any time of it: tree, map, pictures, events, 3D recording."""
     history = read_history(file)
     history.trees()
     beside = file.parent / RECORDING
@@ -162,7 +162,7 @@ def tree(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Write it to this file.")] = None,
     ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,
 ) -> None:
-    """Show the tree of a sentence or a mission file before it runs, or of a log as it last was."""
+    """Shows the tree of a sentence or a mission file before it runs, or of a log as it last was."""
     whole = _view(file, request, at, robot)
     shown = whole if depth is None else fold_below(whole, depth)
     few = most or _MOST.get(form)

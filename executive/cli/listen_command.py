@@ -47,7 +47,7 @@ def listen(
     robot: Annotated[str | None, typer.Option(help="The robot's name; the world's robot unless said.")] = None,
     jsonl: Annotated[bool, typer.Option("--jsonl", help="One JSON object for each file.")] = False,
 ) -> None:
-    """Recognise what is said in wav files or at the microphone, and show the commands that it means."""
+    """Recognises what is said in wav files or at the microphone, and shows the commands that it means."""
     if mic == bool(files):
         raise InputError("errand listen takes wav files or --mic", hint="try: errand listen request.wav")
     knowledge = knowledge_of(open_world(request.world or DEFAULT_WORLD))
@@ -138,7 +138,7 @@ def answer_line(meaning: Understanding) -> str:
 
 
 def show_hearing(hearings: Iterable[Hearing], console: Console, voice: Voice) -> None:
-    """Show the level and what is being said, block by block, and answer each sentence that ends."""
+    """Shows the level and what is being said, block by block, and answers each sentence that ends."""
     with Live(console=console, refresh_per_second=8, transient=True) as live:
         for hearing in hearings:
             live.update(_meter(hearing))
@@ -173,7 +173,7 @@ def _follow_microphone(listener: Listener) -> None:
 
 
 def _answer(listener: Listener, file: Path, *, jsonl: bool) -> Recording | None:
-    """Show what was heard in a file; None when it could not be listened to."""
+    """Shows what was heard in a file; None when it could not be listened to."""
     try:
         recording = listener.file(file)
     except InputError as error:

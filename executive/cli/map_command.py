@@ -125,7 +125,7 @@ class _Building:
         self._begun_s = time.monotonic()
 
     def drive(self, most_s: float, cancelled: Callable[[], bool]) -> str | None:
-        """Drive until the survey is done; returns why it ended before, or None."""
+        """Drives until the survey is done; returns why it ended before, or None."""
         clock, survey = self._simulation.clock, self._survey
         told_s, drawn_s, kept_s = 0.0, -math.inf, time.monotonic()
         try:
@@ -155,7 +155,7 @@ class _Building:
         return "it was broken off; the same command goes on" if cancelled() else f"{most_s:g} s are over"
 
     def result(self) -> dict[str, Any]:
-        """Save the grids; returns the result as JSON values. Raises InputError."""
+        """Saves the grids; returns the result as JSON values. Raises InputError."""
         from plant.referee.trajectory import trajectory_error_m
         from skills.mapping.map_folder import save_grids, surveyed
 
@@ -205,7 +205,7 @@ class _Building:
             draft.replace(self._out / PICTURE)
 
     def _keep(self) -> None:
-        """Save the graph, from which the next run goes on."""
+        """Saves the graph, from which the next run goes on."""
         from skills.mapping.map_folder import save_graph
 
         with writing(self._out, _OTHER):
@@ -252,7 +252,7 @@ _TRAJECTORY, _LOOP, _ROBOT, _GOAL = (70, 120, 220), (230, 150, 30), (30, 140, 60
 
 
 def map_picture(ground: GridMap, graph: PoseGraph, pose: Pose2D, goal: Pose2D | None) -> Picture:
-    """Draw the ground as known so far (north up, RGB), at most _WIDEST pixels wide or high."""
+    """Draws the ground as known so far (north up, RGB), at most _WIDEST pixels wide or high."""
     unknown = np.zeros_like(ground.occupied) if ground.unknown is None else ground.unknown
     grey = np.where(ground.occupied, _GREY["occupied"], np.where(unknown, _GREY["unknown"], _GREY["free"]))
     seen = np.argwhere(~unknown)

@@ -22,7 +22,7 @@ _NAME: Final = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 
 
 def missions() -> None:
-    """List the missions that come with Errand."""
+    """Lists the missions that come with Errand."""
     rows = [(name, _first_words(file)) for name, file in shipped_missions().items()]
     show_table(console_for(as_json=False), ("mission", "what it shows"), rows)
 
@@ -30,7 +30,7 @@ def missions() -> None:
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to put them.", show_default=False)],
 ) -> None:
-    """Copy the missions that come with Errand into a folder, to be changed; files that are there stay."""
+    """Copies the missions that come with Errand into a folder, to be changed; files that are there stay."""
     with writing(folder, "name another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         new = [file for file in sorted(FOLDER.glob("*.[yj]*")) if not (folder / file.name).exists()]
@@ -50,7 +50,7 @@ def new_skill(
     name: Annotated[str, typer.Argument(help="The skill's name: lower-case words joined by _.")],
     folder: Annotated[Path, typer.Argument(help="The new folder for the package.")],
 ) -> None:
-    """Write an installable package with one skill, its tests and its registration."""
+    """Writes an installable package with one skill, its tests and its registration."""
     from executive.tree.registry import installed_skills
 
     written = render_skill(name, folder, taken=frozenset(installed_skills().names))
@@ -60,7 +60,7 @@ def new_skill(
 
 
 def render_skill(name: str, folder: Path, *, taken: frozenset[str] = frozenset()) -> tuple[Path, ...]:
-    """Write a package with the skill `name` into the new folder `folder`; the files written.
+    """Writes a package with the skill `name` into the new folder `folder`; the files written.
 
     Raises:
         InputError: the name is no lower-case word, or is taken; the folder exists and is not empty, or cannot be made.

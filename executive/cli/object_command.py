@@ -45,7 +45,7 @@ def import_command(
     close_holes: Annotated[bool, typer.Option("--close-holes", help="Close an open mesh where it is open.")] = False,
     as_json: AS_JSON = False,
 ) -> None:
-    """Make a model of a mesh: visual geometry, convex collision parts, and inertia from its volume and mass."""
+    """Makes a model of a mesh: visual geometry, convex collision parts, and inertia from its volume and mass."""
     from plant.models.builder.importing import Wanted, import_object
 
     wanted = Wanted(name, mass, class_name, scale, up, close_holes)
@@ -67,7 +67,7 @@ def show(
     picture: Annotated[Path | None, typer.Option("--picture", help="Draw it into this file, PNG.")] = None,
     as_json: AS_JSON = False,
 ) -> None:
-    """Tell what an imported model holds: extents, mass, inertia, collision parts."""
+    """Tells what an imported model holds: extents, mass, inertia, collision parts."""
     found = read_imported(folder)
     if picture is not None:
         _draw(folder, found, picture)

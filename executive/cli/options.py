@@ -71,7 +71,7 @@ class _Typed:
 
     @property
     def several(self) -> bool:
-        """Whether it may be given again and again."""
+        """Returns whether it may be given again and again."""
         return get_origin(self.kind) is tuple
 
     @property

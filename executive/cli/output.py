@@ -125,7 +125,7 @@ def terminal_answerer() -> Answerer | None:
 
 
 def ask_at_terminal(question: ClarifyingQuestion) -> str | None:
-    """Put a question to who sits at the terminal; None for an empty line or the end of the input."""
+    """Puts a question to who sits at the terminal; None for an empty line or the end of the input."""
     numbers = "  ".join(f"[{number}] {name}" for number, name in enumerate(question.candidates, start=1))
     typer.echo(f"? {question.text}  {numbers}".rstrip(), err=True)
     try:

@@ -34,7 +34,7 @@ def parse(
         Path | None, typer.Option(help="Draw the dependency arcs of the one sentence into this file.")
     ] = None,
 ) -> None:
-    """Show the commands that a sentence means."""
+    """Shows the commands that a sentence means."""
     if (sentence is None) == (file is None):
         raise InputError("errand parse takes one sentence or --file", hint='try: errand parse "go to the kitchen"')
     if svg is not None and sentence is None:

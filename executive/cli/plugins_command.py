@@ -44,7 +44,7 @@ def plugins(
     limit: Annotated[float, quantity_option(Duration, "--limit", help="How long each may take to load.")] = LIMIT_S,
     load: Annotated[str | None, typer.Option(hidden=True)] = None,
 ) -> None:
-    """List what other distributions add, each loaded in a process of its own, and why some cannot be used."""
+    """Lists what other distributions add, each loaded in a process of its own, and why some cannot be used."""
     if load is not None:
         _load(load, limit)
         return
@@ -95,7 +95,7 @@ def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
 
 
 def _load(key: str, limit_s: float) -> None:
-    """Load one plug-in in this process. Raises InputError: it cannot be used."""
+    """Loads one plug-in in this process. Raises InputError: it cannot be used."""
     entry = {_key(each): each for each in _of_others()}.get(key)
     if entry is None:
         raise InputError(f"there is no plug-in {key}")

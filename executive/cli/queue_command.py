@@ -96,7 +96,7 @@ def add(
 
 @queue.command(name="list")
 def show(out: Out = Path("out"), store: STORE = None, as_json: AS_JSON = False) -> None:
-    """Show all missions of the store and how far each is."""
+    """Shows all missions of the store and how far each is."""
     with MissionStore(store or out / STORE_NAME, create=False) as missions:
         known = missions.missions()
         standing = {each.id: each for each in StandingMissions(missions).missions()}
@@ -107,7 +107,7 @@ def show(out: Out = Path("out"), store: STORE = None, as_json: AS_JSON = False) 
 
 @queue.command()
 def remove(number: Number, out: Out = Path("out"), store: STORE = None) -> None:
-    """Forget a mission; one that stands can be removed while a server runs."""
+    """Forgets a mission; one that stands can be removed while a server runs."""
     with MissionStore(store or out / STORE_NAME, create=False) as missions:
         stands = missions.mission(number).state is MissionState.STANDING
         with nullcontext() if stands else missions.claimed():
@@ -123,7 +123,7 @@ def run(
     quiet: QUIET = False,
     as_json: AS_JSON = False,
 ) -> None:
-    """Run all that is queued, each mission in the world as the one before has left it."""
+    """Runs all that is queued, each mission in the world as the one before has left it."""
     from executive.app.runs import MissionRuns, queued_missions, resumable_line, run_in_turn
     from executive.cli.screen import ConsoleScreen
 
@@ -206,7 +206,7 @@ def serve(
     quiet: QUIET = False,
     as_json: AS_JSON = False,
 ) -> None:
-    """Wait for triggers and run what is queued, until Ctrl-C: at times, on a full battery, calls and messages."""
+    """Waits for triggers and runs what is queued, until Ctrl-C: at times, on a full battery, calls and messages."""
     from executive.app.queue_server import CallAddress, Listeners, QueueServer
     from executive.app.runs import MissionRuns, resumable_line
     from executive.cli.screen import ConsoleScreen
@@ -238,7 +238,7 @@ def resume(
     as_json: AS_JSON = False,
     quiet: QUIET = False,
 ) -> None:
-    """Go on with the mission that was broken off or cancelled, from its last finished step; then with its queue."""
+    """Goes on with the mission that was broken off or cancelled, from its last finished step; then with its queue."""
     console = console_for(as_json)
     with MissionStore(store, create=False) as missions, missions.claimed():
         from executive.app.runs import MissionRuns, queued_missions, run_in_turn

@@ -57,7 +57,7 @@ def teleop(
         float | None, quantity_option(Delay, "--for", help="End after so many seconds on the robot's clock.")
     ] = None,
 ) -> None:
-    """Drive a robot's body and arm by hand. It stops when keys stop coming, and keeps the skills' limits."""
+    """Drives a robot's body and arm by hand. It stops when keys stop coming, and keeps the skills' limits."""
     with ExitStack() as stack:
         if not _NAME.fullmatch(robot):
             raise InputError(f"'{robot[:60]}' is no name for a robot", hint="use letters and digits, as in Alice")
@@ -75,7 +75,7 @@ def teleop(
         hands = Teleop(context)
 
         def saving(name: str | None) -> str:
-            """Save the pose under a name, or a free one; says so."""
+            """Saves the pose under a name, or a free one; says so."""
             return f"saved as {save_pose(poses, name, hands.pose(), world=opened.name)}"
 
         feed, scene = Feed(), simulation.show_live()
@@ -113,7 +113,7 @@ def context_for(world: World, robot: Robot, clock: Clock, start: Pose2D) -> Skil
 
 
 def drive(hands: Teleop, context: SkillContext, limit_s: float | None, told: Callable[[], None]) -> None:
-    """Do what is asked until the limit (s, on the robot's clock), never faster than the wall's clock."""
+    """Does what is asked until the limit (s, on the robot's clock), never faster than the wall's clock."""
     begun_s = context.clock.now()
     due_s = time.monotonic()
     while limit_s is None or context.clock.now() - begun_s < limit_s:
@@ -124,7 +124,7 @@ def drive(hands: Teleop, context: SkillContext, limit_s: float | None, told: Cal
 
 
 def period(hands: Teleop, context: SkillContext) -> None:
-    """Estimate where the robot is, send the commands of one period, and let it pass."""
+    """Estimates where the robot is, sends the commands of one period, and lets it pass."""
     context.localiser.update(context.robot)
     context.costmap.update(context.robot, context.localiser.estimate())
     hands.tick()
@@ -138,7 +138,7 @@ class TerminalKeys:
         self._hands, self._save, self._say = hands, save, say
 
     def press(self, key: str) -> None:
-        """Ask for what the key means; save with its key; any other stops the robot."""
+        """Asks for what the key means; save with its key; any other stops the robot."""
         self._hands.ask(asked_by([key]))
         if key == SAVE_KEY:
             try:
@@ -179,7 +179,7 @@ def _told(hands: Teleop) -> dict[str, Any]:
 
 
 def warm_up() -> None:
-    """Compile the numeric code for this machine, so that the first run begins at once."""
+    """Compiles the numeric code for this machine, so that the first run begins at once."""
     begun_s = time.monotonic()
     compile_kernels()
     typer.echo(f"{count_text(newly_compiled(), 'function')} compiled in {time.monotonic() - begun_s:.0f} s")

@@ -36,7 +36,7 @@ def run(
     view_for: VIEW_FOR = None,
     view_port: VIEW_PORT = 0,
 ) -> None:
-    """Run a sentence or a mission file in the simulated world."""
+    """Runs a sentence or a mission file in the simulated world."""
     refuse_unaddressed(request)
     from executive.app.feasibility import refuse_impossible
     from executive.app.page_view import PageView, queueing
@@ -81,7 +81,7 @@ def run(
 
 
 def refuse_unaddressed(request: Request) -> None:
-    """Raise InputError where a sentence lacks the robot's name, although the request or the world asks for it.
+    """Raises InputError where a sentence lacks the robot's name, although the request or the world asks for it.
 
     Nothing heavy is imported for it. Whether a name that is there calls the robot is decided later, and so is all that
     cannot be read here, and who of several robots is called.

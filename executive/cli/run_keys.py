@@ -60,7 +60,7 @@ class Keys:
         )
 
     def press(self, key: str) -> None:
-        """Do what the key stands for; others do nothing."""
+        """Does what the key stands for; others do nothing."""
         if self.typing.saying:
             self._write_sentence(key)
             return
@@ -87,7 +87,7 @@ class Keys:
             self._edit(key)
 
     def _edit(self, key: str) -> None:
-        """Write or erase a letter."""
+        """Writes or erases a letter."""
         text = self.typing.text
         if key in _ERASE:
             self.typing = replace(self.typing, text=text[:-1])
@@ -134,7 +134,7 @@ def prompt_lines(state: ControlState, now_s: float, typing: Typing = Typing()) -
 
 @contextmanager
 def keys_pressed(press: Callable[[str], object], descriptor: int | None = None) -> Iterator[bool]:
-    """Read keys while the block runs, in a thread that sleeps until one comes; False where there is no terminal.
+    """Reads keys while the block runs, in a thread that sleeps until one comes; False where there is no terminal.
 
     `press` is called with each key in that thread. The terminal is put back as it was. `descriptor` is standard input
     unless given.

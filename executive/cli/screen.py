@@ -58,7 +58,7 @@ class HeardSpeech(RunVisitor):
     quiet: bool
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Let speech be heard."""
+        """Lets speech be heard."""
         if topic == SPEECH:
             robot, text = (str(message.get(name, "")) for name in ("robot", "text"))
             if not self.quiet:
@@ -84,12 +84,12 @@ class ConsoleScreen:
     shown_page: PageView | None = field(default=None, init=False)
 
     def tell(self, line: str, *, title: bool = False) -> None:
-        """Show a line."""
+        """Shows a line."""
         self.console.print(line, markup=False, style="bold" if title else None)
 
     @contextmanager
     def watching(self, prepared: Prepared) -> Iterator[Watching]:
-        """Show what is run, the tree while it runs and what the robot says; the console controls it, or the page."""
+        """Shows what is run, the tree while it runs and what the robot says; the console controls it, or the page."""
         for told in dict.fromkeys(note for each in prepared.all for note in each.mission.notes):
             self.tell(f"{told}.")
         for line in (*prepared.request.scenario.lines(), *prepared.request.variation.lines()):
@@ -116,14 +116,14 @@ class ConsoleScreen:
             yield Watching(control, visitors, page, self.profile)
 
     def conclude(self, finished: Finished) -> None:
-        """Show the verdicts and the figures, after the whole tree where that is wanted."""
+        """Shows the verdicts and the figures, after the whole tree where that is wanted."""
         if self.whole_tree:
             self.console.print(to_rich(finished.tree, collapsed=False))
         for line in finished.report.lines():
             self.console.print(line)
 
     def name_files(self, out: Path) -> None:
-        """Name what was left in a folder, but for what the store keeps there."""
+        """Names what was left in a folder, but for what the store keeps there."""
         names = sorted(path.name for path in out.iterdir() if not path.name.startswith(Path(STORE).stem))
         self.tell(f"Written to {out}: {', '.join(names)}")
 
@@ -140,7 +140,7 @@ PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
 def live_view(
     console: Console, control: Control | None = None, *, say: Callable[[str], str] | None = None
 ) -> Iterator[RunVisitor]:
-    """Show the tree while the mission runs, and write a line for each skill that ends.
+    """Shows the tree while the mission runs, and writes a line for each skill that ends.
 
     Where somebody sits at a terminal, keys control the run, and `say` answers the sentences that are typed.
     """
@@ -165,7 +165,7 @@ class _Lines(RunVisitor):
         self._begun_s: dict[str, float] = {}
 
     def tick(self, progress: Progress) -> None:
-        """Write what ended since the last tick."""
+        """Writes what ended since the last tick."""
         for robot, tree in progress.trees.items():
             if tree.root.path_id not in self._leaves:
                 self._leaves[tree.root.path_id] = _skill_titles(node_view(tree.root))

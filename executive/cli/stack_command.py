@@ -23,6 +23,6 @@ def _group() -> None:
 @stack.command()
 @takes_request("stack")
 def show(request: Request) -> None:
-    """Print a stack with all its options as YAML, which --stack takes again."""
+    """Prints a stack with all its options as YAML, which --stack takes again."""
     chosen = load_stack(request.stack)
     typer.echo(yaml_of(plain(chosen), flow_style=False), nl=False)

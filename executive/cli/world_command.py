@@ -52,7 +52,7 @@ def from_map(
     start: START = None,
     wall_height: Annotated[float, quantity_option(WallHeight, help="Height of the walls, m.")] = 2.5,
 ) -> None:
-    """Make a world of a map: walls, both grids, rooms and doors to be named."""
+    """Makes a world of a map: walls, both grids, rooms and doors to be named."""
     from plant.worlds.builder.own import world_from_grid
     from plant.worlds.builder.rooms import FREE, OCCUPIED, UNKNOWN, Grid
 
@@ -71,7 +71,7 @@ def from_cylinders(
     out: Out,
     start: START = None,
 ) -> None:
-    """Make a world of upright cylinders: a JSON object with `cylinders` [[x, y, radius, height], ...] and `start`."""
+    """Makes a world of upright cylinders: a JSON object with `cylinders` [[x, y, radius, height], ...] and `start`."""
     from plant.worlds.builder.own import world_from_cylinders
 
     read = _cylinders(file)
@@ -86,7 +86,7 @@ def show(
     folder: Annotated[str, typer.Argument(metavar="WORLD", help="A world by name or folder.")],
     out: Annotated[Path, typer.Option("--out", help="The picture, PNG.")] = Path("world.png"),
 ) -> None:
-    """Draw a world's plan: rooms, doors, walls, surfaces and the start."""
+    """Draws a world's plan: rooms, doors, walls, surfaces and the start."""
     from plant.scene_pictures import save_png
     from plant.worlds.drawing import draw_world
 
@@ -130,7 +130,7 @@ def _cylinders(path: Path) -> _Cylinders:
 
 
 def _made(source: Path, out: Path, make: Callable[[Path], None]) -> None:
-    """Make a world, and say what was made; it is read once more, so that what is said is so. Raises InputError."""
+    """Makes a world, and says what was made; it is read once more, so that what is said is so. Raises InputError."""
     try:
         with new_folder(out) as draft:
             make(draft)

@@ -105,7 +105,7 @@ class Conversation(RunVisitor):
             self._last = _Spoken(tree.commands, memory, now_s, tree.mission_name, steps)
 
     def tick(self, progress: Progress) -> None:
-        """See how far the run is."""
+        """Sees how far the run is."""
         self._progress = self._remarks.progress = progress
         tree = progress.trees.get(self._speech.robot_name)
         if tree is not None:
@@ -328,7 +328,7 @@ class Conversation(RunVisitor):
         return Reply(ReplyKind.DONE, text, commands)
 
     def _can_be_changed(self, now_s: float) -> bool:
-        """Whether the last request is still running, waiting, or about to begin."""
+        """Returns whether the last request is still running, waiting, or about to begin."""
         last, missions = self._remembered(now_s), self._control.state.missions.get(self._speech.robot_name, ())
         return last is not None and (last.mission in missions or last.mission not in self._seen)
 

@@ -104,7 +104,7 @@ def _says_to_whom(clause: Predicate) -> bool:
 
 
 def _goes_nowhere(action: Action) -> bool:
-    """Whether it is the "go" of "go and find", which says nothing of its own."""
+    """Returns whether it is the "go" of "go and find", which says nothing of its own."""
     return action.kind is VerbKind.GO and action.goal is None and action.unknown == (action.verb,)
 
 

@@ -112,7 +112,7 @@ class Addressees:
         return None if match is None else (self.meant(match["who"]), text[match.end() :])
 
     def narrates(self, text: str) -> bool:
-        """Whether all that a text says of robots is how they are: "Bob can't reach the shelf"."""
+        """Returns whether all that a text says of robots is how they are: "Bob can't reach the shelf"."""
         return re.search(rf"\b{self.forms.one.pattern}", self.forms.narrated.sub("", text), re.IGNORECASE) is None
 
     def parts(self, text: str) -> tuple[Who | None, tuple[Saying, ...]]:
@@ -216,7 +216,7 @@ class _Parting:
         return None if verb is None else _Found(match["who"], match.end(), "gap", f"{verb[1]} ")
 
     def _take(self, found: _Found, before: str) -> None:
-        """End the part that `before` belongs to, and begin the one that was found."""
+        """Ends the part that `before` belongs to, and begins the one that was found."""
         joint_at = self.calls.forms.joint.search(before)
         at = len(before) if joint_at is None else joint_at.start()
         said, joint = before[:at], before[at:]
@@ -250,7 +250,7 @@ class _Parting:
         self.address = who if found.kind == "call" else self.address
 
     def _add(self, more: str) -> None:
-        """Add to the text of the last part."""
+        """Adds to the text of the last part."""
         last = self.found[-1]
         self.found[-1] = replace(last, text=self.calls.tidy(f"{last.text}{more}"))
 

@@ -53,27 +53,27 @@ class Clause:
 
     @property
     def begins(self) -> bool:
-        """Whether a sentence begins with it."""
+        """Returns whether a sentence begins with it."""
         return re.search(r"[.!?;]", self.joint) is not None
 
     @property
     def outer(self) -> bool:
-        """Whether it is done after all of the clauses before."""
+        """Returns whether it is done after all of the clauses before."""
         return CLAUSES.outer.search(self.joint) is not None
 
     @property
     def anyway(self) -> bool:
-        """Whether it is done at the end whatever happens."""
+        """Returns whether it is done at the end whatever happens."""
         return CLAUSES.whatever.search(self.joint) is not None
 
     @property
     def ends_anyway(self) -> bool:
-        """Whether it says at its end that it is done whatever happens."""
+        """Returns whether it says at its end that it is done whatever happens."""
         return self.kind is None and CLAUSES.ends_anyway.search(self.text) is not None
 
     @property
     def then(self) -> bool:
-        """Whether "then" stands before it."""
+        """Returns whether "then" stands before it."""
         return re.search(r"\bthen\b", self.joint, re.IGNORECASE) is not None
 
 

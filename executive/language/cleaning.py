@@ -102,7 +102,7 @@ def heard_wake(transcript: str, name: str, *, others: Collection[str] = ()) -> A
 
 
 def strip_wake(text: str, name: str, others: Collection[str] = ()) -> Address:
-    """Take the wake phrase for the robot called `name` out of `text`, where it stands; `others` are other robots.
+    """Takes the wake phrase for the robot called `name` out of `text`, where it stands; `others` are other robots.
 
     A bare name at the beginning without a comma is taken out, too, but calls nobody. Where somebody else is called,
     theirs is the name.

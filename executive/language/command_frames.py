@@ -83,7 +83,7 @@ def _puts_down(action: Action, before: Action) -> bool:
 
 
 def _one_in_hand(frames: Sequence[CommandFrame]) -> Iterator[CommandFrame]:
-    """Bring what is in the hand before something else is taken, and then that, too: "grab a coke and a water"."""
+    """Brings what is in the hand before something else is taken, and then that, too: "grab a coke and a water"."""
     held: CommandFrame | None = None
     several = False
     for frame in frames:
@@ -97,7 +97,7 @@ def _one_in_hand(frames: Sequence[CommandFrame]) -> Iterator[CommandFrame]:
 
 
 def _set_down(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Put a thing where it was carried: "take it to the desk and set it down"."""
+    """Puts a thing where it was carried: "take it to the desk and set it down"."""
     found: list[Action] = []
     for action in actions:
         if found and action.goal is None and _puts_down(action, found[-1]):
@@ -108,7 +108,7 @@ def _set_down(actions: Sequence[Action]) -> tuple[Action, ...]:
 
 
 def _join_going(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Give the place of a bare "go" to the next action, where that lacks one; "then fetch" is an errand of its own."""
+    """Gives the place of a bare "go" to the next action, where that lacks one; "then fetch" is an errand of its own."""
     joined: list[Action] = []
     for action in actions:
         before = joined[-1] if joined and joined[-1].kind is VerbKind.GO else None
@@ -132,13 +132,13 @@ def _join_going(actions: Sequence[Action]) -> tuple[Action, ...]:
 
 
 def _without_wishes(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Leave out a wish when the next words say how it is to be met: "I would like a tea, can you get me one"."""
+    """Leaves out a wish when the next words say how it is to be met: "I would like a tea, can you get me one"."""
     followed = zip_longest(actions, actions[1:])
     return tuple(action for action, after in followed if after is None or not _meets(after, action))
 
 
 def _meets(action: Action, wish: Action) -> bool:
-    """Whether an action goes once more for what a wish asks to be brought."""
+    """Returns whether an action goes once more for what a wish asks to be brought."""
     same = action.target is not None and wish.target is not None and action.target.tokens == wish.target.tokens
     somebody = wish.goal is not None and (wish.goal is HERE or wish.goal.living)
     wished = wish.kind is VerbKind.ROUND_TRIP and somebody and wish.source is None and not wish.again
@@ -147,7 +147,7 @@ def _meets(action: Action, wish: Action) -> bool:
 
 
 def _one_by_one(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Carry each thing before the next is taken: "take the milk and the cup and put them on the table"."""
+    """Carries each thing before the next is taken: "take the milk and the cup and put them on the table"."""
     ordered: list[Action] = []
     for action in actions:
         last = next((n for n in range(len(ordered) - 1, -1, -1) if ordered[n].target == action.target), None)

@@ -55,7 +55,7 @@ def unwanted_things(items: Sequence[Item]) -> tuple[Phrase, ...]:
 
 
 def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[Item], list[Item]]:
-    """Leave out the clause or the chunks behind "not", where that only tells them apart from what is asked for.
+    """Leaves out the clause or the chunks behind "not", where that only tells them apart from what is asked for.
 
     Raises RefusalError: it forbids something by itself ("but don't go to the kitchen").
     """
@@ -101,7 +101,7 @@ def _clause_end(ahead: Sequence[Item]) -> int:
 
 
 def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> bool:
-    """Whether what follows is to be done in place of what was negated: going for going, handling for handling.
+    """Returns whether what follows is to be done in place of what was negated: going for going, handling for handling.
 
     Where nothing was asked for before, what is not to be handled is simply left alone.
     """
@@ -112,7 +112,7 @@ def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> 
 
 
 def _meant_instead(negated: Chunk, mark: Negation, done: Sequence[Item], rest: Sequence[Item]) -> bool:
-    """Whether something else is said in the place of what was negated: "the milk, not the juice"."""
+    """Returns whether something else is said in the place of what was negated: "the milk, not the juice"."""
     if negated.role is not None and mark.word.startswith("but"):
         return False
     before = next((n for n in range(len(done) - 1, -1, -1) if isinstance(done[n], Verb)), 0)
@@ -133,7 +133,7 @@ def _one_of_them(rest: list[Item], negated: Phrase) -> list[Item]:
 
 
 def _corrected(done: list[Item], rest: list[Item], mark: Correction) -> tuple[list[Item], list[Item]]:
-    """Put what follows in the place of what it corrects."""
+    """Puts what follows in the place of what it corrects."""
     ahead = _without_separators(rest)
     verb = next((n for n in range(len(done) - 1, -1, -1) if isinstance(done[n], Verb)), None)
     if all(isinstance(item, Separator) for item in done):

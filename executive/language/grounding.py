@@ -50,7 +50,7 @@ def ground(
 
 
 def check_unwanted(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge) -> None:
-    """Refuse to leave out one kind among several that a command takes: "a drink, but not a beer".
+    """Refuses to leave out one kind among several that a command takes: "a drink, but not a beer".
 
     Raises RefusalError.
     """

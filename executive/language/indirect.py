@@ -20,7 +20,7 @@ OBJECTS: Final = Phrase((Token(0, 0, "objects", "object", "NOUN", "NNS", 0, "obj
 
 
 def _asks(items: Sequence[Item]) -> bool:
-    """Whether it was asked to look for what comes next."""
+    """Returns whether it was asked to look for what comes next."""
     last = items[-1] if items else None
     return isinstance(last, Verb) and bool(last.kinds & {VerbKind.FIND, VerbKind.CHECK})
 
@@ -48,7 +48,7 @@ def where_is(row: Row, items: list[Item]) -> Item | None:
 
 
 def _is_be(row: Row, at: int) -> bool:
-    """Whether a form of "to be" stands there."""
+    """Returns whether a form of "to be" stands there."""
     return at < len(row.tokens) and (row.tokens[at].lemma == "be" or row.tokens[at].word == "'s")
 
 

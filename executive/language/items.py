@@ -167,7 +167,7 @@ class Row:
 
 
 def command_position(items: Sequence[Item]) -> bool:
-    """Whether a command may begin behind these items."""
+    """Returns whether a command may begin behind these items."""
     return not items or isinstance(items[-1], Separator)
 
 
@@ -191,7 +191,7 @@ class Predicate:
 
 
 def predicates(items: Iterable[Item]) -> tuple[Predicate, ...]:
-    """Cut the row of items at its verbs."""
+    """Cuts the row of items at its verbs."""
     found: list[Predicate] = [Predicate(None)]
     for item in items:
         if isinstance(item, Being):
@@ -205,7 +205,7 @@ def predicates(items: Iterable[Item]) -> tuple[Predicate, ...]:
 
 
 def _ungapped(clause: Predicate) -> Iterator[Predicate]:
-    """Say the verb again where it was left out: "a beer to Robin and a coke to Charlie"."""
+    """Says the verb again where it was left out: "a beer to Robin and a coke to Charlie"."""
     items, between = clause.items, range(1, len(clause.items) - 1)
     cut = next((n for n in between if _gives_another(items, n)), None)
     recipient: tuple[Item, ...] = ()
@@ -230,7 +230,7 @@ def _gives_another(items: Sequence[Item], at: int) -> bool:
 
 
 def _gap(items: Sequence[Item], at: int) -> bool:
-    """Whether a separator stands between two things that each have a place of the same role."""
+    """Returns whether a separator stands between two things that each have a place of the same role."""
     joint, thing, place = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
     if not (isinstance(joint, Separator) and isinstance(thing, Chunk) and isinstance(place, Chunk)):
         return False
@@ -240,7 +240,7 @@ def _gap(items: Sequence[Item], at: int) -> bool:
 
 
 def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
-    """Begin a clause of "to be", which takes its subject, and the "if" before it, from the clause before."""
+    """Begins a clause of "to be", which takes its subject, and the "if" before it, from the clause before."""
     rest, subject = last.items, last.items[-1] if last.items and not being.existential else None
     if not isinstance(subject, Chunk) or subject.role is not None:
         subject = None
@@ -252,7 +252,7 @@ def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
 
 
 def without_name(clauses: Sequence[Predicate]) -> tuple[Predicate, ...]:
-    """Leave out a bare name before the first verb: it calls somebody ("Michael go to the kitchen")."""
+    """Leaves out a bare name before the first verb: it calls somebody ("Michael go to the kitchen")."""
     first, *rest = clauses or [Predicate(None)]
     name = first.content[0] if len(first.content) == 1 else None
     if first.verb is not None or not rest or not isinstance(name, Chunk) or name.role is not None:
@@ -268,7 +268,7 @@ def requested_predicates(predicates: Sequence[Predicate]) -> list[Predicate]:
 
 
 def _with_verb(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
-    """Say "take" where there is no verb at all: "hammer to the kitchen, please"."""
+    """Says "take" where there is no verb at all: "hammer to the kitchen, please"."""
     items = [item for clause in clauses for item in clause.content]
     chunks = [item for item in items if isinstance(item, Chunk)]
     carried = [chunk.role for chunk in chunks] == [None, PrepositionRole.GOAL] and len(chunks) == len(items)
@@ -278,7 +278,7 @@ def _with_verb(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
 
 
 def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
-    """Put a place that stands before the first verb behind it: "from the kitchen bring me a spoon"."""
+    """Puts a place that stands before the first verb behind it: "from the kitchen bring me a spoon"."""
     if len(clauses) < 2 or clauses[0].verb is not None or not isinstance(clauses[1].verb, Verb | Being):
         return clauses
     fronted = clauses[0].content
@@ -297,7 +297,7 @@ def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
 
 
 def _without_reasons(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
-    """Leave out what the speakers say that they are about to do themselves, before or after what is to be done."""
+    """Leaves out what the speakers say that they are about to do themselves, before or after what is to be done."""
 
     def own_affair(verb: Verb | Being | Outside | None, before: Sequence[Item]) -> bool:
         """Whether it is nothing that a robot does, and nothing that it is asked for, either: "I am about to sing"."""
@@ -319,7 +319,7 @@ def _without_reasons(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
 
 
 def _without_checks(clauses: Sequence[Predicate]) -> Iterator[Predicate]:
-    """Leave out "see" and "check" before "if there is": the question stands alone."""
+    """Leaves out "see" and "check" before "if there is": the question stands alone."""
     asks = False
     for clause, after in zip_longest(clauses, clauses[1:]):
         checks = isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds

@@ -21,7 +21,7 @@ _BY_HAND: Final = frozenset({"bring", "carry", "take", "deliver", "take over", "
 
 
 def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> None:
-    """Refuse odd numbers, to carry people, to serve all of a kind, what no hand can hold, and places out of reach.
+    """Refuses odd numbers, to carry people, to serve all of a kind, what no hand can hold, and places out of reach.
 
     Raises:
         RefusalError: any action is out of reach; it names all that is.
@@ -59,14 +59,14 @@ def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None
 
 
 def _asks_for_people(action: Action) -> bool:
-    """Whether it asks where somebody is, or whether there is any person at all ("is anybody in the hall")."""
+    """Returns whether it asks where somebody is, or whether there is any person at all ("is anybody in the hall")."""
     phrase = action.target if action.kind is VerbKind.FIND else None
     anyone = phrase is not None and phrase.head.word in lexicon().anyone
     return phrase is not None and (anyone or phrase.person or phrase.stands_for_somebody)
 
 
 def _moved(action: Action, target: Phrase) -> bool:
-    """Whether a definite thing is taken from or put into a place in the house, so that it is no idea.
+    """Returns whether a definite thing is taken from or put into a place in the house, so that it is no idea.
 
     So is "the mail from the desk", and what is written ("take the report to the boss").
     """
@@ -106,7 +106,7 @@ def _outside(action: Action, moved: bool) -> Iterator[str]:
 
 
 def _holdable(phrase: Phrase, action: Action) -> bool:
-    """Whether it is something to be found, and taken where the action takes it."""
+    """Returns whether it is something to be found, and taken where the action takes it."""
     find = action.kind is VerbKind.FIND
     if find and action.source is None:
         trade = phrase.kind is NounKind.PERSON and phrase.indefinite and not phrase.named_person  # a good dentist
@@ -127,7 +127,7 @@ def _holdable(phrase: Phrase, action: Action) -> bool:
 
 
 def _idle(phrase: Phrase, place: Location, verb: str) -> bool:
-    """Whether going there is something else than a way: "go to bed", "reach my wife"."""
+    """Returns whether going there is something else than a way: "go to bed", "reach my wife"."""
     out = place.preposition.startswith("out")
     if phrase.person and (out or not phrase.named_person) and place.within is None and verb in lexicon().calls:
         return True
@@ -146,7 +146,7 @@ def _reachable(phrase: Phrase, place: Location) -> bool:
 
 
 def refuse_harm(clauses: Sequence[Predicate]) -> None:
-    """Refuse what does harm. Raises RefusalError, which names the clauses that do."""
+    """Refuses what does harm. Raises RefusalError, which names the clauses that do."""
     harmful = [spoken_words((clause.verb, *clause.items)) for clause in clauses if clause.verb and _does_harm(clause)]
     if harmful:
         raise RefusalError(f"{', '.join(map(repr, harmful))} could hurt somebody or break something", harmful)
@@ -169,7 +169,7 @@ def _does_harm(clause: Predicate) -> bool:
 
 
 def _somebody(phrase: Phrase) -> bool:
-    """Whether it is somebody, or a part of them."""
+    """Returns whether it is somebody, or a part of them."""
     bare = len(phrase.content) == 1
     living = phrase.person or phrase.speaker or phrase.stands_for_somebody or (bare and phrase.kind is NounKind.PERSON)
     owned = not bare or any(token.tag in ("PRP$", "POS") for token in phrase.tokens)
@@ -177,7 +177,7 @@ def _somebody(phrase: Phrase) -> bool:
 
 
 def check_ways_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Action]) -> None:
-    """Refuse a way that is to be taken, and relations to the speaker but "to me". Raises RefusalError."""
+    """Refuses a way that is to be taken, and relations to the speaker but "to me". Raises RefusalError."""
     for place in (place for action in actions for place in action.ways):
         if place.phrase is None or place.phrase.head.lemma not in read_table("relations.yaml")["doors"]:
             raise _refused("go", place.preposition, place.name)
@@ -189,7 +189,7 @@ def check_ways_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Actio
 
 
 def check_relation(act: str, kinds: Sequence[str], location: Location) -> None:
-    """Refuse a relation that a command which goes, brings or looks ("go", "bring", "look") does not keep.
+    """Refuses a relation that a command which goes, brings or looks ("go", "bring", "look") does not keep.
 
     `kinds` is what the place may turn out to be: "room", "surface" or "person". Raises RefusalError.
     """

@@ -38,7 +38,7 @@ class NounKind(enum.Enum):
 
     @property
     def within_reach(self) -> bool:
-        """Whether a robot in a house can have to do with it."""
+        """Returns whether a robot in a house can have to do with it."""
         return self not in (NounKind.ELSEWHERE, NounKind.ABSTRACT)
 
 

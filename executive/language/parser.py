@@ -62,7 +62,7 @@ class DependencyParser:
         return NounKinds.load(self.vector)
 
     def release(self) -> None:
-        """Give the model's memory back; it is loaded anew when it is next needed."""
+        """Gives the model's memory back; it is loaded anew when it is next needed."""
         for loaded in ("_model", "_nouns"):
             self.__dict__.pop(loaded, None)
         self._parsed.clear()
@@ -101,7 +101,7 @@ class DependencyParser:
         return vector / norm if norm else None
 
     def is_word(self, word: str) -> bool:
-        """Whether `word` is frequent in English, in lower case or as a name; misspelled words are not."""
+        """Returns whether `word` is frequent in English, in lower case or as a name; misspelled words are not."""
         pipeline, rows = self._model
         return any(pipeline.vocab.strings[form] in rows.frequent for form in (word.lower(), word.title()))
 

@@ -63,7 +63,7 @@ class Phrase:
 
     @property
     def plural(self) -> bool:
-        """Whether the noun stands in the plural."""
+        """Returns whether the noun stands in the plural."""
         return self.head.tag in ("NNS", "NNPS")
 
     @property
@@ -91,33 +91,33 @@ class Phrase:
 
     @property
     def pronoun(self) -> bool:
-        """Whether it stands for something said before ("it", "one", "two of them")."""
+        """Returns whether it stands for something said before ("it", "one", "two of them")."""
         word = self.head.word in lexicon().pronouns and not self.stands_for_one
         return word and all(map(_is_determiner, self.tokens[:-1]))
 
     @property
     def stands_for_one(self) -> bool:
-        """Whether its noun is "one", told apart by what stands before it ("the red one")."""
+        """Returns whether its noun is "one", told apart by what stands before it ("the red one")."""
         return self.head.word in _ONE and len(self.tokens) > 1
 
     @property
     def stands_for_somebody(self) -> bool:
-        """Whether it is a pronoun that can mean a person."""
+        """Returns whether it is a pronoun that can mean a person."""
         return len(self.tokens) == 1 and self.head.word in lexicon().somebody
 
     @property
     def speaker(self) -> bool:
-        """Whether it is who speaks."""
+        """Returns whether it is who speaks."""
         return len(self.tokens) == 1 and self.head.word in lexicon().speaker
 
     @property
     def person(self) -> bool:
-        """Whether it is somebody: a noun for people, or a person's name."""
+        """Returns whether it is somebody: a noun for people, or a person's name."""
         return self.head.lemma in lexicon().people or self.head.word in lexicon().people or self.named_person
 
     @property
     def named_person(self) -> bool:
-        """Whether it is a person's name."""
+        """Returns whether it is a person's name."""
         if self._determined() or (self.plural and self.head.kind is not NounKind.PERSON):
             return False
         if self.head.known:
@@ -129,18 +129,18 @@ class Phrase:
 
     @property
     def proper(self) -> bool:
-        """Whether it is written as a name, of whatever kind."""
+        """Returns whether it is written as a name, of whatever kind."""
         return not self._determined() and all(token.pos == "PROPN" for token in self.tokens)
 
     @property
     def universal(self) -> bool:
-        """Whether it means all of a kind ("everyone", "all the men"); "all the forks" are only the forks."""
+        """Returns whether it means all of a kind ("everyone", "all the men"); "all the forks" are only the forks."""
         words = {t.word for t in self.tokens} & lexicon().everyone
         return bool(words - {_ALL}) or (bool(words) and (self.person or not self.plural))
 
     @property
     def addressed(self) -> bool:
-        """Whether it is who is spoken to, or a thing of theirs ("your phone"): a robot has none."""
+        """Returns whether it is who is spoken to, or a thing of theirs ("your phone"): a robot has none."""
         if len(self.tokens) == 1 and self.head.word in ("you", "yourself"):
             return True
         held = self.kind is NounKind.THING or self.head.lemma in lexicon().fixtures
@@ -148,12 +148,12 @@ class Phrase:
 
     @property
     def indefinite(self) -> bool:
-        """Whether it means any one of its kind: no article but "a", no possessive."""
+        """Returns whether it means any one of its kind: no article but "a", no possessive."""
         return not any(t.word in lexicon().definite or t.tag in ("PRP$", "POS") for t in self.tokens)
 
     @property
     def known(self) -> bool:
-        """Whether the world knows its name."""
+        """Returns whether the world knows its name."""
         return self.head.known
 
     @property
@@ -169,7 +169,7 @@ class Phrase:
 
     @property
     def counts(self) -> bool:
-        """Whether it is only a number ("two", "a couple")."""
+        """Returns whether it is only a number ("two", "a couple")."""
         return _number(self.head) is not None
 
     def with_extra(self, *words: str) -> Phrase:
@@ -214,7 +214,7 @@ class Phrase:
                 yield tuple(run)
 
     def _measures(self, at: int) -> bool:
-        """Whether the number there belongs to a unit of measure."""
+        """Returns whether the number there belongs to a unit of measure."""
         unit = at + 2 < len(self.tokens) and self.tokens[at + 1].word in lexicon().units
         return unit and _number(self.tokens[at]) is not None
 
@@ -283,7 +283,7 @@ def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:
 
 
 def _compound(before: Phrase, phrase: Phrase) -> bool:
-    """Whether nouns side by side without an article are one: "the kitchen" and "counter"."""
+    """Returns whether nouns side by side without an article are one: "the kitchen" and "counter"."""
     if before.head.lemma in lexicon().people and phrase.named_person and phrase.proper:
         return before.head.pos in ("NOUN", "PROPN") and not before.plural
     nouns = before.head.pos == "NOUN" and all(t.pos == "NOUN" for t in phrase.tokens)
@@ -291,7 +291,7 @@ def _compound(before: Phrase, phrase: Phrase) -> bool:
 
 
 def _is_head(token: Token, tokens: Sequence[Token]) -> bool:
-    """Whether a phrase ends with this word."""
+    """Returns whether a phrase ends with this word."""
     if token.tag in ("EX", "WDT", "WP") or token.relation == "nummod":
         return False
     parent = tokens[token.head]
@@ -302,7 +302,7 @@ def _is_head(token: Token, tokens: Sequence[Token]) -> bool:
 
 
 def _belongs(token: Token, head: Token, tokens: Sequence[Token]) -> bool:
-    """Whether a word before `head` depends on it through words of its own phrase only."""
+    """Returns whether a word before `head` depends on it through words of its own phrase only."""
     for _ in range(_DEEPEST):
         if token.relation not in _LEFT or token.word == "," or token.word in _LOOSE:
             return False

@@ -67,7 +67,7 @@ def which_question(slot: Slot, heard: str, candidates: tuple[str, ...]) -> Clari
 
 
 def perhaps_question(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQuestion:
-    """Whether an unknown name stands for a known one."""
+    """Returns whether an unknown name stands for a known one."""
     quoted = listing((f"'{name}'" for name in candidates), last="or")
     text = f"I know no {slot.value} '{heard}'; did you mean {quoted}?"
     return ClarifyingQuestion(text, slot, candidates, candidates[0], heard)

@@ -81,7 +81,7 @@ class _Reader(Row):
         return verb(" ".join(found))
 
     def _takes_preposition(self, verb: tuple[str, ...]) -> bool:
-        """Whether the last word of a verb rather begins a longer preposition ("go | in front of")."""
+        """Returns whether the last word of a verb rather begins a longer preposition ("go | in front of")."""
         if verb[:-1] not in lexicon().verbs:
             return False
         start = self.at + len(verb) - 1
@@ -158,7 +158,7 @@ class _Reader(Row):
         return Phrase((replace(self.tokens[start], tag="DT", pos="DET"), *phrase.tokens))
 
     def _of(self, phrase: Phrase) -> Phrase:
-        """Join "of wine" to a bottle, and "of cups" to "two" or "a couple"."""
+        """Joins "of wine" to a bottle, and "of cups" to "two" or "a couple"."""
         while self.at < len(self.tokens) and self.tokens[self.at].word == "of":
             inner = self.phrase_at(self.at + 1)
             if inner is None:
@@ -170,7 +170,7 @@ class _Reader(Row):
         return phrase
 
     def _numbered(self, phrase: Phrase) -> Phrase:
-        """Join the number of a place: "room four"."""
+        """Joins the number of a place: "room four"."""
         token, behind = self.tokens[self.at] if self.at < len(self.tokens) else None, self.ahead()
         counts = bool(behind) and behind[0].pos in ("NOUN", "ADJ", "PROPN")
         countable = phrase.kind in (NounKind.PLACE, NounKind.THING) and not (phrase.plural or phrase.pronoun)
@@ -260,13 +260,13 @@ class _Reader(Row):
         return not items and token.word in ("after", "upon", "by") and bool(behind) and behind[0].tag == "VBG"
 
     def _first_told(self, items: Sequence[Item]) -> bool:
-        """Whether "inside" is the house itself: no place was spoken of, and the thing was said by its name."""
+        """Returns whether "inside" is the house itself: no place was spoken of, and the thing was said by its name."""
         chunks = [item for item in items if isinstance(item, Chunk)]
         named = bool(chunks) and not chunks[-1].phrase.pronoun
         return named and all(chunk.role is None for chunk in chunks) and not any(isinstance(i, Being) for i in items)
 
     def _points(self, items: Sequence[Item]) -> bool:
-        """Whether "over there" only goes with a "that", as in "that clamp over there"."""
+        """Returns whether "over there" only goes with a "that", as in "that clamp over there"."""
         thing = next((item for item in reversed(items) if not isinstance(item, Separator)), None)
         behind = self.ahead()
         beyond = self.tokens[self.at - 1].word == "over" or (bool(behind) and behind[0].tag == "IN")
@@ -275,7 +275,7 @@ class _Reader(Row):
         return thing.phrase.tokens[0].word in _SHOWN and not thing.phrase.pronoun
 
     def _particle(self, items: list[Item]) -> tuple[str, ...] | None:
-        """Join a particle to its verb: "put the cup down"."""
+        """Joins a particle to its verb: "put the cup down"."""
         at = next((n for n in range(len(items) - 1, -1, -1) if isinstance(items[n], Verb)), None)
         last = None if at is None else items[at]
         particle, behind = self.tokens[self.at].word, self.ahead()

@@ -162,7 +162,7 @@ class _Reader:
         yield found[-1]
 
     def _check_in_hand(self, before: Understanding, meant: Understanding, who: Who | None) -> None:
-        """Refuse to take what another robot holds, or has given away."""
+        """Refuses to take what another robot holds, or has given away."""
         again = meant.trace is not None and any(one.again for one in meant.trace.resolved)
         again = again or re.search(_IT, meant.text, re.IGNORECASE) is not None
         carried = [command for command in before.commands if command.item is not None or command.object is not None]
@@ -177,7 +177,7 @@ class _Reader:
             raise RefusalError(what, [str(thing)])
 
     def _check_one_thing(self, part: Saying, meant: Understanding) -> None:
-        """Refuse to send several robots for the one thing."""
+        """Refuses to send several robots for the one thing."""
         several = part.who is Whom.ALL or (isinstance(part.who, tuple) and len(part.who) > 1)
         if not several or meant.trace is None or all(command.task is not Task.GRASP for command in meant.commands):
             return
@@ -220,7 +220,7 @@ class _Reader:
 
 
 def _share(one: Who | None, other: Who) -> bool:
-    """Whether robots are among others."""
+    """Returns whether robots are among others."""
     if isinstance(one, tuple) and isinstance(other, tuple):
         return bool(set(one) & set(other))
     return one is not None

@@ -26,12 +26,12 @@ class Location:
 
     @property
     def person(self) -> bool:
-        """Whether it is somebody."""
+        """Returns whether it is somebody."""
         return self.phrase is not None and self.phrase.person
 
     @property
     def living(self) -> bool:
-        """Whether it is somebody, of whatever trade, or an animal: "him" and "her" can mean them."""
+        """Returns whether it is somebody, of whatever trade, or an animal: "him" and "her" can mean them."""
         return self.phrase is not None and (self.phrase.person or self.phrase.kind is NounKind.PERSON)
 
     @property
@@ -46,7 +46,7 @@ class Location:
 
     @property
     def every_room(self) -> bool:
-        """Whether all rooms are meant."""
+        """Returns whether all rooms are meant."""
         return self.phrase is not None and self.phrase.universal and self.phrase.singular.split()[-1] == "room"
 
     @property
@@ -94,7 +94,7 @@ class Roles:
     favour: bool = False
 
     def add(self, one: _Placed) -> None:
-        """Sort in a phrase with the place around it, by its preposition."""
+        """Sorts in a phrase with the place around it, by its preposition."""
         phrase, role, location = one.chunk.phrase, one.chunk.role, one.location
         joined = bool(one.joint and self.goals)
         if role is None:
@@ -150,7 +150,7 @@ class _Placed:
 
 
 def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) -> Roles:
-    """Sort the items behind a verb.
+    """Sorts the items behind a verb.
 
     `describes` says that a first "near", "on top of" with more places behind it tells which object is meant, `puts`
     that "on" behind "from" says where to, as in "put the cup from the desk on the bed".
@@ -192,7 +192,7 @@ def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Placed]:
 
 
 def _described(spoken: list[_Placed]) -> list[_Placed]:
-    """Make "the object on top of the cup from the desk" an object of its own and a source."""
+    """Makes "the object on top of the cup from the desk" an object of its own and a source."""
     places = [n for n, one in enumerate(spoken) if one.chunk.role not in (None, PrepositionRole.FOR)]
     if len(places) < 2 or places[0] == 0:
         return spoken
@@ -208,7 +208,7 @@ def _described(spoken: list[_Placed]) -> list[_Placed]:
 
 
 def _nested(spoken: Sequence[_Placed], puts: bool) -> Iterator[_Placed]:
-    """Join to each place the one behind it that tells it more closely: no "and" between, and another preposition."""
+    """Joins to each place the one behind it that tells it more closely: no "and" between, and another preposition."""
     rest = list(spoken)
     while rest:
         first = rest.pop(0)
@@ -245,6 +245,6 @@ def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
 
 
 def _receives(first: Phrase, roles: Roles) -> bool:
-    """Whether the first of several bare phrases is given the others: somebody, or an animal."""
+    """Returns whether the first of several bare phrases is given the others: somebody, or an animal."""
     them = first.stands_for_somebody or first.head.word in _EVERYONE or first.kind is NounKind.PERSON
     return first.person or (them and not roles.listed)

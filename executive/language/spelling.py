@@ -73,7 +73,7 @@ class SoundAlikes:
         self.of = lru_cache(maxsize=4096)(self._of)
 
     def knows(self, word: str) -> bool:
-        """Whether the word is one of the phrases or stands in one."""
+        """Returns whether the word is one of the phrases or stands in one."""
         return word.lower() in self._words
 
     def all(self, words: str) -> tuple[Alike, ...]:
@@ -242,7 +242,7 @@ def look_alikes(word: str, known: Mapping[str, str], facts: DependencyParser) ->
 
 
 def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -> Corrected:
-    """Write known names in place of what is misspelled so that only one of them can be meant.
+    """Writes known names in place of what is misspelled so that only one of them can be meant.
 
     A word is misspelled when it is no English word; the name must be within one slip, or two for long names. Names
     that are written together or apart ("night stand", "nightstand") are the same.

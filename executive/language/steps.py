@@ -120,7 +120,7 @@ class Steps:
         return replace(trace, actions=read_actions(trace.clauses, told=told, recipient=trace.recipient))
 
     def _check(self, trace: Trace) -> Trace:
-        """Refuse the whole sentence when any part of it was not understood."""
+        """Refuses the whole sentence when any part of it was not understood."""
         unknown = [(word, action.said) for action in trace.actions for word in action.unknown]
         if unknown:
             raise not_understood(unknown, self.knowledge)

@@ -48,7 +48,7 @@ class Token:
 
     @property
     def adjective(self) -> bool:
-        """Whether it can be an attribute of a thing ("red", "heaviest")."""
+        """Returns whether it can be an attribute of a thing ("red", "heaviest")."""
         return is_attribute(self.text) or (self.pos in ("ADJ", "ADV") and may_be_attribute(self.text))
 
 
@@ -113,7 +113,7 @@ def _fact(tokens: Sequence[Token], at: int, name: str) -> str:
 
 
 def _begins_command(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a verb that the robot knows, with its particles, and an object stand here."""
+    """Returns whether a verb that the robot knows, with its particles, and an object stand here."""
     words = tuple(t.word for t in tokens[at : at + 3])
     length = next((n for n in range(len(words), 0, -1) if words[:n] in lexicon().verbs), None)
     behind = tokens[at + length : at + length + 1] if length is not None else []
@@ -152,7 +152,7 @@ def name_table(knowledge: Knowledge) -> NameTable:
 def parse_with_names(
     text: str, parse: Callable[[str], tuple[Token, ...]], table: NameTable | None
 ) -> tuple[Token, ...]:
-    """Parse `text` with each known name as one token, whose text and lemma are the name as spoken and in singular."""
+    """Parses `text` with each known name as one token, whose text and lemma are the name as spoken and in singular."""
     if table is None:
         return parse(text)
     pattern, stand_ins = table

@@ -28,7 +28,7 @@ _DAY_MIN: Final = 24 * 60
 
 
 def refuse_certain_comparisons(expression: Expression, ranges: Ranges) -> None:
-    """Refuse a comparison whose answer the range of what it reads decides.
+    """Refuses a comparison whose answer the range of what it reads decides.
 
     Raises:
         ExpressionError: names the comparison, the range and the likely mistake.
@@ -46,7 +46,7 @@ def refuse_certain_comparisons(expression: Expression, ranges: Ranges) -> None:
 
 
 def refuse_certain(condition: Condition, ranges: Ranges) -> None:
-    """Refuse a condition whose parts contradict each other, or leave it no way to fail.
+    """Refuses a condition whose parts contradict each other, or leave it no way to fail.
 
     Raises:
         ExpressionError: it cannot hold, or always holds.

@@ -48,7 +48,7 @@ def after_command(command: Command, held: InGripper | None, knowledge: Knowledge
 
 
 def is_same(held: InGripper | None, thing: Thing | None, knowledge: Knowledge) -> bool:
-    """Whether what is held, or whatever of several it is, is what `thing` asks for."""
+    """Returns whether what is held, or whatever of several it is, is what `thing` asks for."""
     if held is None:
         return False
     return all(_fits(one, thing, knowledge) for one in map(InGripper, held.perhaps or (held.thing,)))
@@ -81,7 +81,7 @@ def _carried(command: Command) -> Thing | None:
 
 
 def _fits(held: InGripper, thing: Thing | None, knowledge: Knowledge) -> bool:
-    """Whether what is held is surely what `thing` names; an object that is not known may be anything."""
+    """Returns whether what is held is surely what `thing` names; an object that is not known may be anything."""
     if held.thing is None or thing is None:
         return True
     of_held, asked = (set(knowledge.classes(knowledge.thing(one.name) or one.name)) for one in (held.thing, thing))

@@ -331,7 +331,7 @@ class _Resolver:
         return tuple(name for name, who in people if place is None or inside & {who.at, facts.room(who.at)})
 
     def _refuse_unknown(self, file: Mission, name: str, parameter: Parameter) -> None:
-        """Refuse a parameter that names no place, object or person of the world."""
+        """Refuses a parameter that names no place, object or person of the world."""
         known = {
             "place": (self.knowledge.place, self.knowledge.place_names()),
             "object": (self.knowledge.thing, self.knowledge.thing_names()),
@@ -371,7 +371,7 @@ def _group(step: Step, steps: Steps, name: str) -> Group:
 
 
 def _refuse_decided(error: _Error, expression: str | Expression, path: KeyPath) -> None:
-    """Refuse an expression that cannot be read, or compares what it reads with a value out of its range."""
+    """Refuses an expression that cannot be read, or compares what it reads with a value out of its range."""
     try:
         read = Expression(expression) if isinstance(expression, str) else expression
         refuse_certain_comparisons(read, RANGES)

@@ -38,7 +38,7 @@ def announce(
     scenario: Sequence[str] = (),
     robots: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """Publish the run's facts, then one message for each command.
+    """Publishes the run's facts, then one message for each command.
 
     `scenario` lists the faults and events of the run, `robots` the kind of each of several robots. Raises KeyError for
     a class without a number.

@@ -87,7 +87,7 @@ class EventLog(RunVisitor):
             self._log_ticks({"overruns": progress.overruns})
 
     def end(self, result: RunResult) -> None:
-        """Log the ticks that are left, and how long the whole run took."""
+        """Logs the ticks that are left, and how long the whole run took."""
         if self._failure is None:
             self._log_ticks({"overruns": result.overruns, "wall_time_s": result.wall_time_s})
 
@@ -96,11 +96,11 @@ class EventLog(RunVisitor):
         self(WALL, {"tick_s": ticks, "limit_s": self._tick_limit_s, **more})
 
     def listen(self, listener: Listener) -> None:
-        """Tell `listener` of every message from now on: topic, the robot's clock (s), and the plain values."""
+        """Tells `listener` of every message from now on: topic, the robot's clock (s), and the plain values."""
         self._listeners.append(listener)
 
     def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
-        """Log a message under a topic. Raises ValueError on a closed log, OSError: it cannot be written."""
+        """Logs a message under a topic. Raises ValueError on a closed log, OSError: it cannot be written."""
         if self._closed:
             raise ValueError("the event log is closed")
         if self._failure is not None:
@@ -129,7 +129,7 @@ class EventLog(RunVisitor):
             listener(topic, now_s, plain)
 
     def flush(self) -> None:
-        """Write everything to the file."""
+        """Writes everything to the file."""
         self._flushed_s = self._clock.now()
         self._writer.flush()
 

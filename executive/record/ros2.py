@@ -41,7 +41,7 @@ Data = Mapping[str, Any]
 
 
 def write_ros2(events: Iterable[Event], path: Path) -> int:
-    """Write the events as a ROS 2 bag; gives how many messages it holds.
+    """Writes the events as a ROS 2 bag; gives how many messages it holds.
 
     Raises InputError: the file cannot be written.
     """

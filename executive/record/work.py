@@ -21,7 +21,7 @@ class Work:
         self._lock = threading.Lock()
 
     def count(self, name: str, amount: int = 1) -> None:
-        """Add to the counter of this name."""
+        """Adds to the counter of this name."""
         with self._lock:
             self._counts[name] += amount
 

@@ -108,7 +108,7 @@ class Control:
         return self.state
 
     def pause(self, reason: str = "paused by the operator", *, robot: str | None = None) -> None:
-        """Hold all robots still, or one of them; the trees keep their state. Idempotent.
+        """Holds all robots still, or one of them; the trees keep their state. Idempotent.
 
         Raises ValueError: no such robot in the run.
         """
@@ -117,7 +117,7 @@ class Control:
         self._hold(robot, Mode.PAUSED, "pause", reason)
 
     def resume(self, *, robot: str | None = None) -> None:
-        """Continue after a pause, a breakpoint or steps, or after one robot's own pause; the stop button stays."""
+        """Continues after a pause, a breakpoint or steps, or after one robot's own pause; the stop button stays."""
         if robot is None:
             self._at = self._stride = None
         self._let_go(robot, Mode.PAUSED, "resume", "the mission goes on")
@@ -130,7 +130,7 @@ class Control:
             self.resume()
 
     def step(self, ticks: int | None = None) -> None:
-        """Go on until a node changes its status, or for some ticks, and pause again.
+        """Goes on until a node changes its status, or for some ticks, and pauses again.
 
         Skills in motion are suspended between steps, so that few ticks may not suffice for a motion to get anywhere.
         Raises ValueError: ticks below 1.
@@ -157,7 +157,7 @@ class Control:
             self._note("cancel", f"once more: {reason}")
 
     def press(self, button: str) -> None:
-        """Press a button that missions wait for or decide by. Raises ValueError: no mission of the run has it."""
+        """Presses a button that missions wait for or decides by. Raises ValueError: no mission of the run has it."""
         if self._begun and button not in self._buttons:
             known = f"there are: {', '.join(self._buttons)}" if self._buttons else "there are none"
             raise ValueError(f"the run has no button '{button}'; {known}")
@@ -170,14 +170,14 @@ class Control:
         return self._presses
 
     def stop_button(self, reason: str = "the stop button is pressed", *, robot: str | None = None) -> None:
-        """Stop all robots, or one, until `release_stop_button`, whatever else is asked for.
+        """Stops all robots, or one, until `release_stop_button`, whatever else is asked for.
 
         Raises ValueError: no such robot in the run.
         """
         self._hold(robot, Mode.STOPPED, "stop button", reason)
 
     def release_stop_button(self, *, robot: str | None = None) -> None:
-        """Continue as it was when the button was pressed, for all robots or for one."""
+        """Continues as it was when the button was pressed, for all robots or for one."""
         self._let_go(robot, Mode.STOPPED, "stop button released", "the stop button is released")
 
     def stop_pressed(self, robot: str) -> str | None:
@@ -191,13 +191,13 @@ class Control:
         self._note("breakpoint set", path_id)
 
     def clear_breakpoint(self, path_id: str) -> None:
-        """Remove a breakpoint; does nothing when there is none."""
+        """Removes a breakpoint; does nothing when there is none."""
         if path_id in self._requests.breakpoints:
             self._ask_for(breakpoints=self._requests.breakpoints - {path_id})
             self._note("breakpoint cleared", path_id)
 
     def preempt(self, tree: CompiledTree) -> None:
-        """Do another mission first; the one under way is suspended and taken up again afterwards.
+        """Does another mission first; the one under way is suspended and taken up again afterwards.
 
         Raises ValueError: no such robot in the run, or the mission is under way already.
         """
@@ -206,13 +206,13 @@ class Control:
         self._note("preempt", f"first '{tree.mission_name}'")
 
     def then(self, tree: CompiledTree) -> None:
-        """Do another mission when the one that the robot began with is done. Raises ValueError as `preempt`."""
+        """Does another mission when the one that the robot began with is done. Raises ValueError as `preempt`."""
         self._refuse_mission(tree)
         self._ask_for(later=(*self._requests.later, tree))
         self._note("then", f"afterwards '{tree.mission_name}'")
 
     def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
-        """Do another mission instead of the one under way, which is given up.
+        """Does another mission instead of the one under way, which is given up.
 
         With `instead_of` it takes the place of the mission of that name: one that waits is not begun, and one that is
         not under way just now is left alone, as by `preempt`. Raises ValueError: no such robot in the run.
@@ -222,7 +222,7 @@ class Control:
         self._note("replace", f"instead '{tree.mission_name}'")
 
     def answer(self, question_id: str, text: str) -> None:
-        """Answer an open question. Raises ValueError when it is not open or `text` is none of its options."""
+        """Answers an open question. Raises ValueError when it is not open or `text` is none of its options."""
         pending = self._questions.get(question_id)
         if pending is None:
             raise ValueError(f"the question '{question_id[:80]}' is not open (any more)")
@@ -295,7 +295,7 @@ class Control:
         self._note("lease lost" if why else "lease back", why or f"{robot_name} has its lease again")
 
     def ask(self, question: Question, clock: Clock, robot: str = "") -> Asked:
-        """Put a robot's question to the operator. Raises ValueError when one of that id is open already."""
+        """Puts a robot's question to the operator. Raises ValueError when one of that id is open already."""
         if question.id in self._questions:
             raise ValueError(f"the question '{question.id}' is open already")
         opened = OpenQuestion(question, clock.now() + question.limit_s, robot)
@@ -320,7 +320,7 @@ class Control:
             pending.open = replace(pending.open, until_s=pending.open.until_s + duration_s)
 
     def rest(self, duration_s: float) -> None:
-        """Let the wall's clock run on, less long when something is asked for meanwhile."""
+        """Lets the wall's clock run on, less long when something is asked for meanwhile."""
         seen = self._version
         self._changed.wait_for(lambda: self._version > seen, duration_s)
 
@@ -352,7 +352,7 @@ class Control:
         return RobotMode(Mode.READY if ready else Mode.RUNNING)
 
     def _hold(self, robot: str | None, mode: Mode, what: str, reason: str) -> None:
-        """Have a robot, or all, stand still. Raises ValueError: no such robot in the run."""
+        """Has a robot, or all, stands still. Raises ValueError: no such robot in the run."""
         if robot is not None:
             self._refuse_stranger(robot)
         if (robot, mode) not in self._holds:
@@ -413,5 +413,5 @@ class PendingAnswer:
         return self.answer
 
     def withdraw(self) -> None:
-        """Take the question back."""
+        """Takes the question back."""
         self._take_default(self, "taken back")

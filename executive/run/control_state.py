@@ -105,10 +105,10 @@ class ControlRequests:
 
     @property
     def of_robots(self) -> bool:
-        """Whether anything is asked of single robots, or they are to stand still."""
+        """Returns whether anything is asked of single robots, or they are to stand still."""
         asked = self.preempts or self.instead or self.later or self.cancels or self.holds
         return bool(asked) or self.hold is not None
 
     def held(self, robot_name: str) -> bool:
-        """Whether a robot stands still, alone or with all others."""
+        """Returns whether a robot stands still, alone or with all others."""
         return self.hold is not None or robot_name in self.holds

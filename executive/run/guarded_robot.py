@@ -92,7 +92,7 @@ class GuardedRobot:
         return True
 
     def give_lease_back(self) -> None:
-        """Return the lease; the robot stops."""
+        """Returns the lease; the robot stops."""
         self.return_lease(self._lease)
 
     def __getattr__(self, verb: str) -> Any:

@@ -50,7 +50,7 @@ def history_keys(robot_name: str, mission_name: str) -> HistoryKeys:
 
 
 def is_speech(node: NodeSpec) -> bool:
-    """Whether a node is a skill that says a text."""
+    """Returns whether a node is a skill that says a text."""
     says = "text" in node.options.get("inputs", {})
     return node.kind == "skill" and says and node.options["skill"].uses == {Part.VOICE}
 
@@ -106,7 +106,7 @@ class Executions:
             self._end(path, node.status is Status.SUCCESS)
 
     def after_tick(self, changed: Iterable[str]) -> None:
-        """Note what was stopped in this tick, and whether the robot may drive; `changed` are nodes that changed."""
+        """Notes what was stopped in this tick, and whether the robot may drive; `changed` are nodes that changed."""
         for path in [path for path in self._open if self._nodes[path].status is not Status.RUNNING]:
             if path not in self._taken_up:
                 self._end(path, done=False)
@@ -186,7 +186,7 @@ class Findings:
         self._keys = history_keys(robot_name, mission_name)
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Take note of a message of the mission; an answer gets its time and the robot's name."""
+        """Takes note of a message of the mission; an answer gets its time and the robot's name."""
         if topic == ANSWER_TOPIC:
             message = {**message, "robot": self._robot_name, "t": round(self._clock.now(), 6)}
             finding = _finding(message)

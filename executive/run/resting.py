@@ -43,7 +43,7 @@ class SteppingAside:
             self._skill.end()
 
     def _begin_where_asked(self) -> None:
-        """Set off where somebody who goes first needs the place, and there is another to go to."""
+        """Sets off where somebody who goes first needs the place, and there is another to go to."""
         if self._context.clock.now() < self._due_s or not self._context.localiser.estimate().localised:
             return
         self._due_s = self._context.clock.now() + _LOOK_S
@@ -126,7 +126,7 @@ class Resting:
             robot.aside.step()
 
     def _look_out(self, robot: _Robot) -> None:
-        """Bring the estimators up to date, seldom while the robot stands; it is there all the same."""
+        """Brings the estimators up to date, seldom while the robot stands; it is there all the same."""
         context = robot.who.context
         if robot.aside.drives or context.clock.now() >= robot.sense_due_s:
             robot.sense_due_s = context.clock.now() + _LOOK_S

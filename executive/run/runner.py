@@ -46,7 +46,7 @@ def run(
     control: Control | None = None,
     spare: Sequence[RunEntry] = (),
 ) -> RunResult:
-    """Run the missions of any number of robots to their end, robots in the order of their names.
+    """Runs the missions of any number of robots to their end, robots in the order of their names.
 
     Each tick: poll `control`, advance the clock by the tick period, update each robot's estimators, tick each tree,
     tell the `visitors`. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree
@@ -142,7 +142,7 @@ class _Run:
         return [session for session in self._sessions.values() if session.result is None]
 
     def _has_work(self) -> bool:
-        """Whether a mission is under way, after those were begun that are assigned now."""
+        """Returns whether a mission is under way, after those were begun that are assigned now."""
         while not self._stopping and (assigned := self._assigner.assign()):  # again where one cannot begin
             self._assigned = list(assigned)
             while self._assigned:
@@ -152,7 +152,7 @@ class _Run:
         return bool(self._live)
 
     def _begin(self, entry: RunEntry) -> None:
-        """Begin a mission of a robot that may be resting. Raises OSError: the disk is full."""
+        """Begins a mission of a robot that may be resting. Raises OSError: the disk is full."""
         name = entry.robot.name
         self._resting.leave(name)
         try:
@@ -199,7 +199,7 @@ class _Run:
         self._keep_pace(begun_wall_s)
 
     def _poll(self, live: Sequence[Session]) -> ControlRequests:
-        """Do what is asked for before time passes."""
+        """Does what is asked for before time passes."""
         requests = self._control.poll()
         self._publish_events(requests.events)
         if requests.cancel is not None:
@@ -221,7 +221,7 @@ class _Run:
         return requests
 
     def _obey(self, session: Session, requests: ControlRequests) -> None:
-        """Do what is asked of one robot."""
+        """Does what is asked of one robot."""
         for request in requests.instead:
             if request.tree.robot_name == session.name:
                 session.replace(request.tree, request.instead_of)
@@ -239,7 +239,7 @@ class _Run:
             session.hold()
 
     def _stop(self, ending: Ending, at_once: bool = False) -> None:
-        """End all missions, and assign no more. What they always do in the end is done first, unless `at_once`."""
+        """Ends all missions, and assign no more. What they always do in the end is done first, unless `at_once`."""
         self._stopping = True
         for session in self._live:
             session.cancel(ending, self._settings.endings_limit_s)
@@ -253,7 +253,7 @@ class _Run:
                 self._visitors.publish(RESERVED_PATH, path)
 
     def _rest(self, live: Sequence[Session], turn: Sequence[Session], held: Callable[[str], bool]) -> None:
-        """Let the robots that wait for others, and those without a mission, clear paths that are reserved."""
+        """Lets the robots that wait for others, and those without a mission, clears paths that are reserved."""
         for session in live:
             if session in turn:
                 self._resting.leave(session.name)
@@ -262,7 +262,7 @@ class _Run:
         self._resting.tick(held)
 
     def _tick(self, moving: Sequence[Session], breakpoints: frozenset[str]) -> Mapping[str, TickNote]:
-        """Tick the trees of robots that may move; what that brought of each."""
+        """Ticks the trees of robots that may move; what that brought of each."""
         notes: dict[str, TickNote] = {}
         changes: list[bool] = []
         for session in moving:
@@ -280,7 +280,7 @@ class _Run:
         return notes
 
     def _note_ends(self, live: Sequence[Session]) -> None:
-        """See how the robots are, each tick for an assigner that recalls them, else twice a second; close the missions
+        """Sees how the robots are, each tick for an assigner that recalls them, else twice a second; close the missions
         that have ended."""
         due = self._looks_always or self._clock.now() >= self._look_due_s - _EPSILON_S
         self._look_due_s += _LOOK_PERIOD_S if due else 0.0
@@ -294,7 +294,7 @@ class _Run:
             self._note_end(result, session.gone)
 
     def _look(self, session: Session, *, now: bool = False) -> bool:
-        """See how a robot is; whether it still answers."""
+        """Sees how a robot is; whether it still answers."""
         status = session.guarded(partial(session.status, now=now))
         if status is None:
             return False
@@ -310,7 +310,7 @@ class _Run:
         return {end.result.robot_name: end.result for end in self._ended}
 
     def _tell_ends(self) -> None:
-        """Tell of the missions that have ended."""
+        """Tells of the missions that have ended."""
         ends, self._told = self._ended[self._told :], len(self._ended)
         for end in ends:
             self._control.mission_ended(end.result.robot_name)
@@ -319,7 +319,7 @@ class _Run:
                 each.mission_ended(end)
 
     def _recall(self) -> None:
-        """End the missions that are recalled now."""
+        """Ends the missions that are recalled now."""
         why = self._assigner.recall(self._seen)
         recalled = [session for session in self._live if session.name in why]
         for session in recalled:
@@ -334,7 +334,7 @@ class _Run:
         return Progress(now_s, self._ticks, self._overruns, states, trees, seen, notes, tick_wall_s)
 
     def _keep_pace(self, begun_wall_s: float) -> None:
-        """Do not let simulated time run ahead of people who have something to decide."""
+        """Does not let simulated time run ahead of people who have something to decide."""
         people = self._control.attended and any(session.waits_for_people for session in self._sessions.values())
         if self._control.pace is None or not (people or self._control.slow):
             return
@@ -348,7 +348,7 @@ class _Run:
             self._visitors.publish(CONTROL, message)
 
     def _end(self, ending: Ending | None) -> None:
-        """Stop all that is under way."""
+        """Stops all that is under way."""
         self._visitors.ending = True
         self._resting.close()
         for session in self._sessions.values():

@@ -88,7 +88,7 @@ class RunRobot:
         return RobotStatus(pose, robot.gripper().holding, robot.battery().charge)
 
     def sense(self) -> None:
-        """Bring the estimators up to date, and tell the others where the robot believes to be."""
+        """Brings the estimators up to date, and tells the others where the robot believes to be."""
         context = self.context
         if estimators := context.leave_others_out:
             covered_W = self._traffic.covered_W(self.name)
@@ -101,18 +101,18 @@ class RunRobot:
         self._traffic.heard(self.name, self.pose)
 
     def claim(self) -> RunContext:
-        """Claim the lease, which nobody holds; what may be used under it. Raises LeaseError."""
+        """Claims the lease, which nobody holds; what may be used under it. Raises LeaseError."""
         self.context = replace(self.context, lease=self._guarded.claim(HOLDER))
         return self.context
 
     def stop_and_leave(self) -> None:
-        """Stop the robot and give its lease back. Raises nothing."""
+        """Stops the robot and gives its lease back. Raises nothing."""
         context = self.context
         self.attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
         self.attempt("return the lease", self._guarded.give_lease_back)
 
     def attempt(self, what: str, call: Callable[[], object]) -> bool:
-        """Do it, and say whether that went well; a defect goes to the log, since the rest must still happen."""
+        """Does it, and says whether that went well; a defect goes to the log, since the rest must still happen."""
         try:
             call()
         except (Exception, VerbHung):
@@ -130,7 +130,7 @@ class Session(RunRobot):
     """
 
     def __init__(self, entry: RunEntry, shared: RunShared) -> None:
-        """Open it under the robot's lease. Raises LeaseError, and what the robot's verbs raise."""
+        """Opens it under the robot's lease. Raises LeaseError, and what the robot's verbs raise."""
         super().__init__(entry, shared)
         context = self.claim()
         try:
@@ -194,7 +194,7 @@ class Session(RunRobot):
             return None
 
     def has_its_turn(self, results: Mapping[str, RobotResult]) -> bool:
-        """Whether the robots that the mission waits for are done; it ends when one of them has failed."""
+        """Returns whether the robots that the mission waits for are done; it ends when one of them has failed."""
         for name in self._after:
             if name not in results:
                 return False
@@ -205,7 +205,7 @@ class Session(RunRobot):
         return True
 
     def sense(self) -> None:
-        """Bring the estimators up to date, count a new match of the scan, and log pose and state twice a second."""
+        """Brings the estimators up to date, counts a new match of the scan, and logs pose and state twice a second."""
         super().sense()
         self._asked_at = self._asked_at or self.pose
         context, estimate = self.context, self.context.localiser.estimate()
@@ -219,7 +219,7 @@ class Session(RunRobot):
             self._publish_navigation()
 
     def may_move(self) -> bool:
-        """Whether the lease counts. A lost one suspends the mission until it can be had again.
+        """Returns whether the lease counts. A lost one suspends the mission until it can be had again.
 
         Raises nothing; when that takes longer than LEASE_PATIENCE_S, the session is closed with cause EXECUTION.
         """
@@ -245,7 +245,7 @@ class Session(RunRobot):
         return False
 
     def tick(self, breakpoints: frozenset[str]) -> bool:
-        """Tick the mission under way once; True when a node changed its status. Its end takes up the one before.
+        """Ticks the mission under way once; True when a node changed its status. Its end takes up the one before.
 
         What a mission that was given up or cancelled always does in the end comes first.
         """
@@ -290,7 +290,7 @@ class Session(RunRobot):
         return self.result is None and any(run.ends for run in self._runs)
 
     def cancel(self, ending: Ending, limit_s: float) -> None:
-        """End all missions of this robot where they are; idempotent.
+        """Ends all missions of this robot where they are; idempotent.
 
         What they always do in the end is done by `tick`, for so long (s) at most.
         """
@@ -303,7 +303,7 @@ class Session(RunRobot):
 
     @property
     def cancelled(self) -> bool:
-        """Whether the missions were ended early."""
+        """Returns whether the missions were ended early."""
         return self._cancelled is not None
 
     def hold(self) -> None:
@@ -321,11 +321,11 @@ class Session(RunRobot):
         self._begin(tree)
 
     def later(self, tree: CompiledTree) -> None:
-        """Begin another mission when the one that the robot began with is done; it comes back to the same start."""
+        """Begins another mission when the one that the robot began with is done; it comes back to the same start."""
         self._later += (tree,)
 
     def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
-        """Give up the mission under way, or not begin one that waits, and have another in its place, from its start.
+        """Gives up the mission under way, or not begin one that waits, and have another in its place, from its start.
 
         Where the mission called `instead_of` is neither, the other is done first.
         """
@@ -351,7 +351,7 @@ class Session(RunRobot):
         self._note_result(given_up.judge(Ending(Outcome.CANCELLED, Cause.CANCELLED, message)))
 
     def close(self, ending: Ending | None = None) -> RobotResult:
-        """Stop the trees and the robot, give the lease back, log the end. Idempotent; raises nothing."""
+        """Stops the trees and the robot, gives the lease back, logs the end. Idempotent; raises nothing."""
         if self.result is None:
             ending = ending if self._cancelled is None else self._cancelled[0]
             for run in self._runs:

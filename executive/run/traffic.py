@@ -60,25 +60,25 @@ class _Robot:
 
     @property
     def silent(self) -> bool:
-        """Whether it was not heard of for long."""
+        """Returns whether it was not heard of for long."""
         return self.table.now() - self.stamp_s > SILENT_S
 
     def claim(self) -> None:
-        """See `Traffic.claim`."""
+        """Sees `Traffic.claim`."""
         if self.turn is None:
             self.turn = self.table.next_turn()
             self.path = None if self.pose is None else self.pose[None, :]
 
     def announce(self, path: FloatArray, discs: FloatArray) -> None:
-        """See `Traffic.announce`."""
+        """Sees `Traffic.announce`."""
         self.path, self.discs = path, discs
 
     def release(self) -> None:
-        """See `Traffic.release`."""
+        """Sees `Traffic.release`."""
         self.path = self.turn = None
 
     def others(self) -> Sequence[Neighbour]:
-        """See `Traffic.others`."""
+        """Sees `Traffic.others`."""
         return tuple(
             Neighbour(
                 other.name,
@@ -94,13 +94,13 @@ class _Robot:
         )
 
     def let_pass(self, name: str) -> None:
-        """See `Traffic.let_pass`."""
+        """Sees `Traffic.let_pass`."""
         other = self.table.view_of(name)
         if self.turn is not None and other.turn is not None:
             self.turn, other.turn = other.turn, self.turn
 
     def goes_before(self, other: _Robot) -> bool:
-        """Whether it has the right of way: it claimed first, and still answers."""
+        """Returns whether it has the right of way: it claimed first, and still answers."""
         if self.turn is None or self.silent:
             return False
         return other.turn is None or other.silent or self.turn < other.turn

@@ -85,7 +85,7 @@ class TreeRun:
         return next((path_id for path_id, gate in self._gates.items() if gate.waiting), None)
 
     def show(self) -> None:
-        """Log the tree."""
+        """Logs the tree."""
         structure = node_view(self.tree.root, self.states).structure()
         self.context.publish(TREE, {"robot": self.tree.robot_name, "root": structure})
 
@@ -121,7 +121,7 @@ class TreeRun:
         return TickNote(self.tree, now_s, changes, board, pose, checkpoints, charge)
 
     def _tick(self) -> None:
-        """Tick the tree; or, while the rest of it stands still, what a node that was stopped was still to do."""
+        """Ticks the tree; or, while the rest of it stands still, what a node that was stopped was still to do."""
         endings = self.context.endings
         due = endings.due
         if due is None:
@@ -143,13 +143,13 @@ class TreeRun:
             self._executions.visited(node, stopped)
 
     def end_early(self) -> None:
-        """Stop the tree where it is, and do no more of it than what is always done in the end."""
+        """Stops the tree where it is, and do no more of it than what is always done in the end."""
         if not self._ended_early and not self.finished:
             self.root.stop(Status.INVALID)
             self._ended_early = True
 
     def suspend(self) -> None:
-        """Keep the place and let go of the robot."""
+        """Keeps the place and lets go of the robot."""
         suspend(self.root)
 
     @property
@@ -158,7 +158,7 @@ class TreeRun:
         return self._observed.states
 
     def log_changes(self, *, of_all: bool = False) -> Sequence[Change]:
-        """Log the transitions since the last time, and what running skills do by now; the transitions."""
+        """Logs the transitions since the last time, and what running skills do by now; the transitions."""
         changes = self._observed.changes(of_all=of_all)
         transitions = [change for change in changes if change.is_transition]
         for change in transitions:
@@ -169,7 +169,7 @@ class TreeRun:
         return transitions
 
     def halt(self, attempt: Attempt) -> None:
-        """Stop all that runs; results that are there stay in sight. Also after an exception in the middle of a tick.
+        """Stops all that runs; results that are there stay in sight. Also after an exception in the middle of a tick.
 
         Each part is done through `attempt`, so that a defect in one does not keep the others from being done.
         """

@@ -158,7 +158,7 @@ class Visitors:
         return iter(self._all)
 
     def publish(self, topic: str, message: Mapping[str, Any]) -> None:
-        """Tell all of a message. Raises what a visitor raises, but not while the run is ending."""
+        """Tells all of a message. Raises what a visitor raises, but not while the run is ending."""
         try:
             for read in self._readers:
                 message = read(topic, message)

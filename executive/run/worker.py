@@ -25,7 +25,7 @@ _Work = tuple[Callable[[], Any], "Future[Any]"]
 
 
 def in_lock_step_job() -> bool:
-    """Whether this is called by a job in lock-step, which may touch nothing that the ticks change."""
+    """Returns whether this is called by a job in lock-step, which may touch nothing that the ticks change."""
     return threading.current_thread().name == _LOCK_STEP_THREAD
 
 
@@ -39,7 +39,7 @@ class WorkThread:
         self._thread.start()
 
     def do(self, work: Callable[[], ResultT]) -> Future[ResultT]:
-        """Have `work` done after all that was given before. Raises RuntimeError when closed."""
+        """Has `work` done after all that was given before. Raises RuntimeError when closed."""
         if self._closed:
             raise RuntimeError("the worker is closed")
         future: Future[ResultT] = Future()
@@ -47,7 +47,7 @@ class WorkThread:
         return future
 
     def close(self, wait_s: float) -> None:
-        """Drop what has not begun, and wait so long for what runs; idempotent."""
+        """Drops what has not begun, and waits so long for what runs; idempotent."""
         self._closed = True
         with suppress(Empty):
             while (given := self._work.get_nowait()) is not None:
@@ -95,7 +95,7 @@ def _work_off(given: SimpleQueue[_Work | None]) -> None:
 
 
 def fulfil(future: Future[ResultT], work: Callable[[], ResultT]) -> None:
-    """Do the work; the future gets its result, or what it raised."""
+    """Does the work; the future gets its result, or what it raised."""
     try:
         future.set_result(work())
     except BaseException as defect:
@@ -150,7 +150,7 @@ class LockStepWorker:
         self._clock, self._thread = clock, WorkThread(_LOCK_STEP_THREAD)
 
     def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
-        """Start `work`. What it raises is raised by `result`. Raises ValueError for a negative latency."""
+        """Starts `work`. What it raises is raised by `result`. Raises ValueError for a negative latency."""
         if latency_s < 0.0:
             raise ValueError(f"{name}: a latency of {latency_s} s")
         return _LockStepJob(self._thread.do(work), self._clock, self._clock.now() + latency_s)
@@ -158,7 +158,7 @@ class LockStepWorker:
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
     ) -> Job[ResultT]:
-        """Read the robot's sensors now, in this thread, and start work on what they gave."""
+        """Reads the robot's sensors now, in this thread, and starts work on what they gave."""
         try:
             given = read()
         except Exception as defect:
@@ -168,7 +168,7 @@ class LockStepWorker:
         return self.submit(lambda: work(given), latency_s=latency_s, name=name)
 
     def close(self) -> None:
-        """Drop what has not begun; wait for what runs."""
+        """Drops what has not begun; wait for what runs."""
         self._thread.close(_PATIENCE_S)
 
     def __enter__(self) -> LockStepWorker:
@@ -191,9 +191,9 @@ class ThreadWorker:
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
     ) -> Job[ResultT]:
-        """Let the thread read the robot's sensors, which may block, and work on what they gave."""
+        """Lets the thread read the robot's sensors, which may block, and work on what they gave."""
         return self.submit(lambda: work(read()), latency_s=latency_s, name=name)
 
     def close(self) -> None:
-        """Drop what has not begun; what runs is left to end by itself."""
+        """Drops what has not begun; what runs is left to end by itself."""
         self._thread.close(0.0)

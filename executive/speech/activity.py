@@ -68,7 +68,7 @@ class Endpointer:
 
     @property
     def speaking(self) -> bool:
-        """Whether an utterance has begun and not ended."""
+        """Returns whether an utterance has begun and not ended."""
         return bool(self._kept)
 
     def so_far(self) -> Samples:
@@ -76,7 +76,7 @@ class Endpointer:
         return joined(self._kept)
 
     def push(self, block: Samples) -> Iterator[Utterance]:
-        """Hear the next block; yields the utterances that end in it."""
+        """Hears the next block; yields the utterances that end in it."""
         sound = np.concatenate([self._rest, block])
         whole = len(sound) - len(sound) % FRAME
         self._rest = sound[whole:]

@@ -59,7 +59,7 @@ class Adapter:
     changes: Mapping[str, LowRank]
 
     def add_to(self, weights: ModelFile) -> None:
-        """Add the changes to the weights, where they stand.
+        """Adds the changes to the weights, where they stand.
 
         Raises:
             InputError: a matrix is missing or of another shape; then nothing is changed.
@@ -74,7 +74,7 @@ class Adapter:
             before[...] = before + low_rank.change().reshape(before.shape)
 
     def save(self, file: Path, *, base: str) -> None:
-        """Write it to a file; `base` is the sha256 of the weights that it belongs to."""
+        """Writes it to a file; `base` is the sha256 of the weights that it belongs to."""
         parts = {f"{name}{_UP}": low.up for name, low in self.changes.items()}
         parts |= {f"{name}{_DOWN}": low.down for name, low in self.changes.items()}
         np.savez(file, base=np.array(base), **parts)  # type: ignore[arg-type]

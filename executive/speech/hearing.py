@@ -72,7 +72,7 @@ class Reader:
         return Reading(meant, fits=not strange, suspects=strange)
 
     def calls(self, text: str) -> bool:
-        """Whether a robot is called in `text`."""
+        """Returns whether a robot is called in `text`."""
         return self.read(text).meaning.addressed
 
     def _called(self, text: str) -> Address:
@@ -85,7 +85,7 @@ class Reader:
 
 
 def refuse_alike(robots: Sequence[str]) -> None:
-    """Raise InputError where robots cannot be told apart by voice, or a name cannot be said."""
+    """Raises InputError where robots cannot be told apart by voice, or a name cannot be said."""
     for number, name in enumerate(robots):
         if not re.fullmatch(r"[^\W\d_]+(?:[ '-][^\W\d_]+)*", name):
             hint = "give it a name of letters, or write what it is to do"
@@ -125,7 +125,7 @@ def _names(command: Command) -> Iterator[str]:
 
 
 def _knows(known: Collection[str], name: str) -> bool:
-    """Whether a name is known as a whole, or without the adjectives before it, or is a word for a person.
+    """Returns whether a name is known as a whole, or without the adjectives before it, or is a word for a person.
 
     Pronouns that stand for nobody are no names.
     """

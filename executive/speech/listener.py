@@ -52,7 +52,7 @@ class Listener:
         return self.reader.vocabulary
 
     def file(self, wav: Path) -> Recording:
-        """Listen to a recording of any length; only seconds of it are in memory.
+        """Listens to a recording of any length; only seconds of it are in memory.
 
         Raises:
             InputError: see `read_wav`.
@@ -78,7 +78,7 @@ class Listener:
         yield from endpointer.flush()
 
     def hear(self, utterance: Utterance) -> HeardUtterance | None:
-        """Recognise and understand what was said; None when it was no speech after all."""
+        """Recognises and understands what was said; None when it was no speech after all."""
         recognition = self.recogniser.transcribe(utterance.samples, self.vocabulary)
         best = interpret(recognition, self.reader.read, self.alikes)
         if best is None:
@@ -105,7 +105,7 @@ class Recording:
 
     @property
     def addressed(self) -> bool:
-        """Whether the robot was called."""
+        """Returns whether the robot was called."""
         return any(one.meant.addressed for one in self.heard)
 
     @property

@@ -48,7 +48,7 @@ class Recogniser(Protocol):
     """Turns sound into text; the same sound and vocabulary give the same text."""
 
     def transcribe(self, sound: Samples, vocabulary: Vocabulary) -> Recognition:
-        """Recognise at most 30 s of sound at RATE_HZ."""
+        """Recognises at most 30 s of sound at RATE_HZ."""
 
     def draft(self, sound: Samples, vocabulary: Vocabulary) -> str:
         """A quick first reading of a sentence that is still being spoken."""

@@ -50,12 +50,12 @@ class Loudness:
 
     @property
     def silent(self) -> bool:
-        """Whether nothing in it is louder than 60 dB below full scale."""
+        """Returns whether nothing in it is louder than 60 dB below full scale."""
         return self.peak < _SILENT_LEVEL
 
     @property
     def much_clipped(self) -> bool:
-        """Whether so many samples (one in 500) were cut off that words may be lost."""
+        """Returns whether so many samples (one in 500) were cut off that words may be lost."""
         return self.clipped > _MUCH_CLIPPED * self.count
 
 

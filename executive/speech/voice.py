@@ -16,14 +16,14 @@ class Voice(Protocol):
     """Says something aloud. It never fails and never waits for the end."""
 
     def say(self, text: str) -> None:
-        """Begin to say `text`."""
+        """Begins to say `text`."""
 
 
 class Silence:
     """No voice: says nothing."""
 
     def say(self, text: str) -> None:
-        """Do nothing."""
+        """Does nothing."""
 
 
 class EspeakVoice:
@@ -37,7 +37,7 @@ class EspeakVoice:
         self._speaking: subprocess.Popen[bytes] | None = None
 
     def say(self, text: str) -> None:
-        """Begin to say `text`, or as much of it as is ever said."""
+        """Begins to say `text`, or as much of it as is ever said."""
         if self._speaking is not None and self._speaking.poll() is None:
             return
         quiet = subprocess.DEVNULL
@@ -49,7 +49,7 @@ class EspeakVoice:
             self._speaking = None
 
     def wait(self) -> None:
-        """Wait until it has said all."""
+        """Waits until it has said all."""
         if self._speaking is not None:
             self._speaking.wait()
 
@@ -67,11 +67,11 @@ class QueuedVoice:
         self._thread.start()
 
     def say(self, text: str) -> None:
-        """Say `text` when all before it is said."""
+        """Says `text` when all before it is said."""
         self._texts.put(text)
 
     def close(self) -> None:
-        """Wait until all is said, a minute at most; nothing is said afterwards. Idempotent."""
+        """Waits until all is said, a minute at most; nothing is said afterwards. Idempotent."""
         self._texts.put(None)
         self._thread.join(self._PATIENCE_S)
 

@@ -95,7 +95,7 @@ class WhisperRecogniser:
         self._tokens = tokens.Tokenizer(whisper.hf_tokenizer, True, task="transcribe", language="en")
 
     def transcribe(self, sound: Samples, vocabulary: Vocabulary) -> WhisperRecognition:
-        """Recognise at most 30 s of sound at RATE_HZ."""
+        """Recognises at most 30 s of sound at RATE_HZ."""
         return WhisperRecognition(self, sound, vocabulary)
 
     def draft(self, sound: Samples, vocabulary: Vocabulary) -> str:

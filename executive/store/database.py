@@ -81,7 +81,7 @@ class Database:
     kind: FileKind
 
     def __init__(self, path: Path, *, create: bool = False) -> None:
-        """Open the file, made new where `create` allows it.
+        """Opens the file, made new where `create` allows it.
 
         A killed process loses nothing that was committed: the file is in write-ahead mode. Raises InputError: there is
         none, it cannot be opened, it is damaged, or another version wrote it.
@@ -107,7 +107,7 @@ class Database:
         self.close()
 
     def close(self) -> None:
-        """Close it; idempotent."""
+        """Closes it; idempotent."""
         self._connection.close()
 
     @contextmanager
@@ -145,7 +145,7 @@ class Database:
             return cursor.execute(query, values).fetchall()
 
     def _prepare(self) -> None:
-        """Set the modes, check whose file it is, and make the tables of a new one."""
+        """Sets the modes, checks whose file it is, and makes the tables of a new one."""
         kind, connection = self.kind, self._connection
         (application,) = connection.execute("PRAGMA application_id").fetchone()
         (version,) = connection.execute("PRAGMA user_version").fetchone()

@@ -62,7 +62,7 @@ class StoreJournal(RunVisitor):
         return self
 
     def _replace(self, tree: CompiledTree) -> None:
-        """Keep the mission that has taken the place of another in its stead, with nothing done of it yet."""
+        """Keeps the mission that has taken the place of another in its stead, with nothing done of it yet."""
         self._board, self._written, self._steps, self._values, self._checkpoints = {}, {}, {}, {}, {}
         self._pose = self._charges = self._recollection = None
         if self._request_of is None:
@@ -94,7 +94,7 @@ class StoreJournal(RunVisitor):
                 self.note(note)
 
     def note(self, note: TickNote) -> None:
-        """Keep what a tick brought of the mission."""
+        """Keeps what a tick brought of the mission."""
         if self._tree is not None and note.tree is not self._tree:
             self._replace(note.tree)
         self._tree = note.tree

@@ -72,7 +72,7 @@ class MissionStore(Database):
     kind = STORE_FILE
 
     def __init__(self, path: Path, *, create: bool = True, now: Callable[[], datetime] = utc_now) -> None:
-        """Open it; `now` is the wall's clock. Raises InputError: there is none, or it cannot be used."""
+        """Opens it; `now` is the wall's clock. Raises InputError: there is none, or it cannot be used."""
         super().__init__(path, create=create)
         self.now = now
 
@@ -121,7 +121,7 @@ class MissionStore(Database):
             connection.execute(f"UPDATE mission SET {columns} WHERE id = ?", (*values, number))
 
     def has_steps(self, number: int) -> bool:
-        """Whether anything was done of a mission."""
+        """Returns whether anything was done of a mission."""
         return bool(self.rows("SELECT 1 FROM step WHERE mission = ? LIMIT 1", number))
 
     def memory(self, number: int, robot: str | None = None) -> Memory:
@@ -161,7 +161,7 @@ class MissionStore(Database):
 
 
 def insert(connection: sqlite3.Connection, request: Request, *, state: MissionState, **more: object) -> int:
-    """Add a mission with values for more columns; its number."""
+    """Adds a mission with values for more columns; its number."""
     values = {"state": state.value, "request": request.to_json(), **more}
     names, marks = ", ".join(values), ", ".join(f":{name}" for name in values)
     return connection.execute(f"INSERT INTO mission ({names}) VALUES ({marks})", values).lastrowid or 0

@@ -66,7 +66,7 @@ class Recollection:
         return self
 
     def pending(self, path_id: str) -> bool:
-        """Whether a result is still to be used: until then it must not be overwritten."""
+        """Returns whether a result is still to be used: until then it must not be overwritten."""
         return path_id in self._ended
 
     def result(self, path_id: str) -> StepRecord | None:
@@ -74,7 +74,7 @@ class Recollection:
         return self._ended.get(path_id)
 
     def is_last(self, path_id: str) -> bool:
-        """Whether this was the last success before the restart; what it brought about may not hold any more."""
+        """Returns whether this was the last success before the restart; what it brought about may not hold any more."""
         return path_id == self._last
 
     def used(self, path_id: str, sentence: str) -> None:
@@ -97,7 +97,7 @@ class Recollection:
         self._checkpoints.pop(path_id, None)
 
     def looks_first(self, changes_world: bool) -> bool:
-        """Whether a skill that begins must first look what is done already.
+        """Returns whether a skill that begins must first look what is done already.
 
         So it is until one has begun that changes the world: what was kept may lag behind what was done.
         """

@@ -89,7 +89,7 @@ def ended_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recolle
         return None
 
     def take_up(node: ExplainedNode) -> None:
-        """Let a node say what it said; the root in its first tick."""
+        """Lets a node say what it said; the root in its first tick."""
         step = memory.steps.get(node.path_id)
         if node.path_id == tree.root.path_id:
             _AsBefore(node, ended)
@@ -139,7 +139,7 @@ class _Past:
     specs: Mapping[str, NodeSpec]
 
     def take_up(self, node: ExplainedNode) -> None:
-        """Let a node come to where it was, whatever its kind: skills do so by themselves.
+        """Lets a node come to where it was, whatever its kind: skills do so by themselves.
 
         A branch that was passed over is passed over once more. A composite that was under way forgets nothing. A
         decorator asks its child once more, whatever would hold that back, since what was guarded need not be so any
@@ -168,7 +168,7 @@ class _Past:
         return Status.INVALID if step is None else step.status
 
     def _was_reached(self, node: Any) -> bool:
-        """Whether a branch was taken or passed over, as a later one shows that was begun."""
+        """Returns whether a branch was taken or passed over, as a later one shows that was begun."""
         parent = node.parent
         if parent is None:
             return False
@@ -211,14 +211,14 @@ class _NotHeldBack:
 
 
 def _applies_as_before(node: Any, applied: bool) -> None:
-    """Let a branch say at first what it said before the restart: the blackboard knows more by now."""
+    """Lets a branch say at first what it said before the restart: the blackboard knows more by now."""
     answers = [applied]
     asked: Callable[[], bool] = node.applies
     vars(node)["applies"] = lambda: answers.pop() if answers else asked()
 
 
 def told_before(message: str) -> bool:
-    """Whether a node's sentence is that of a result from before a restart."""
+    """Returns whether a node's sentence is that of a result from before a restart."""
     return message.endswith(f"({BEFORE})")
 
 

@@ -50,7 +50,7 @@ class StandingMissions:
         self._store, self._zone = store, zone
 
     def add(self, request: Request, trigger: Trigger, missed: Missed = Missed.SKIP) -> StandingMission:
-        """Keep a mission whose request is understood. Raises InputError: its only time has passed."""
+        """Keeps a mission whose request is understood. Raises InputError: its only time has passed."""
         now = self._store.now()
         if isinstance(trigger, Once) and trigger.latest(now, now, self._zone) is not None:
             raise InputError(f"{trigger} has passed", hint="give a time to come, or queue the mission without --at")

@@ -23,7 +23,7 @@ class TriggerSource(Protocol):
     """Hears the topics of one kind."""
 
     def start(self, topics: Sequence[str], fire: Fire) -> None:
-        """Begin to listen, and return within 10 s; call `fire` for each message that comes.
+        """Begins to listen, and returns within 10 s; call `fire` for each message that comes.
 
         It is called in a thread of its own; so is `stop`, which has 10 s as well.
 
@@ -32,7 +32,7 @@ class TriggerSource(Protocol):
         """
 
     def stop(self) -> None:
-        """Stop listening, and let go of what was opened; `fire` is not called after it returns. Idempotent."""
+        """Stops listening, and lets go of what was opened; `fire` is not called after it returns. Idempotent."""
 
 
 def refuse_missing_source(kind: str) -> None:

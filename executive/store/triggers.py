@@ -145,7 +145,7 @@ class OnBatteryFull:
         return "battery full" if self.level == FULL else f"battery {100 * self.level:g}%"
 
     def rises(self, lowest: float, last: float) -> bool:
-        """Whether a mission with this lowest and last charge is an occurrence."""
+        """Returns whether a mission with this lowest and last charge is an occurrence."""
         return lowest < self.level - NOISE and self.level <= last
 
 

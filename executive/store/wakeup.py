@@ -26,7 +26,7 @@ class WakeupPipe:
     """The waiting side. Use it as a context manager, or close it."""
 
     def __init__(self, store: MissionStore) -> None:
-        """Listen beside a store. Raises InputError: no pipe can be made there."""
+        """Listens beside a store. Raises InputError: no pipe can be made there."""
         self._store, self._path = store, _path(store.path)
         with store.kind.failures(store.path):
             with suppress(FileExistsError):
@@ -43,17 +43,17 @@ class WakeupPipe:
         self.close()
 
     def close(self) -> None:
-        """Listen no more."""
+        """Listens no more."""
         self._path.unlink(missing_ok=True)
         os.close(self._pipe)
 
     def wake(self) -> None:
-        """End the wait under way, or the next one; from any thread, and from signal handlers."""
+        """Ends the wait under way, or the next one; from any thread, and from signal handlers."""
         with suppress(BlockingIOError):
             os.write(self._pipe, b"!")
 
     def wait(self, until: datetime | None) -> None:
-        """Block until somebody wakes it or a moment (aware) comes, but never for longer than LONGEST_WAIT."""
+        """Blocks until somebody wakes it or a moment (aware) comes, but never for longer than LONGEST_WAIT."""
         left = LONGEST_WAIT if until is None else min(LONGEST_WAIT, until - self._store.now())
         select.select([self._pipe], [], [], max(0.0, left.total_seconds()))
         with suppress(BlockingIOError):
@@ -61,7 +61,7 @@ class WakeupPipe:
 
 
 def wake_server(store: Path) -> None:
-    """Tell the process that waits at a store, if there is one, that something has changed."""
+    """Tells the process that waits at a store, if there is one, that something has changed."""
     try:
         pipe = os.open(_path(store), os.O_WRONLY | os.O_NONBLOCK)
     except OSError:

@@ -178,7 +178,7 @@ class SkillTestFile(_Strict):
 def load_skill_tests(
     path: Path | str, skills: Mapping[str, type[Skill[Any]]], kinds: Sequence[FaultKind] = STANDARD_FAULTS
 ) -> SkillTestFile:
-    """Read a file of skill tests and check it against the registered skills.
+    """Reads a file of skill tests and checks it against the registered skills.
 
     Raises InputError: with file, line and hint: broken YAML, unknown keys, no such skill, port or fault, wrong values.
     """

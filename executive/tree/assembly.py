@@ -35,11 +35,11 @@ class Named:
     quantity: Any = None
 
     def is_alike(self, kind: Any) -> bool:
-        """Whether expressions may compare its values with those of type `kind`."""
+        """Returns whether expressions may compare its values with those of type `kind`."""
         return self.type is kind or (kind_of(self.type) is kind_of(kind) and kind_of(kind) is not Kind.OTHER)
 
     def is_same(self, other: Named | None) -> bool:
-        """Whether two values stand under one blackboard key and are of one type."""
+        """Returns whether two values stand under one blackboard key and are of one type."""
         return other is not None and other.key == self.key and other.is_alike(self.type)
 
 
@@ -63,7 +63,7 @@ class Flow:
         return replace(self, names=dict(self.names))
 
     def join(self, branches: Sequence[Flow]) -> None:
-        """Go on after one of several branches, nobody knows which."""
+        """Goes on after one of several branches, nobody knows which."""
         first, *others = branches
         shared = {n: named for n, named in first.names.items() if all(named.is_same(b.names.get(n)) for b in others)}
         for name, named in shared.items():
@@ -76,7 +76,7 @@ class Flow:
         self.opening = all(branch.opening for branch in branches)
 
     def may_lack(self, before: Flow) -> None:
-        """Go on although the last step may have been skipped: what it gave may be missing."""
+        """Goes on although the last step may have been skipped: what it gave may be missing."""
         after = {name: named for name, named in self.names.items() if named.is_same(before.names.get(name))}
         changed = {name for name, named in after.items() if before.names[name] != named}
         self.names = after | {name: replace(after[name], quantity=None) for name in changed}
@@ -184,7 +184,7 @@ class Assembler:
         return made, after
 
     def give(self, name: str | None, key: str, kind: type, builder: PlanBuilder, quantity: Any = None) -> str:
-        """Let later steps read a value under `name` (None: none); the key that it goes to.
+        """Lets later steps read a value under `name` (None: none); the key that it goes to.
 
         That is the key under which the name has been given before, so that a loop's steps read what its later ones
         give; else `key`, or where that is empty the name's own.

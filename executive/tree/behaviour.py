@@ -38,11 +38,11 @@ class Explained:
     final: bool = False
 
     def clear_explanation(self) -> None:
-        """Forget cause and message."""
+        """Forgets cause and message."""
         self.cause, self.message, self.final = None, "", False
 
     def explain_cancelled(self) -> None:
-        """Say that the node was stopped from outside, and while doing what."""
+        """Says that the node was stopped from outside, and while doing what."""
         self.cause = Cause.CANCELLED
         self.message = f"stopped while: {self.message}" if self.message else "stopped"
 
@@ -95,7 +95,7 @@ class ExplainedLeaf(ExplainedNode, Behaviour):
         Behaviour.__init__(self, self.name)
 
     def tick(self) -> Iterator[Behaviour]:
-        """Do the work of a tick. As the library's, which also writes debug texts and checks the status' type."""
+        """Does the work of a tick. As the library's, which also writes debug texts and checks the status' type."""
         if self.status != Status.RUNNING:
             self.initialise()
         status = self.update()
@@ -116,7 +116,7 @@ class ExplainedDecorator(ExplainedNode, Decorator):
         Decorator.__init__(self, self.name, self.child)
 
     def tick(self) -> Iterator[Behaviour]:
-        """Tick the child unless something holds it back, then judge. As the library's, which also checks types."""
+        """Ticks the child unless something holds it back, then judge. As the library's, which also checks types."""
         if self.status != Status.RUNNING:
             self.initialise()
         status = self._held_back()
@@ -164,7 +164,7 @@ class MemoryComposite(ExplainedNode, Composite):
         Composite.__init__(self, self.name, list(self.children))
 
     def tick(self) -> Iterator[Behaviour]:
-        """Tick the present child, and those that follow it in the same tick."""
+        """Ticks the present child, and those that follow it in the same tick."""
         if self.status != Status.RUNNING:
             self._restart()
         while True:
@@ -208,14 +208,14 @@ class MemoryComposite(ExplainedNode, Composite):
             self._forget()
 
     def _forget(self) -> None:
-        """Leave nothing on the blackboard of the time before it began."""
+        """Leaves nothing on the blackboard of the time before it began."""
 
     def _reset_children(self) -> None:
         for child in self.children:
             child.stop(Status.INVALID)
 
     def _take_over(self, child: Behaviour) -> None:
-        """Take the child's status, and its explanation where there is something to explain."""
+        """Takes the child's status, and its explanation where there is something to explain."""
         status = child.status if child.status != Status.INVALID else Status.FAILURE
         self.cause, self.message = self._explanation(child) if status == Status.FAILURE else (None, message_of(child))
         if status == Status.RUNNING:
@@ -243,7 +243,7 @@ def cause_of(node: Behaviour) -> Cause:
 
 
 def failed_for_good(node: Behaviour) -> bool:
-    """Whether the node, or one below it, failed and another attempt would end the same way."""
+    """Returns whether the node, or one below it, failed and another attempt would end the same way."""
     return any(isinstance(one, Explained) and one.status == Status.FAILURE and one.final for one in node.iterate())
 
 
@@ -258,7 +258,7 @@ class Conditional(Protocol):
     """A child that a selector passes over untouched when it does not apply: that is no failure."""
 
     def applies(self) -> bool:
-        """Whether there is any sense in ticking it now."""
+        """Returns whether there is any sense in ticking it now."""
 
 
 @runtime_checkable
@@ -266,7 +266,7 @@ class Suspendable(Protocol):
     """A node that must be told when it will not be ticked for a while."""
 
     def suspend(self) -> None:
-        """Let go of the robot and stop counting time until the next tick. Idempotent; never raises."""
+        """Lets go of the robot and stops counting time until the next tick. Idempotent; never raises."""
 
 
 def suspend(root: Behaviour, *, sparing: Behaviour | None = None) -> None:

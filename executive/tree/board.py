@@ -20,7 +20,7 @@ class Board:
         self._copy: Mapping[str, Any] | None = None
 
     def put(self, key: str, value: Any) -> None:
-        """Store a value. Raises ValueError for a key with a dot or without the robot's name in front."""
+        """Stores a value. Raises ValueError for a key with a dot or without the robot's name in front."""
         if "." in key or not key.startswith(self._prefix):
             raise ValueError(f"blackboard key '{key}': must begin with '{self._prefix}' and hold no dot")
         self._values[key] = value
@@ -33,7 +33,7 @@ class Board:
         return self._values[key]
 
     def forget(self, keys: Iterable[str]) -> None:
-        """Take values off the board, so that nothing leaks into another attempt; unknown keys are let pass."""
+        """Takes values off the board, so that nothing leaks into another attempt; unknown keys are let pass."""
         for key in keys:
             self._values.pop(key, None)
         self._copy = None

@@ -96,7 +96,7 @@ def check_tree(
     estimates: Estimates,
     held: InGripper | None = None,
 ) -> Checked:
-    """Check a compiled mission that begins at `start` with `held` in the gripper: are its objects there and light
+    """Checks a compiled mission that begins at `start` with `held` in the gripper: are its objects there and light
     enough, its places in reach, and does the gripper hold in each step what that step needs?"""
     lines = {node.path_id: node.source for node in tree.root.walk()}
 

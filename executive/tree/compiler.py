@@ -70,7 +70,7 @@ class CompiledTree:
 
 
 def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> CompiledTree:
-    """Compile a mission to a tree and check its wiring; each node keeps the line of the file that it comes from.
+    """Compiles a mission to a tree and checks its wiring; each node keeps the line of the file that it comes from.
 
     Args:
         mission: what to do; its robot and name become the first parts of the path ids.
@@ -111,7 +111,7 @@ def _may_skip(node: NodeSpec) -> bool:
 
 
 def _leads_back(mission: Mission) -> bool:
-    """Whether something in a mission leads back to where the robot stands at its beginning."""
+    """Returns whether something in a mission leads back to where the robot stands at its beginning."""
     steps = list(mission.walk())
     used = (step.mission for step in steps if isinstance(step, UseMission))
     policies: tuple[Policy, ...] = (mission, *steps, *used)
@@ -120,7 +120,7 @@ def _leads_back(mission: Mission) -> bool:
 
 
 def check_wiring(root: NodeSpec) -> None:
-    """Check all ports of a tree.
+    """Checks all ports of a tree.
 
     Raises InputError: an input port without a value, an unknown port, a value of a wrong type, a blackboard key that no
     earlier node writes, an output bound to a port that the skill does not have, or a path id used twice.

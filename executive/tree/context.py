@@ -37,13 +37,13 @@ class Endings:
         return self._due[0] if self._due else None
 
     def take(self, node: Behaviour) -> bool:
-        """Take a node over, perhaps in the middle of its work; False when the run does no more of that."""
+        """Takes a node over, perhaps in the middle of its work; False when the run does no more of that."""
         if not self._closed:
             self._due.append(node)
         return not self._closed
 
     def has(self, node: Behaviour) -> bool:
-        """Whether a node was taken over, and is not done yet."""
+        """Returns whether a node was taken over, and is not done yet."""
         return any(each is node for each in self._due)
 
     def done(self) -> None:
@@ -51,7 +51,7 @@ class Endings:
         self._due.pop(0)
 
     def close(self) -> tuple[Behaviour, ...]:
-        """Take nothing any more; what was still due."""
+        """Takes nothing any more; what was still due."""
         left, self._due, self._closed = tuple(self._due), [], True
         return left
 

@@ -124,7 +124,7 @@ class NodeView:
 
 
 def _tells_what(port: Port) -> bool:
-    """Whether a port holds texts, or the name of one surface; logs of older versions say "str" for a text."""
+    """Returns whether a port holds texts, or the name of one surface; logs of older versions say "str" for a text."""
     return "text" in port.type or "str" in port.type or ("Surface" in port.type and "," not in port.value)
 
 

@@ -189,7 +189,7 @@ class PlanBuilder:
         return below.recover(f"go to {to}", drive, *recoveries, attempts=3)
 
     def has_ports(self, skill: str, inputs: tuple[str, ...] = (), outputs: tuple[str, ...] = ()) -> bool:
-        """Whether a registered skill has these ports; a skill of others may lack what is not essential."""
+        """Returns whether a registered skill has these ports; a skill of others may lack what is not essential."""
         kind = self.registry.get(skill)
         if kind is None:
             return False

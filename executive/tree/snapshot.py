@@ -31,12 +31,12 @@ class Change(NamedTuple):
 
     @property
     def is_transition(self) -> bool:
-        """Whether its status or cause changed."""
+        """Returns whether its status or cause changed."""
         return self.before.status is not self.after.status or self.before.cause is not self.after.cause
 
     @property
     def is_activity(self) -> bool:
-        """Whether it goes on and does something new; mere new numbers do not count."""
+        """Returns whether it goes on and does something new; mere new numbers do not count."""
         if self.is_transition or self.after.status is not Status.RUNNING:
             return False
         return _NUMBER.sub("", self.before.message) != _NUMBER.sub("", self.after.message)
@@ -68,7 +68,7 @@ class Observed:
             vars(node)["stop"] = _noted(node, self._touched, self._stopped)
 
     def tick(self, node: Behaviour, visited: Visited = lambda node, stopped: None) -> None:
-        """Tick the tree, or a part of it; `visited` is told of each node, after those below it."""
+        """Ticks the tree, or a part of it; `visited` is told of each node, after those below it."""
         for each in node.tick():
             self._touched.add(each)
             visited(each, each in self._stopped)

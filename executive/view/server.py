@@ -97,7 +97,7 @@ class PageServer(Server):
         ]
 
     def _allowed(self, connection: HTTPConnection) -> bool:
-        """Whether host, origin and token are right. Browsers always send the origin of actions."""
+        """Returns whether host, origin and token are right. Browsers always send the origin of actions."""
         here = {f"{HOST}:{self.port}", f"localhost:{self.port}"}
         headers = connection.headers
         origin = headers.get("origin")

@@ -65,7 +65,7 @@ def note_of(node: NodeView) -> str:
 
 
 def is_closed(node: NodeView) -> bool:
-    """Whether a node succeeded or has not begun, so that the nodes below it can be hidden."""
+    """Returns whether a node succeeded or has not begun, so that the nodes below it can be hidden."""
     return node.state.status in (Status.SUCCESS, Status.INVALID) and node.state.cause is None
 
 

@@ -113,12 +113,12 @@ class Command:
 
 
 def is_attribute(word: str) -> bool:
-    """Whether a leading `word` is read as an attribute of what follows ("red", "biggest")."""
+    """Returns whether a leading `word` is read as an attribute of what follows ("red", "biggest")."""
     return _ATTRIBUTE.fullmatch(word) is not None
 
 
 def may_be_attribute(word: str) -> bool:
-    """Whether `word` can be an attribute in a command: one word, and no number."""
+    """Returns whether `word` can be an attribute in a command: one word, and no number."""
     return _NO_ATTRIBUTE.fullmatch(word) is None
 
 

@@ -138,7 +138,7 @@ class Template:
         return "".join(piece if isinstance(piece, str) else _shown(piece.value(values)) for piece in _pieces(self.text))
 
     def could_be(self, text: str) -> bool:
-        """Whether a text is this one with some values put in, but for its spaces."""
+        """Returns whether a text is this one with some values put in, but for its spaces."""
         pieces = [
             re.escape(piece) if isinstance(piece, str) else ".*" for piece in _pieces(" ".join(self.text.split()))
         ]
@@ -213,7 +213,7 @@ _SLIPS: Final[tuple[tuple[str, Callable[[re.Match[str]], str]], ...]] = (
 
 
 def _refuse_others(node: ast.expr, depth: int) -> None:
-    """Refuse what the grammar does not have."""
+    """Refuses what the grammar does not have."""
     if depth > MOST_DEPTH:
         raise ExpressionError("the expression is nested too deeply", "use 'set' to name a part of it")
     if isinstance(node, ast.Constant):

@@ -51,7 +51,7 @@ class Forms:
         return model.model_validate(self._fitting(data, told[0], model), by_alias=True, by_name=False)
 
     def _refuse_unknown(self, data: Mapping[Any, Any]) -> None:
-        """Raise ValidationError where some keys are those of no model."""
+        """Raises ValidationError where some keys are those of no model."""
         known = {key for model in self.models.values() for key in aliases(model)}
         unknown = [key for key in data if key not in known]
         if unknown and not any(key in self.models for key in data):

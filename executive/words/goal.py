@@ -48,7 +48,7 @@ class Region:
             raise ValueError(f"region {self.name!r} needs three corners or more and z_min_m below z_max_m")
 
     def contains(self, p_W: Iterable[float]) -> bool:
-        """Whether a point (x, y, z) in the world lies inside."""
+        """Returns whether a point (x, y, z) in the world lies inside."""
         x, y, z = p_W
         return self.z_min_m <= z <= self.z_max_m and inside(self.polygon_W, (x, y))
 

@@ -216,7 +216,7 @@ def _resolve(
 
 
 def load_knowledge(path: Path | str) -> Knowledge:
-    """Read a world's `knowledge.yaml`.
+    """Reads a world's `knowledge.yaml`.
 
     Raises:
         InputError: with file, line and hint, for broken YAML, unknown or missing keys, wrong values, and names that

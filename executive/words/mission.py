@@ -234,7 +234,7 @@ class Mission(_Whole):
 
     @property
     def is_framed(self) -> bool:
-        """Whether something is watched while its steps run, or done in the end."""
+        """Returns whether something is watched while its steps run, or done in the end."""
         return bool(self.always) or self.while_ is not None or self.when is not None
 
     def walk(self) -> Iterator[Step]:

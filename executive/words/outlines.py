@@ -23,7 +23,7 @@ class Side:
 
 
 def inside(polygon: Sequence[Point], point: Point) -> bool:
-    """Whether (x, y) lies within the outline."""
+    """Returns whether (x, y) lies within the outline."""
     import shapely
 
     return bool(shapely.contains_xy(_outline(tuple(polygon)), *point))
@@ -42,7 +42,7 @@ def distance_m(polygon: Sequence[Point], point: Point) -> float:
 
 
 def fits(outline: Sequence[Point], polygon: Sequence[Point], taken: Iterable[Sequence[Point]]) -> bool:
-    """Whether one outline lies within another, and meets none of those that are taken."""
+    """Returns whether one outline lies within another, and meets none of those that are taken."""
     import shapely
 
     body = shapely.Polygon(outline)

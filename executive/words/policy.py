@@ -101,7 +101,7 @@ class Policy(Strict):
 
     @property
     def is_empty(self) -> bool:
-        """Whether it asks for nothing."""
+        """Returns whether it asks for nothing."""
         guards = self.guards or Guards()
         guarded = guards.battery is not None or guards.localised or guards.time_s is not None
         numbers = (self.timeout_s, self.pick_ups, self.move_aside)

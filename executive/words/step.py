@@ -79,7 +79,7 @@ class Step(Placed):
 
     @property
     def is_block(self) -> bool:
-        """Whether it decides, repeats, waits or the like, and is no command, skill or mission."""
+        """Returns whether it decides, repeats, waits or the like, and is no command, skill or mission."""
         return bool(self.key)
 
     @property

@@ -104,7 +104,7 @@ class Loop(Strict):
 
     @property
     def is_endless(self) -> bool:
-        """Whether nothing ends the rounds."""
+        """Returns whether nothing ends the rounds."""
         return self.times is None and self.until is None and self.while_ is None
 
 

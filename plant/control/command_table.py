@@ -71,7 +71,7 @@ class CommandTable(CommandStatuses):
         self._running: dict[Part, Active[object]] = {}
 
     def begin(self, part: Part, payload: object, now_s: float, until_s: float) -> CommandId:
-        """Start a command in place of the part's running one."""
+        """Starts a command in place of the part's running one."""
         command = self.add(CommandStatus(CommandState.RUNNING))
         self.finish(part, CommandState.STOPPED, f"replaced by command {command}")
         self._running[part] = Active(command, payload, now_s, until_s)
@@ -86,7 +86,7 @@ class CommandTable(CommandStatuses):
         return self.add(CommandStatus(state, reason))
 
     def finish(self, part: Part, state: CommandState, reason: str = "") -> None:
-        """End the part's running command, if any."""
+        """Ends the part's running command, if any."""
         active = self._running.pop(part, None)
         if active is not None:
             self.change(active.id, CommandStatus(state, reason))

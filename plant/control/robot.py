@@ -83,7 +83,7 @@ class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
     def __init__(
         self, body: RobotBody, index: ActuatedJoints, sensors: SensorSuite, context: Context, gripper: GripperTolerances
     ) -> None:
-        """Take over the robot as it stands in the plant's `context` at time 0."""
+        """Takes over the robot as it stands in the plant's `context` at time 0."""
         self._name, self._capabilities, self._sensors = body.name, body.kind.capabilities(), sensors
         self._plant, self._instance, self._index, self._context = body.plant, body.instance, index, context
         joints = self._joints()
@@ -116,7 +116,7 @@ class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
         return self._sensors.scan
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        """Take a picture with depth now, or only one of the two. Raises ValueError for an unknown source."""
+        """Takes a picture with depth now, or only one of the two. Raises ValueError for an unknown source."""
         return self._sensors.image(source, visual=visual, depth=depth)
 
     def joints(self) -> Joints:
@@ -138,12 +138,12 @@ class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
     # -- act ------------------------------------------------------------------------------------------------------
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
-        """Follow a joint trajectory; done when its end is reached and the arm is still."""
+        """Follows a joint trajectory; done when its end is reached and the arm is still."""
         reason = self._arm.refusal(trajectory)
         return self._commands.refuse(reason) if reason else self._begin(Part.ARM, trajectory, until_s, lease)
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
+        """Moves the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
         gripper = self._capabilities.gripper
         if gripper is None:
             return self._commands.refuse("set_gripper: the robot has no gripper")
@@ -159,7 +159,7 @@ class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
         return command
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
-        """Stop all motion, or only the given command if it still runs."""
+        """Stops all motion, or only the given command if it still runs."""
         refusal = self._leases.refusal(lease)
         if refusal:
             return self._commands.refuse(f"stop: {refusal}")
@@ -179,23 +179,23 @@ class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
         return self._leases.current
 
     def acquire_lease(self, holder: str) -> Lease:
-        """Take a free lease. Raises LeaseError when another holds it."""
+        """Takes a free lease. Raises LeaseError when another holds it."""
         return self._leases.acquire(holder)
 
     def take_lease(self, holder: str) -> Lease:
-        """Take the lease from whoever holds it; the robot stops."""
+        """Takes the lease from whoever holds it; the robot stops."""
         self._halt_all("the lease was taken by " + repr(holder))
         return self._leases.take(holder)
 
     def return_lease(self, lease: Lease) -> None:
-        """Give the lease back; the robot stops. A lease that was taken away is ignored."""
+        """Gives the lease back; the robot stops. A lease that was taken away is ignored."""
         if self._leases.give_back(lease):
             self._halt_all("the lease was returned")
 
     # -- called by the simulation ---------------------------------------------------------------------------------
 
     def sense(self, now_s: float) -> None:
-        """Take new sensor readings."""
+        """Takes new sensor readings."""
         self._now_s = now_s
         self._sensors.update(now_s)
 
@@ -219,13 +219,13 @@ class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
         return {**super().state(), "arm_moves": self._commands.running(Part.ARM) is not None}
 
     def restore(self, state: State) -> None:
-        """Have such a state: an arm that was moving holds where it is; the gripper keeps its clamp."""
+        """Has such a state: an arm that was moving holds where it is; the gripper keeps its clamp."""
         super().restore(state)
         if state["arm_moves"]:
             self._arm.hold(self._joints())
 
     def power_up(self, now_s: float) -> None:
-        """Begin again where it stands: nobody has the lease, no command runs; take readings."""
+        """Begins again where it stands: nobody has the lease, no command runs; take readings."""
         self._now_s = now_s
         self._commands, self._leases = CommandTable(), LeaseManager(self._name)
         self._sensors.power_up(now_s)
@@ -241,7 +241,7 @@ class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
         """Positions and velocities that all joints but the arm's are to have after dt_s."""
 
     def _hold_still(self, part: Part) -> None:
-        """Make where a part is the place where it stays; a gripper that clamps something goes on clamping."""
+        """Makes where a part is the place where it stays; a gripper that clamps something goes on clamping."""
         if part is Part.ARM:
             self._arm.hold(self._joints())
         if part is Part.GRIPPER:

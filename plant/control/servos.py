@@ -94,7 +94,7 @@ class GripperServo(Kept, keeps=("goal", "_before", "_still_s")):
         self._still_s = 0.0
 
     def begin(self, goal: GripperGoal) -> None:
-        """Take a new goal."""
+        """Takes a new goal."""
         self._before, self.goal = self.goal, goal
         self._still_s = 0.0
 

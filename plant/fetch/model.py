@@ -42,7 +42,7 @@ class FetchModel(RobotBody):
     """Fetch's bodies and joints in a plant. It stands on its wheels and casters; its fingers are geared together."""
 
     def __init__(self, plant: MultibodyPlant, name: str, *, kind: RobotKind, limits: WheelLimits) -> None:
-        """Add the robot to `plant` (before Finalize)."""
+        """Adds the robot to `plant` (before Finalize)."""
         super().__init__(plant, name, kind, fetch_urdf(), _GAINS)
         self.limits, self.base = limits, plant.GetBodyByName(BASE_LINK, self.instance)
         left, right = (plant.GetJointByName(finger, self.instance) for finger in FINGERS)
@@ -58,7 +58,7 @@ class FetchModel(RobotBody):
         return JointIndex(self.plant, self.instance)
 
     def place(self, context: Context, pose: Pose2D) -> None:
-        """Set the robot on its wheels at a pose, the torso as for travelling and the arm stowed."""
+        """Sets the robot on its wheels at a pose, the torso as for travelling and the arm stowed."""
         facts = fetch_facts()
         angles = {**facts["stowed"], LIFT_JOINT: facts["capabilities"]["travelling_lift"]}
         positions = self.plant.GetPositions(context)

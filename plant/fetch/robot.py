@@ -48,7 +48,7 @@ class FetchRobot(CommandedRobot, keeps=("_fingers_m", "_wheels", "_head", "_head
     _index: JointIndex
 
     def __init__(self, model: FetchModel, sensors: FetchSensors, context: Context) -> None:
-        """Take over the robot as it stands in the plant's `context` at time 0."""
+        """Takes over the robot as it stands in the plant's `context` at time 0."""
         super().__init__(model, model.index(), sensors, context, _GRIPPER_TOLERANCES)
         self._encoders, index, joints = sensors, self._index, self._joints()
         self._fingers_m = joints[index.fingers]
@@ -63,7 +63,7 @@ class FetchRobot(CommandedRobot, keeps=("_fingers_m", "_wheels", "_head", "_head
     # -- act ------------------------------------------------------------------------------------------------------
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Drive at a speed ahead (m/s) and a turn rate (rad/s) until the clock reads until_s; never sideways."""
+        """Drives at a speed ahead (m/s) and a turn rate (rad/s) until the clock reads until_s; never sideways."""
         if not all(math.isfinite(value) for value in (vx, vy, wz)):
             return self._commands.refuse(f"drive: velocity ({vx}, {vy}, {wz}) is not finite")
         if vy != 0.0:
@@ -71,7 +71,7 @@ class FetchRobot(CommandedRobot, keeps=("_fingers_m", "_wheels", "_head", "_head
         return self._begin(Part.VELOCITY, _Wanted(vx, wz), until_s, lease)
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Lift the torso until the body frame is at a height above the floor; it does not pitch."""
+        """Lifts the torso until the body frame is at a height above the floor; it does not pitch."""
         low, high = self._capabilities.height_range_m
         if not (low <= height_m <= high and pitch_rad == 0.0):
             return self._commands.refuse(
@@ -81,14 +81,14 @@ class FetchRobot(CommandedRobot, keeps=("_fingers_m", "_wheels", "_head", "_head
         return self._begin(Part.POSTURE, _LiftGoal(height_m), until_s, lease)
 
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
-        """Lower the torso; driving stops."""
+        """Lowers the torso; driving stops."""
         command = self._begin(Part.POSTURE, _LiftGoal(self._capabilities.height_range_m[0]), until_s, lease)
         if self._runs(command):
             self._commands.finish(Part.VELOCITY, CommandState.STOPPED, "the robot lowers its torso")
         return command
 
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Turn the head to a pan (positive to the left) and a tilt (positive looks down)."""
+        """Turns the head to a pan (positive to the left) and a tilt (positive looks down)."""
         head = self._capabilities.head
         assert head is not None
         (left, right), (up, down) = head.pan_range_rad, head.tilt_range_rad
@@ -148,7 +148,7 @@ class FetchRobot(CommandedRobot, keeps=("_fingers_m", "_wheels", "_head", "_head
             self._commands.finish(Part.HEAD, CommandState.DONE)
 
     def _fingers(self, desired: FloatArray, now_m: FloatArray, dt_s: float) -> None:
-        """Set points of the fingers: they go at their speed, and push with no more than the goal's force."""
+        """Sets points of the fingers: they go at their speed, and push with no more than the goal's force."""
         goal, most_m = self._gripper.goal, self._finger_m_s * dt_s
         self._fingers_m = self._fingers_m + np.clip(goal.opening / 2.0 - self._fingers_m, -most_m, most_m)
         lead_m = goal.force_n / FINGER_GAIN_N_M

@@ -62,7 +62,7 @@ class FetchSensors(SensorSuite, keeps=("_odometer",)):
         return np.asarray(positions[self._joints.positions[self._joints.wheels]], dtype=np.float64)
 
     def count_wheels(self, wheels_rad: FloatArray) -> None:
-        """Take in where the wheels (2,) are: encoders count faster than readings are asked for."""
+        """Takes in where the wheels (2,) are: encoders count faster than readings are asked for."""
         self._odometer.count(wheels_rad)
 
     def _reckoned(self, X_WB: RigidTransform) -> RigidTransform:

@@ -59,7 +59,7 @@ class WheelServos(Kept, keeps=("_speed", "_turn_rate", "_due_rad")):
         self.goal_rad, self.rate_rad_s, self._due_rad = now_rad.copy(), np.zeros(2), now_rad.copy()
 
     def follow(self, wanted: tuple[float, float], now_rad: FloatArray, dt_s: float, *, stopping: bool) -> None:
-        """Set the wheels for the next dt_s: ramp to a speed (m/s) and a turn rate (rad/s), faster when stopping."""
+        """Sets the wheels for the next dt_s: ramp to a speed (m/s) and a turn rate (rad/s), faster when stopping."""
         limits = self._limits
         most = limits.stop_deceleration_m_s2 if stopping else limits.acceleration_m_s2
         turn = limits.stop_turn_deceleration_rad_s2 if stopping else limits.turn_acceleration_rad_s2
@@ -80,7 +80,7 @@ class WheelOdometer(Kept, keeps=("pose", "_last_rad")):
         self.pose = Pose2D(0.0, 0.0, 0.0)
 
     def count(self, now_rad: FloatArray) -> None:
-        """Take in where the wheels are; the base went along an arc since the last time."""
+        """Takes in where the wheels are; the base went along an arc since the last time."""
         way_m, turn_rad = self._axle.travel(now_rad - self._last_rad)
         self._last_rad = now_rad.copy()
         middle = self.pose.yaw_rad + turn_rad / 2.0

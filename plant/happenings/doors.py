@@ -36,7 +36,7 @@ Outlines = Callable[[], Iterator[FloatArray]]
 
 
 def add_panel(plant: MultibodyPlant, door: DoorRule) -> ModelInstanceIndex:
-    """Add a door's panel to a plant (before Finalize), as a model instance of the door's name."""
+    """Adds a door's panel to a plant (before Finalize), as a model instance of the door's name."""
     instance = plant.AddModelInstance(door.name)
     size_m = (door.width, THICKNESS_M, HEIGHT_M)
     inertia = UnitInertia.SolidBox(*size_m)
@@ -53,7 +53,7 @@ def add_panel(plant: MultibodyPlant, door: DoorRule) -> ModelInstanceIndex:
 
 
 def _closed_at(door: DoorRule, now_s: float) -> bool:
-    """Whether a door should be closed at a time."""
+    """Returns whether a door should be closed at a time."""
     closes_s = math.inf if door.closes is None else door.closes
     opens_s = math.inf if door.opens is None else door.opens
     if closes_s <= opens_s:
@@ -75,7 +75,7 @@ def _pose(door: DoorRule, share: float) -> FloatArray:
 def slide(
     plant: MultibodyPlant, context: Context, instance: ModelInstanceIndex, pose: FloatArray, velocity: FloatArray
 ) -> None:
-    """Set (x, y, yaw) and their rates, where they are others, of a model that slides on a planar joint."""
+    """Sets (x, y, yaw) and their rates, where they are others, of a model that slides on a planar joint."""
     if np.abs(plant.GetPositions(context, instance) - pose).max() > _MOVED:
         plant.SetPositions(context, instance, pose)
     if np.abs(plant.GetVelocities(context, instance) - velocity).max() > _MOVED:
@@ -121,7 +121,7 @@ class Doors(Kept, keeps=("_panels",)):
 
     @property
     def still(self) -> bool:
-        """Whether there is no door that moves."""
+        """Returns whether there is no door that moves."""
         return not self._doors
 
     def history(self) -> Mapping[tuple[float, float], Sequence[tuple[float, float]]]:
@@ -129,7 +129,7 @@ class Doors(Kept, keeps=("_panels",)):
         return {door.at: tuple(self._panels[name].history) for name, door in self._doors.items()}
 
     def before_step(self, now_s: float, dt_s: float) -> None:
-        """Put each panel where it is, with the velocity that leads to where it will be after dt_s."""
+        """Puts each panel where it is, with the velocity that leads to where it will be after dt_s."""
         for name, door in self._doors.items():
             panel, closes = self._panels[name], _closed_at(door, now_s)
             if closes != panel.closes:
@@ -148,7 +148,7 @@ class Doors(Kept, keeps=("_panels",)):
         return share if share < 1.0 and self._occupied(door) else min(1.0, share + step)
 
     def _occupied(self, door: DoorRule) -> bool:
-        """Whether somebody is in the doorway."""
+        """Returns whether somebody is in the doorway."""
         half = 0.5 * door.width * np.array([math.cos(door.yaw), math.sin(door.yaw)])
         line = shapely.LineString([np.array(door.at) - half, np.array(door.at) + half])
         return any(shapely.distance(line, shapely.Polygon(each)) < CLEAR_M for each in self._outlines())

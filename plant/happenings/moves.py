@@ -48,11 +48,11 @@ class Moves(Kept, keeps=("_done",)):
         self._listeners: list[Callable[[str], None]] = []
 
     def listen(self, listener: Callable[[str], None]) -> None:
-        """Call `listener` with the name of each object that was moved."""
+        """Calls `listener` with the name of each object that was moved."""
         self._listeners.append(listener)
 
     def before_step(self, now_s: float, hands_W: Callable[[], Hands], holding: Sequence[str]) -> None:
-        """Move what is due. `hands_W` gives where the robots' hands are; `holding` are those that hold something."""
+        """Moves what is due. `hands_W` gives where the robots' hands are; `holding` are those that hold something."""
         for number, move in enumerate(self._world.moves):
             if number not in self._done and now_s >= move.at:
                 self._done |= {number}

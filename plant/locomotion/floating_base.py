@@ -70,7 +70,7 @@ class FloatingBase(Kept, keeps=("_velocity", "_target", "_posture")):
     def __init__(
         self, plant: MultibodyPlant, name: str, body: RigidBody, limits: FloatingBaseLimits | None = None
     ) -> None:
-        """Add the joints to `plant` (before Finalize) and weld `body` to the last of them."""
+        """Adds the joints to `plant` (before Finalize) and weld `body` to the last of them."""
         self._plant = plant
         self._limits = limits or FloatingBaseLimits()
         self.instance: ModelInstanceIndex = plant.AddModelInstance(f"{name}_floating_base")
@@ -137,7 +137,7 @@ class FloatingBase(Kept, keeps=("_velocity", "_target", "_posture")):
         return [joint.position_start() for joint in self._joints]
 
     def place(self, context: Context, pose: Pose2D, height_m: float) -> None:
-        """Set the body's pose at the beginning of a run."""
+        """Sets the body's pose at the beginning of a run."""
         values = (pose.x_m, pose.y_m, pose.yaw_rad, height_m, 0.0)
         positions = self._plant.GetPositions(context)
         positions[self._places] = values

@@ -98,6 +98,6 @@ def read_imported(folder: Path) -> ImportedObject:
 
 
 def write_imported(folder: Path, made: ImportedObject) -> None:
-    """Write what `read_imported` reads."""
+    """Writes what `read_imported` reads."""
     text = yaml_of(made.model_dump(mode="json", by_alias=True))
     (folder / FACTS_FILE).write_text(f"# Made by `errand object import`, don't edit.\n{text}", encoding="utf-8")

@@ -77,7 +77,7 @@ class Offers(Kept, keeps=("_still_since_s",)):
         self._still_since_s: dict[str, float] = {}
 
     def look(self, now_s: float, holding: Sequence[str]) -> None:
-        """Note which robots hold something out, and since when."""
+        """Notes which robots hold something out, and since when."""
         out = [name for name in holding if self._holds_out(name)]
         self._still_since_s = {name: self._still_since_s.get(name, now_s) for name in out}
 
@@ -96,7 +96,7 @@ class Offers(Kept, keeps=("_still_since_s",)):
         return at_hand and self._before_outline(offer.robot) and self._hand_m_s(offer.robot) < MOVES_M_S
 
     def grips(self, offer: Offer) -> bool:
-        """Whether the gripper still touches an object that touches nothing else."""
+        """Returns whether the gripper still touches an object that touches nothing else."""
         return self._free_in(offer.robot) == offer.thing
 
     def grip_W(self, robot: str) -> FloatArray:
@@ -131,7 +131,7 @@ class Offers(Kept, keeps=("_still_since_s",)):
             yield float(X_WG.translation()[2]) - _reach_m(kind, half_m, down)
 
     def _holds_out(self, robot: str) -> bool:
-        """Whether a robot that holds something keeps its hand still before itself, high enough."""
+        """Returns whether a robot that holds something keeps its hand still before itself, high enough."""
         if self._hand_m_s(robot) > STILL_M_S:
             return False
         return self.grip_W(robot)[2] >= LEAST_HEIGHT_M and self._before_outline(robot)
@@ -217,11 +217,11 @@ class Receiver(Kept, keeps=("phase", "offer", "_since_s", "_opening", "_p_HO", "
 
     @property
     def busy(self) -> bool:
-        """Whether they take something, or have something on the tray."""
+        """Returns whether they take something, or have something on the tray."""
         return self.phase is not Phase.IDLE or not self._home
 
     def look(self, now_s: float) -> None:
-        """Decide what to do next."""
+        """Decides what to do next."""
         if self.offer is None:
             self.offer = self._offers.near(self._X_WP().translation(), REACH_M, now_s - self._receiving.reaction_s)
             if self.offer is not None:
@@ -248,7 +248,7 @@ class Receiver(Kept, keeps=("phase", "offer", "_since_s", "_opening", "_p_HO", "
             self._turn_to(Phase.PULLING, now_s)
 
     def _end_receiving(self, offer: Offer, now_s: float) -> None:
-        """Pull again when the gripper still holds the object; put the tray away when the object is not on it."""
+        """Pulls again when the gripper still holds the object; put the tray away when the object is not on it."""
         if self._offers.grips(offer) and self._offers.holds(offer):
             self._grip(offer)
             self._turn_to(Phase.PULLING, now_s)
@@ -260,7 +260,7 @@ class Receiver(Kept, keeps=("phase", "offer", "_since_s", "_opening", "_p_HO", "
         self._opening, self._p_HO = self._offers.opening(offer.robot), self._offers.in_hand(offer)
 
     def _gives(self, offer: Offer, opens_rad: float = GIVES_RAD, moved_m: float = GIVES_M) -> bool:
-        """Whether the gripper gives way: somebody who pulls feels it sooner."""
+        """Returns whether the gripper gives way: somebody who pulls feels it sooner."""
         opened = self._offers.opening(offer.robot) - self._opening > opens_rad
         return opened or float(np.linalg.norm(self._offers.in_hand(offer) - self._p_HO)) > moved_m
 
@@ -277,7 +277,7 @@ class Receiver(Kept, keeps=("phase", "offer", "_since_s", "_opening", "_p_HO", "
         return np.asarray(force_n * np.array([*(math.sqrt(1.0 - DOWN**2) * along), -DOWN]))
 
     def move_tray(self, dt_s: float) -> None:
-        """Put the tray where it is, with the velocity that leads to where it will be after dt_s."""
+        """Puts the tray where it is, with the velocity that leads to where it will be after dt_s."""
         if self.phase is Phase.IDLE and self._home:
             if self._walks:
                 self._X_WT = self._home_W()
@@ -324,7 +324,7 @@ class Receiver(Kept, keeps=("phase", "offer", "_since_s", "_opening", "_p_HO", "
         return RigidTransform(RotationMatrix.MakeZRotation(yaw_rad), np.array([x, y, level_m]))
 
     def _on_tray(self, offer: Offer) -> bool:
-        """Whether the object is on the tray or just above it."""
+        """Returns whether the object is on the tray or just above it."""
         x, y, z = self._X_WT.inverse() @ self._offers.place_W(offer)
         return math.hypot(x, y) < ON_TRAY_M and -BELOW_M < z < ON_TRAY_M
 
@@ -343,7 +343,7 @@ class Receiver(Kept, keeps=("phase", "offer", "_since_s", "_opening", "_p_HO", "
         return self._X_WP() @ X_PT_HOME
 
     def _set(self, X_WT: RigidTransform, V_WT: SpatialVelocity) -> None:
-        """Set the tray's pose and velocity in the plant where they are others."""
+        """Sets the tray's pose and velocity in the plant where they are others."""
         plant, context, tray = self._plant, self._context, self._tray
         if not plant.EvalBodyPoseInWorld(context, tray).IsNearlyEqualTo(X_WT, _MOVED):
             plant.SetFreeBodyPose(context, tray, X_WT)

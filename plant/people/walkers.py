@@ -137,7 +137,7 @@ class Ground:
         return tuple(kept)
 
     def _straight(self, a: Point, b: Point, ends_W: Sequence[Point]) -> bool:
-        """Whether a person can go straight from a to b; near the ends, things may be nearer."""
+        """Returns whether a person can go straight from a to b; near the ends, things may be nearer."""
         points = np.linspace(a, b, max(2, math.ceil(math.dist(a, b) / (0.5 * _CELL_M))))
         near = np.any([np.hypot(*(points - end).T) < _NEAR_WAYPOINT_M for end in ends_W], axis=0)
         return bool(np.all(self._clear_m(points) >= np.where(near, LEAST_M, SHOULDERS_M) - 0.5 * _CELL_M))
@@ -216,20 +216,20 @@ class Walk(Kept, keeps=("_leg", "_way_m", "_wait_s", "_detour", "place_W", "yaw_
 
     @property
     def done(self) -> bool:
-        """Whether the person has come to the end of the route."""
+        """Returns whether the person has come to the end of the route."""
         return self._leg >= len(self._legs)
 
     @property
     def walks(self) -> bool:
-        """Whether the person is on the way, and not pausing."""
+        """Returns whether the person is on the way, and not pausing."""
         return not self.done and self._wait_s <= 0.0
 
     def set_off(self) -> None:
-        """End the pause."""
+        """Ends the pause."""
         self._wait_s = 0.0
 
     def detour(self, corners_W: tuple[Point, ...]) -> None:
-        """Go to the next stop on another way, from here."""
+        """Goes to the next stop on another way, from here."""
         leg = Leg(corners_W, self._legs[self._leg].pause_s)
         self._detour, self._way_m = (leg, leg.lengths_m()), 0.0
 
@@ -240,11 +240,11 @@ class Walk(Kept, keeps=("_leg", "_way_m", "_wait_s", "_detour", "place_W", "yaw_
 
     @property
     def on_detour(self) -> bool:
-        """Whether the person walks on another way than the planned one."""
+        """Returns whether the person walks on another way than the planned one."""
         return self._detour is not None
 
     def advance(self, dt_s: float) -> None:
-        """Go on for dt_s."""
+        """Goes on for dt_s."""
         if self.done:
             return
         if self._wait_s > 0.0:
@@ -311,7 +311,7 @@ class Walkers(Kept, keeps=("_walks",)):
 
     @property
     def still(self) -> bool:
-        """Whether nobody walks at all."""
+        """Returns whether nobody walks at all."""
         return not self._walks
 
     def places_W(self) -> Iterator[Point]:
@@ -319,7 +319,7 @@ class Walkers(Kept, keeps=("_walks",)):
         yield from (walk.place_W for walk in self._walks.values())
 
     def before_step(self, dt_s: float, standing: Collection[str] = ()) -> None:
-        """Put everybody where they are, with the velocity that leads to where they will be after dt_s.
+        """Puts everybody where they are, with the velocity that leads to where they will be after dt_s.
 
         Those `standing` stay where they are.
         """
@@ -337,7 +337,7 @@ class Walkers(Kept, keeps=("_walks",)):
             slide(self._plant, self._context, self._instances[name], np.array(before), velocity)
 
     def _wait(self, name: str, walk: Walk, dt_s: float) -> None:
-        """Stand for a robot; after a while, look for a way around."""
+        """Stands for a robot; after a while, looks for a way around."""
         walk.held_s += dt_s
         if walk.held_s < PATIENCE_S or self._ground is None:
             return
@@ -347,7 +347,7 @@ class Walkers(Kept, keeps=("_walks",)):
             walk.detour(around.way(walk.place_W, walk.next_stop_W, who=name))
 
     def _held(self, name: str, walk: Walk) -> bool:
-        """Whether somebody who is on the way stands for a robot."""
+        """Returns whether somebody who is on the way stands for a robot."""
         if not self._routes[name].yields:
             return False
         return any(self._close_ahead(walk, outline_W) for outline_W in self._outlines_W(walk))
@@ -362,7 +362,7 @@ class Walkers(Kept, keeps=("_walks",)):
                 yield X_WB.multiply(corners_B.T).T[:, :2]
 
     def _close_ahead(self, walk: Walk, outline_W: FloatArray) -> bool:
-        """Whether an outline is close to the person and before them."""
+        """Returns whether an outline is close to the person and before them."""
         offset = _nearest_on(outline_W, np.array(walk.place_W)) - walk.place_W
         if float(np.hypot(*offset)) > (PASS_M if walk.on_detour else YIELD_M):
             return False

@@ -56,14 +56,14 @@ class CollisionCounter(Kept, keeps=("_last_touched_s", "collisions")):
     """
 
     def __init__(self, entities: Mapping[int, Entity], debounce_s: float = 0.5) -> None:
-        """Start with a clean record."""
+        """Starts with a clean record."""
         self._entities, self._debounce_s = entities, debounce_s
         self._first_of = {entity.owner: number for number, entity in sorted(entities.items(), reverse=True)}
         self._last_touched_s: dict[Pair, float] | None = None
         self.collisions: list[Collision] = []
 
     def update(self, time_s: float, pairs: Mapping[Pair, float], speeds_m_s: Mapping[str, float]) -> None:
-        """Take in the pairs that touch at time_s, with the height of their lowest contact.
+        """Takes in the pairs that touch at time_s, with the height of their lowest contact.
 
         `speeds_m_s` are those of the robots just before they touched.
         """
@@ -82,7 +82,7 @@ class CollisionCounter(Kept, keeps=("_last_touched_s", "collisions")):
         return (self._first_of[a.owner], self._first_of[b.owner]) if whole else pair
 
     def _is_bump(self, pair: Pair, z: float) -> bool:
-        """Whether a touch is a collision: not feet on the floor, not loose objects, not a robot with itself."""
+        """Returns whether a touch is a collision: not feet on the floor, not loose objects, not a robot with itself."""
         kinds = {self._entities[index].kind for index in pair}
         if Kind.OBJECT in kinds or not kinds & ROBOT_KINDS:
             return False

@@ -77,7 +77,7 @@ class Entities:
         persons: Sequence[str],
         scenery: Mapping[GeometryId, str],
     ) -> Entities:
-        """Read the entities off a finalized plant. Raises ValueError that names what is not there.
+        """Reads the entities off a finalized plant. Raises ValueError that names what is not there.
 
         `scenery` names the pieces of furniture whose shapes belong to the world body.
         """

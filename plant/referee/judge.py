@@ -79,12 +79,12 @@ def _until_s(condition: GoalCondition, truth: Truth) -> float:
 
 
 def _is_past(condition: GoalCondition) -> bool:
-    """Whether only the past counts, not the end of the mission."""
+    """Returns whether only the past counts, not the end of the mission."""
     return condition.when is not When.END_OF_MISSION and condition.ended_s is not None
 
 
 def _taken_again(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
-    """Whether a later step of the same mission lifted it."""
+    """Returns whether a later step of the same mission lifted it."""
     ended_s = _until_s(condition, truth)
     return any(
         lift.time_s > ended_s and from_s <= lift.time_s <= until_s + SETTLE_S
@@ -114,7 +114,7 @@ def _judge_grasped(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _is_held(history: ObjectHistory, condition: GoalCondition, until_s: float) -> bool:
-    """Whether a robot has it in its gripper at the times at which it must."""
+    """Returns whether a robot has it in its gripper at the times at which it must."""
 
     def own(robot: str | None) -> bool:
         return robot is not None and condition.robot in (None, robot)
@@ -298,7 +298,7 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
-    """Compare the answer with the state of the door while the robot looked; while it moves, both answers are right."""
+    """Compares the answer with the state of the door while the robot looked; while it moves, both answers are right."""
     then_s = truth.now_s if condition.answered_s is None else condition.answered_s
     (doorway,) = condition.source
     changes = next((each for (x, y), each in truth.doors.items() if doorway.contains((x, y, 0.0))), ())
@@ -329,7 +329,7 @@ def _judge_cleared(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
-    """Whether it rested in the source when the step began, or came to rest there while it ran."""
+    """Returns whether it rested in the source when the step began, or came to rest there while it ran."""
     from_s, until_s = condition.from_s, _until_s(condition, truth)
     came = zip(history.rested_s, history.rests_W, strict=True)
     began_W = history.at(from_s)
@@ -338,7 +338,7 @@ def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> b
 
 
 def _is_left(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
-    """Whether it was in the source at the end of the step, or is there now though nobody put it back."""
+    """Returns whether it was in the source at the end of the step, or is there now though nobody put it back."""
     until_s = _until_s(condition, truth)
     put = history.put_by(until_s)
     then_W = put[1] if put is not None else history.at(until_s)

@@ -96,7 +96,7 @@ class ObjectHistory(Kept):
 
     @property
     def lies_where_others_put_it(self) -> bool:
-        """Whether somebody who is no robot moved it last."""
+        """Returns whether somebody who is no robot moved it last."""
         return len(self.rests_W) - 1 in self._by_others and not self._carried
 
     @property
@@ -172,11 +172,11 @@ class ObjectHistory(Kept):
         return next(held, None)
 
     def _ended_between(self, from_s: float, until_s: float) -> bool:
-        """Whether it came to rest, or was dropped, in that time."""
+        """Returns whether it came to rest, or was dropped, in that time."""
         return any(from_s < when_s <= until_s for when_s in (*self.rested_s, *self.dropped_s))
 
     def take(self, sample: ObjectSample) -> None:
-        """Take in one more sample."""
+        """Takes in one more sample."""
         with_hand = self._moves_with_hand(sample)
         self._measure_speed(sample)
         if sample.gripper is not None:
@@ -197,7 +197,7 @@ class ObjectHistory(Kept):
         self._note_rest(sample)
 
     def stay(self, time_s: float) -> None:
-        """Take in that all is as it was in the last sample."""
+        """Takes in that all is as it was in the last sample."""
         last, since_s = self.last, self._still_since_s
         rests = since_s is not None and time_s - since_s > 2.0 * REST_S and self.speed_m_s == 0.0
         if not (rests and last.supported and last.gripper is None and last.tray_of is None and not self._carried):
@@ -217,7 +217,7 @@ class ObjectHistory(Kept):
         self.events.append(f"Somebody moved the {self.name} at {time_s:.2f} s.")
 
     def forget_past(self) -> None:
-        """Start over for another mission: what is held keeps how it came there, all else counts from where it is."""
+        """Starts over for another mission: what is held keeps how it came there, all else counts from where it is."""
         if self._last is not None and self.held_by is None:
             self.lifts, self.rests_W, self.rested_s, self._by_others = [], [], [], []
             self._rests(self._last)
@@ -229,7 +229,7 @@ class ObjectHistory(Kept):
         self.speed_m_s = float(np.linalg.norm(sample.p_WO - self._last.p_WO)) / (sample.time_s - self._last.time_s)
 
     def _moves_with_hand(self, sample: ObjectSample) -> bool:
-        """Whether it keeps its place in the hand since the last sample."""
+        """Returns whether it keeps its place in the hand since the last sample."""
         last = self._last
         if last is None or sample.X_WH is None or last.X_WH is None or sample.time_s <= last.time_s:
             return False
@@ -237,7 +237,7 @@ class ObjectHistory(Kept):
         return float(np.linalg.norm(slip)) / (sample.time_s - last.time_s) < WITH_HAND_M_S
 
     def _note_lift(self, sample: ObjectSample, with_hand: bool) -> None:
-        """Begin a carry once the gripper has raised it clear of its place, or borne it well away from there."""
+        """Begins a carry once the gripper has raised it clear of its place, or borne it well away from there."""
         if sample.gripper is None or sample.supported or not with_hand:
             return
         way_W = sample.p_WO - self.rests_W[-1]
@@ -257,7 +257,7 @@ class ObjectHistory(Kept):
             self._left_z_m = float(sample.p_WO[2])
 
     def _note_fall(self, sample: ObjectSample) -> None:
-        """Count a drop once it is clear that it falls, or lies on the floor without having been set down there."""
+        """Counts a drop once it is clear that it falls, or lies on the floor without having been set down there."""
         if self._left_z_m is None or self._dropped:
             return
         set_down = self._grip_s - self._set_down_s <= SET_DOWN_S
@@ -267,7 +267,7 @@ class ObjectHistory(Kept):
             self.events.append(f"{self._grip_robot} dropped the {self.name} at {sample.time_s:.2f} s.")
 
     def _note_rest(self, sample: ObjectSample) -> None:
-        """End a carry, and remember the place, once it has lain still and let go for a while."""
+        """Ends a carry, and remember the place, once it has lain still and lets go for a while."""
         if not self.resting:
             self._still_since_s = None
             return
@@ -285,6 +285,6 @@ class ObjectHistory(Kept):
         self.rested_s.append(sample.time_s)
 
     def _note_knock(self, sample: ObjectSample) -> None:
-        """Tell of an object that came to lie lower without having been carried."""
+        """Tells of an object that came to lie lower without having been carried."""
         if not self._carried and self.rests_W[-1][2] - sample.p_WO[2] > FALL_M:
             self.events.append(f"The {self.name} was knocked down before {sample.time_s:.2f} s.")

@@ -49,7 +49,7 @@ class Referee(Kept, keeps=("_counter", "_histories", "_given", "_now_s", "_bases
         scenery: Mapping[GeometryId, str] = MappingProxyType({}),
         doors: DoorHistories = dict,
     ) -> None:
-        """Build for a finalized plant; `scenery` names the pieces of furniture whose shapes are the world body's.
+        """Builds for a finalized plant; `scenery` names the pieces of furniture whose shapes are the world body's.
 
         `placements` are the loose objects; those named in `persons` are people. `robots` has the kind of each robot by
         the name of its model instance, and `doors` gives `Truth.doors`. Raises ValueError that names what the plant
@@ -100,7 +100,7 @@ class Referee(Kept, keeps=("_counter", "_histories", "_given", "_now_s", "_bases
         return self._timed_path(robot)[:, :3]
 
     def observe(self, plant_context: Context, time_s: float, *, asleep: Collection[str] = ()) -> None:
-        """Take in the plant's state at time_s; objects that are `asleep` are as they were before."""
+        """Takes in the plant's state at time_s; objects that are `asleep` are as they were before."""
         penetrations = self._geometry.Eval(plant_context).ComputePointPairPenetration()
         self.contact_points += len(penetrations)
         pairs = touching(penetrations, self._entities.of_geometry)
@@ -123,7 +123,7 @@ class Referee(Kept, keeps=("_counter", "_histories", "_given", "_now_s", "_bases
         self._note_given(time_s)
 
     def judge(self, conditions: Sequence[GoalCondition]) -> Verdict:
-        """Whether all conditions hold at their times. Raises ValueError before the first sample."""
+        """Returns whether all conditions hold at their times. Raises ValueError before the first sample."""
         if not self._bases:
             raise ValueError("the referee has not observed anything yet")
         truth = Truth(
@@ -137,7 +137,7 @@ class Referee(Kept, keeps=("_counter", "_histories", "_given", "_now_s", "_bases
         return judge(conditions, truth, bumps=self._counter.collisions)
 
     def go_on(self, state: State, paths: Mapping[str, FloatArray]) -> None:
-        """Go on with such a record; paths are arrays (N, 4) of `points`. Raises ValueError: they have no times."""
+        """Goes on with such a record; paths are arrays (N, 4) of `points`. Raises ValueError: they have no times."""
         if any(path.shape[1:] != (PATH_VALUES,) for path in paths.values()):
             raise ValueError("paths without times")
         self.restore(state)

@@ -52,13 +52,13 @@ class Truth:
 
 
 def extend(path: list[FloatArray], p_W: FloatArray, time_s: float) -> None:
-    """Add a point to a path, with its time, when it is some way from the last."""
+    """Adds a point to a path, with its time, when it is some way from the last."""
     if not path or float(np.linalg.norm(p_W[:2] - path[-1][:2])) >= PATH_STEP_M:
         path.append(np.append(p_W, time_s))
 
 
 def note_stay(stays: list[tuple[float, float]], time_s: float) -> None:
-    """Add that an object rests on a tray now: the last stay goes on, unless it ended some time ago."""
+    """Adds that an object rests on a tray now: the last stay goes on, unless it ended some time ago."""
     goes_on = bool(stays) and time_s - stays[-1][1] <= ON_TRAY_GAP_S
     first_s = stays.pop()[0] if goes_on else time_s
     stays.append((first_s, time_s))

@@ -53,7 +53,7 @@ class NoiseTile:
     """Standard normal grain, larger than the picture, cropped at a random place for every picture."""
 
     def __init__(self, rng: np.random.Generator, height: int, width: int, channels: int = 1) -> None:
-        """Draw the tile for pictures of height x width x channels."""
+        """Draws the tile for pictures of height x width x channels."""
         self._rng, self._height, self._width = rng, height, width
         shape = (height + _TILE_MARGIN, width + _TILE_MARGIN, channels)
         self._tile = rng.standard_normal(shape, dtype=np.float32)

@@ -252,7 +252,7 @@ class Lidar(NoisySensor):
         spec: LidarSpec | None = None,
         work: Counter[str] | None = None,
     ) -> None:
-        """Build for a finalized plant.
+        """Builds for a finalized plant.
 
         `unseen` are the model instances that the beams pass through, by default the one that carries the lidar.
         The rays cast are counted in `work`.

@@ -63,7 +63,7 @@ class ImuModel(NoisySensor, keeps=("_last",)):
     """The IMU of one robot; acceleration comes from the change of velocity between two updates."""
 
     def __init__(self, rng: np.random.Generator, noise: ImuNoise | None = None) -> None:
-        """Draw this run's biases."""
+        """Draws this run's biases."""
         super().__init__(rng)
         self._noise = noise or ImuNoise()
         self._gyro_bias = rng.normal(0.0, self._noise.gyro_bias_rad_s, 3)
@@ -108,7 +108,7 @@ class BatteryModel(NoisySensor, keeps=("_charge", "_stamp_s")):
     """The battery of one robot."""
 
     def __init__(self, rng: np.random.Generator, charge: float = 1.0, spec: BatterySpec | None = None) -> None:
-        """Start with a charge from 0 to 1. Raises ValueError for another."""
+        """Starts with a charge from 0 to 1. Raises ValueError for another."""
         if not 0.0 <= charge <= 1.0:
             raise ValueError(f"battery charge must be from 0 to 1, not {charge}")
         super().__init__(rng)
@@ -168,7 +168,7 @@ class OdometryModel(NoisySensor, keeps=("_last",)):
     """Odometry of one robot. `odom` (O) lies on the floor under the body at the first update."""
 
     def __init__(self, rng: np.random.Generator, noise: OdometryNoise | None = None) -> None:
-        """Draw this run's systematic errors."""
+        """Draws this run's systematic errors."""
         super().__init__(rng)
         self._noise = noise or OdometryNoise()
         scale, turn_scale, drift = np.clip(rng.standard_normal(3), -2.0, 2.0)
@@ -257,7 +257,7 @@ class GripperModel(NoisySensor, keeps=("_holding", "_changing_since_s")):
     """The gripper of one robot."""
 
     def __init__(self, rng: np.random.Generator, noise: GripperNoise | None = None) -> None:
-        """Start empty. A share of the force error is systematic and drawn here."""
+        """Starts empty. A share of the force error is systematic and drawn here."""
         super().__init__(rng)
         self._noise = noise or GripperNoise()
         self._force_scale = 1.0 + float(rng.normal(0.0, self._noise.force_share))
@@ -276,7 +276,7 @@ class GripperModel(NoisySensor, keeps=("_holding", "_changing_since_s")):
         return Gripper(stamp_s, max(0.0, read), force, self._holding)
 
     def _settle(self, stamp_s: float, gripped: bool) -> None:
-        """Change the belief once the readings have said so for long enough."""
+        """Changes the belief once the readings have said so for long enough."""
         if gripped == self._holding:
             self._changing_since_s = None
             return

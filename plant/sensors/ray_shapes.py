@@ -81,7 +81,7 @@ class RayScene:
         inspector: SceneGraphInspector,
         exclude_instances: Collection[ModelInstanceIndex] = (),
     ) -> None:
-        """Read the shapes of a finalized plant that is registered with the inspector's scene graph."""
+        """Reads the shapes of a finalized plant that is registered with the inspector's scene graph."""
         self._plant = plant
         excluded = {int(instance) for instance in exclude_instances}
         default_context = plant.CreateDefaultContext()

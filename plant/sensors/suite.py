@@ -98,14 +98,14 @@ class SensorSuite(
         return plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(link, self._body.instance).index())
 
     def power_up(self, now_s: float) -> None:
-        """Take the first readings."""
+        """Takes the first readings."""
         self._scan: Scan | None = None
         self._revolution: Callable[[], Scan] | None = None
         self._scanned_s = -math.inf
         self.update(now_s)
 
     def update(self, now_s: float) -> None:
-        """Take new readings of all but the cameras."""
+        """Takes new readings of all but the cameras."""
         plant, index = self._body.plant, self._index
         self._now_s = now_s
         X_WB = plant.EvalBodyPoseInWorld(self._context, self._body.body)
@@ -159,7 +159,7 @@ class SensorSuite(
         return self._index.efforts_of(desired, feed_forward, positions, rates)
 
     def _docked(self, X_WB: RigidTransform, v_WB: FloatArray) -> bool:
-        """Whether the body stands still at the dock."""
+        """Returns whether the body stands still at the dock."""
         if self._dock is None:
             return False
         p_WB = X_WB.translation()
@@ -167,7 +167,7 @@ class SensorSuite(
         return off_m < _DOCKED_WITHIN_M and float(np.linalg.norm(v_WB[:2])) < _STILL_M_S
 
     def image(self, source: str, *, visual: bool, depth: bool) -> Image:
-        """Render a picture, its depth, or both, as all was at the last `update`.
+        """Renders a picture, its depth, or both, as all was at the last `update`.
 
         Raises:
             ValueError: the source is unknown.

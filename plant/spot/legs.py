@@ -178,7 +178,7 @@ class Trot(Kept, keeps=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_progr
         self._progress_s = 0.0
 
     def reset(self, motion: BodyMotion) -> None:
-        """Put all feet to rest under a body at this pose."""
+        """Puts all feet to rest under a body at this pose."""
         self._feet_W = [[*self._place(foot, motion, 0.0), self._parameters.foot_radius_m] for foot in range(len(LEGS))]
         self._swinging = None
         self._progress_s = 0.0

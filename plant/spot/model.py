@@ -100,7 +100,7 @@ class SpotModel(RobotBody):
         carried: bool = True,
         limits: FloatingBaseLimits | None = None,
     ) -> None:
-        """Add the robot to `plant` (before Finalize); a robot that is not carried keeps its free base."""
+        """Adds the robot to `plant` (before Finalize); a robot that is not carried keeps its free base."""
         meshes = visuals_folder() if visuals else None
         legs = {joint: _LEG_GAINS for leg in LEGS for joint in leg_joint_names(leg)}
         packages = {} if meshes is None else {VISUALS_PACKAGE: meshes}
@@ -120,14 +120,14 @@ class SpotModel(RobotBody):
         return super().instances() if self.floating_base is None else (self.instance, self.floating_base.instance)
 
     def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
-        """Let links of this robot pass each other, and its legs the floor while it is carried."""
+        """Lets links of this robot pass each other, and its legs the floor while it is carried."""
         super().filter_collisions(filters, floor)
         if self.floating_base is not None:
             legs = [geometry for leg in LEGS for geometry in self.geometries(leg)]
             filters.Apply(CollisionFilterDeclaration().ExcludeBetween(GeometrySet(legs), floor))
 
     def place(self, context: Context, pose: Pose2D) -> None:
-        """Set the robot standing at a pose with its arm stowed."""
+        """Sets the robot standing at a pose with its arm stowed."""
         facts = spot_facts()
         for leg in LEGS:
             for joint in leg_joint_names(leg):

@@ -27,7 +27,7 @@ class SpotRobot(CommandedRobot, keeps=("_posture", "_leg_servos", "_trot", "_flo
     _index: JointIndex
 
     def __init__(self, model: SpotModel, sensors: SpotSensors, context: Context) -> None:
-        """Take over the robot as it stands in the plant's `context` at time 0."""
+        """Takes over the robot as it stands in the plant's `context` at time 0."""
         super().__init__(model, model.index(), sensors, context, _GRIPPER_TOLERANCES)
         self._body, self._floating_base = model.body, model.floating_base
         self._posture = (float(spot_facts()["capabilities"]["standing_height"]), 0.0)
@@ -39,7 +39,7 @@ class SpotRobot(CommandedRobot, keeps=("_posture", "_leg_servos", "_trot", "_flo
     # -- act ------------------------------------------------------------------------------------------------------
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Walk at a body-frame velocity until the clock reads until_s."""
+        """Walks at a body-frame velocity until the clock reads until_s."""
         if not all(math.isfinite(value) for value in (vx, vy, wz)):
             return self._commands.refuse(f"drive: velocity ({vx}, {vy}, {wz}) is not finite")
         if self._posture[0] < spot_facts()["capabilities"]["height_range"][0] - 0.02:
@@ -47,7 +47,7 @@ class SpotRobot(CommandedRobot, keeps=("_posture", "_leg_servos", "_trot", "_flo
         return self._begin(Part.VELOCITY, Velocity(vx, vy, wz), until_s, lease)
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Hold the body origin at a height above the floor and a pitch."""
+        """Holds the body origin at a height above the floor and a pitch."""
         low, high = self._capabilities.height_range_m
         least, most = self._capabilities.pitch_range_rad
         if not (low <= height_m <= high and least <= pitch_rad <= most):
@@ -58,7 +58,7 @@ class SpotRobot(CommandedRobot, keeps=("_posture", "_leg_servos", "_trot", "_flo
         return self._begin(Part.POSTURE, (height_m, pitch_rad), until_s, lease)
 
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
-        """Lower the body to the floor; driving stops."""
+        """Lowers the body to the floor; driving stops."""
         command = self._begin(Part.POSTURE, (spot_facts()["capabilities"]["sitting_height"], 0.0), until_s, lease)
         if self._runs(command):
             self._commands.finish(Part.VELOCITY, CommandState.STOPPED, "the robot sits down")

@@ -47,7 +47,7 @@ _LIBRARY: Final = re.compile(rb"^\s*mtllib\s+(\S[^\r\n]*)", re.MULTILINE)
 
 
 def check_directives(file: Path, home: Path) -> None:
-    """Check Drake model directives and all that they name, in the folder `home`.
+    """Checks Drake model directives and all that they name, in the folder `home`.
 
     Raises:
         InputError: with file and line: a file is missing, no plain file, too large, elsewhere, broken, or names itself.
@@ -56,7 +56,7 @@ def check_directives(file: Path, home: Path) -> None:
 
 
 def check_model(file: Path, home: Path) -> None:
-    """Check a model's file and all that it names, in the folder `home`. Raises InputError as `check_directives`."""
+    """Checks a model's file and all that it names, in the folder `home`. Raises InputError as `check_directives`."""
     _Walk(home.resolve()).model(file, ())
 
 
@@ -69,7 +69,7 @@ class _Walk:
     files: int = 0
 
     def directives(self, file: Path, chain: tuple[Path, ...]) -> None:
-        """Check directives that the files of `chain` led to."""
+        """Checks directives that the files of `chain` led to."""
         source = read_yaml(file, TAGS)
         listed = source.data.get("directives") if isinstance(source.data, dict) else None
         if not isinstance(listed, list):
@@ -83,7 +83,7 @@ class _Walk:
                 self._follow(file, source.line(place), name, (*chain, file.resolve()), kind == "add_directives")
 
     def model(self, file: Path, chain: tuple[Path, ...]) -> None:
-        """Check a model, mesh or picture that the files of `chain` led to."""
+        """Checks a model, mesh or picture that the files of `chain` led to."""
         kind = file.suffix.lower()
         if kind in _PICTURES:
             from skills.files.pictures import check_picture  # brings OpenCV, which most commands do not need
@@ -98,7 +98,7 @@ class _Walk:
             self._follow(file, line, name, (*chain, file.resolve()), False)
 
     def _follow(self, file: Path, line: int | None, name: object, chain: tuple[Path, ...], directives: bool) -> None:
-        """Check the file that `file` names in a line."""
+        """Checks the file that `file` names in a line."""
 
         def error(what: str, hint: str) -> InputError:
             return InputError(what, hint=hint, file=file, line=line)
@@ -143,7 +143,7 @@ class _Walk:
 
 
 def _is_ours(path: Path) -> bool:
-    """Whether a file comes with the plant."""
+    """Returns whether a file comes with the plant."""
     try:
         return path.resolve().is_relative_to(OURS) and path.is_file()
     except (OSError, ValueError, RuntimeError):

@@ -292,7 +292,7 @@ def _band_m(path: Path) -> tuple[float, float]:
 
 
 def add_package(package_map: PackageMap) -> None:
-    """Make `package://errand/` mean the plant's folder, as worlds and models use it."""
+    """Makes `package://errand/` mean the plant's folder, as worlds and models use it."""
     package_map.Add(PACKAGE_NAME, WORLDS_FOLDER.parent)
 
 
@@ -302,7 +302,7 @@ def known_worlds() -> tuple[str, ...]:
 
 
 def load_world(name_or_path: str | Path) -> World:
-    """Load a world by its name, or by the path of its folder.
+    """Loads a world by its name, or by the path of its folder.
 
     Raises:
         InputError: with file and line: there is no such world, or one of its files, or what that names, is wrong.

@@ -41,13 +41,13 @@ class Charge(Skill[ChargeInputs]):
     max_data_age_s: ClassVar[Mapping[str, float]] = {"battery": 10.0}
 
     def begin(self, inputs: ChargeInputs) -> None:
-        """Start anew."""
+        """Starts anew."""
         self._level = inputs.level
         self._begun_at = self._best = self.context.robot.battery().charge
         self._best_s = self.context.clock.now()
 
     def step(self) -> Step:
-        """Look at the battery."""
+        """Looks at the battery."""
         if not 0.0 <= self._level <= 1.0:
             return Failed(Cause.PRECONDITION, f"a charge is from 0 to 1, not {self._level:g}")
         charge, now_s = self.context.robot.battery().charge, self.context.clock.now()

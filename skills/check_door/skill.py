@@ -68,7 +68,7 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
     max_data_age_s: ClassVar[Mapping[str, float]] = {"scan": 0.5, "localisation": 1.0}
 
     def run(self, inputs: CheckDoorInputs) -> Routine[Succeeded]:
-        """Look until it can be told."""
+        """Looks until it can be told."""
         door = Doorway(inputs.middle_W, inputs.width_m, inputs.through_rad)
         for look in range(self.options.looks):
             if look:

@@ -29,13 +29,13 @@ class ClearCostmap(Skill[ClearCostmapInputs]):
     default_timeout_s: ClassVar[float] = 10.0
 
     def begin(self, inputs: ClearCostmapInputs) -> None:
-        """Start anew."""
+        """Starts anew."""
         self._inputs = inputs
         self._cleared: int | None = None
         self._end_s = 0.0
 
     def step(self) -> Step:
-        """Clear at the first step, then look."""
+        """Clears at the first step, then look."""
         costmap, now_s = self.context.costmap, self.context.clock.now()
         if self._cleared is None:
             if not isinstance(costmap, ForgettingCostmap):

@@ -95,7 +95,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
     options: DetectOptions
 
     def run(self, inputs: DetectInputs) -> Routine[Succeeded]:
-        """Look at each surface in turn; an object counts when a second look from beside agrees."""
+        """Looks at each surface in turn; an object counts when a second look from beside agrees."""
         self._check(inputs)
         self.context.publish("object_to_detect", object_to_detect_message(self.context, inputs.classes))
         X_WB = self.X_WB()
@@ -122,7 +122,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         return (yield from self._ended(inputs, blocked if len(blocked) == len(targets) else []))
 
     def _check(self, inputs: DetectInputs) -> None:
-        """Raise SkillFailure with cause PRECONDITION for what cannot be looked for."""
+        """Raises SkillFailure with cause PRECONDITION for what cannot be looked for."""
         knows = set(self.context.detector.class_names) & set(class_forms()) | {THING}
         unknown = [name for name in inputs.classes if name not in knows]
         unknown += [word for word in inputs.attributes if word.lower() not in known_attributes()]
@@ -142,7 +142,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         return 0 < inputs.count <= len(self._found(inputs))
 
     def _look_closer(self, inputs: DetectInputs) -> Routine[None]:
-        """Look from near where the object is expected, or at what was not named and may be what is wanted.
+        """Looks from near where the object is expected, or at what was not named and may be what is wanted.
 
         What was looked at from near already is looked at from above.
         """
@@ -165,7 +165,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
             self._clusters = kept
 
     def _look_around(self, inputs: DetectInputs) -> Routine[None]:
-        """Look from either side at what something hides; a camera on a head has no other side."""
+        """Looks from either side at what something hides; a camera on a head has no other side."""
         around = inputs.expected_W is None and self.object_camera.on_hand
         for p_W in self._coverage.hidden_middle_W().values() if around else ():
             for shift_rad in self.options.around_rad:
@@ -175,7 +175,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
                 yield from self._look_and_confirm(inputs, p_BT, [], shift_rad=shift_rad)
 
     def _look_from_above(self, inputs: DetectInputs, targets_W: Sequence[FloatArray]) -> Routine[None]:
-        """Look from a body that stands as high as it can, where the camera is on a head: it looks flat over tables.
+        """Looks from a body that stands as high as it can, where the camera is on a head: it looks flat over tables.
 
         It stays there when that shows what is looked for, which may not be seen from lower down.
         """
@@ -191,7 +191,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         yield from self.stand_as_usual()
 
     def _refresh(self, inputs: DetectInputs) -> Routine[None]:
-        """Look once more at what was seen last, when that is a while ago: an answer rests on fresh pictures."""
+        """Looks once more at what was seen last, when that is a while ago: an answer rests on fresh pictures."""
         if (track := self._seen_a_while_ago(inputs)) is not None:
             yield from self._look_and_confirm(inputs, self.X_WB().inverse() @ track.position_W, [])
         if (track := self._seen_a_while_ago(inputs)) is not None:  # from there it did not show: from where it did
@@ -219,7 +219,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         shift_rad: float = 0.0,
         raised_m: float = 0.0,
     ) -> Routine[None]:
-        """Look at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
+        """Looks at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
         viewpoints = self._viewpoints(p_BT, shift_rad, close=close)
         failure = yield from self._look_if_possible(inputs, p_BT, viewpoints, raised_m)
         if failure is not None:
@@ -235,7 +235,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
     def _look_if_possible(
         self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray], raised_m: float = 0.0
     ) -> Routine[SkillFailure | None]:
-        """Look at a point, unless the arm cannot: then why."""
+        """Looks at a point, unless the arm cannot: then why."""
         try:
             yield from self.look(inputs, p_BT, viewpoints_B, raised_m)
         except SkillFailure as failure:
@@ -311,7 +311,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         viewpoints_B: Sequence[FloatArray],
         raised_m: float = 0.0,
     ) -> Routine[Look]:
-        """Point the camera at p_BT, from the first possible one of `viewpoints_B`, and take in what is seen.
+        """Points the camera at p_BT, from the first possible one of `viewpoints_B`, and takes in what is seen.
 
         One on a head looks from a body that is raised by so much.
         """
@@ -380,7 +380,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
 
 
 def _fits_near(inputs: DetectInputs) -> bool:
-    """Whether it was seen before and fits into a picture from near."""
+    """Returns whether it was seen before and fits into a picture from near."""
     return inputs.seen_before is not None and max(inputs.seen_before.size_m) < _FITS_NEAR_M
 
 
@@ -389,7 +389,7 @@ def _is_wanted(inputs: DetectInputs, track: Track) -> bool:
 
 
 def _is_sure(inputs: DetectInputs, track: Track) -> bool:
-    """Whether nothing more is to be seen of a track: for any object, its class does not matter."""
+    """Returns whether nothing more is to be seen of a track: for any object, its class does not matter."""
     views = 2 if inputs.seen_before is None else 1
     return track.stands(views) if THING in inputs.classes else track.confirmed(views)
 

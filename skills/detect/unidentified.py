@@ -127,12 +127,12 @@ def unnamed(clusters: Iterable[Cluster], tracks: Sequence[Track], classes: Seque
 
 
 def _doubted(track: Track, classes: Sequence[str]) -> bool:
-    """Whether a track is taken for something else than the classes, and not surely."""
+    """Returns whether a track is taken for something else than the classes, and not surely."""
     return track.class_name not in classes and any(track.classes.get(name, 0.0) > _DOUBTED for name in classes)
 
 
 def _may_be(cluster: Cluster, classes: Sequence[str]) -> bool:
-    """Whether a cluster has the size of an object of one of the classes."""
+    """Returns whether a cluster has the size of an object of one of the classes."""
     longest = max(cluster.shape.length_m, cluster.shape.height_m)
     ranges = (class_forms()[name].length_m for name in classes)
     return any(_SMALLEST * low < longest < _LARGEST * high for low, high in ranges)

@@ -77,7 +77,7 @@ def _samples(surface: Surface, step_m: float = 0.1) -> FloatArray:
 
 
 def in_plain_view(image: Image, X_WO: RigidTransform, p_W: FloatArray) -> bool:
-    """Whether a picture should show an object at a point: well inside, near, and with nothing before it."""
+    """Returns whether a picture should show an object at a point: well inside, near, and with nothing before it."""
     beside = p_W + np.array([[0.0, 0.0, 0.0], *(_EDGE_M * np.eye(3)), *(-_EDGE_M * np.eye(3))])
     depth, seen = depth_ahead_m(image, X_WO, beside)
     if not np.all(np.isfinite(depth)) or depth[0] > _PLAIN_M:

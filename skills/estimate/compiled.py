@@ -14,7 +14,7 @@ FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 
 def compiled(function: FunctionT) -> FunctionT:
-    """Compile at the first call, single-threaded and without reordering of floating point: equal runs stay equal."""
+    """Compiles at the first call, single-threaded and without reordering of floating point: equal runs stay equal."""
     return cast(FunctionT, CompiledFunction(function))
 
 
@@ -31,7 +31,7 @@ class CompiledFunction:
 
     @property
     def is_compiled(self) -> bool:
-        """Whether it was called, so that numba knows it."""
+        """Returns whether it was called, so that numba knows it."""
         return "machine_code" in self.__dict__
 
     @functools.cached_property
@@ -64,7 +64,7 @@ def bilinear(field: NDArray[np.float32], u: float, v: float) -> float:
 def distances(
     field: NDArray[np.float32], resolution_m: float, x0_m: float, y0_m: float, points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Look up (N, 2) points in a distance field (m); outside it, minus the distance to its edge."""
+    """Looks up (N, 2) points in a distance field (m); outside it, minus the distance to its edge."""
     rows, columns = field.shape
     values = np.empty(points.shape[0])
     for n in range(points.shape[0]):

@@ -89,7 +89,7 @@ class LayeredCostmap:
         return self._scan_stamp_s, self._returns_W
 
     def forget_seen(self, within_W: FloatArray | None = None) -> int:
-        """Forget what was seen and not surveyed, perhaps only within discs; how many cells were blocked by it."""
+        """Forgets what was seen and not surveyed, perhaps only within discs; how many cells were blocked by it."""
         cells = self._active()
         if within_W is None:
             self._candidate_s.fill(-math.inf)
@@ -108,7 +108,7 @@ class LayeredCostmap:
         self._left_out_W = discs_W
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Take in the newest scan, if it is new and the robot knows where it is."""
+        """Takes in the newest scan, if it is new and the robot knows where it is."""
         odometry = robot.odometry()
         X_WO = Pose2D.from_transform(localisation.X_WO)
         self._pass_time(odometry.stamp_s)
@@ -120,7 +120,7 @@ class LayeredCostmap:
             self._take_scan(scan, X_WO, partial(self._foreign, self._filter, robot, scan))
 
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        """Take in (N, 3) points of a depth camera that lie on things in the way; leave out the floor before."""
+        """Takes in (N, 3) points of a depth camera that lie on things in the way; leave out the floor before."""
         if self._X_WB is None or self._filter is None or len(points_W) == 0:
             return
         own = self._filter.foreign(in_body_axes(points_W, self._X_WB), np.empty((0, 3)))
@@ -135,7 +135,7 @@ class LayeredCostmap:
         self._note_change()
 
     def _pass_time(self, now_s: float) -> None:
-        """Forget what is too old."""
+        """Forgets what is too old."""
         self._now_s = now_s
         if now_s >= self._next_expiry_s:
             self._note_change()
@@ -166,7 +166,7 @@ class LayeredCostmap:
         return np.asarray((rotation @ points_L).T + translation)
 
     def _take_scan(self, scan: Scan, X_WO: Pose2D, foreign: Callable[[FloatArray], NDArray[np.bool_]]) -> None:
-        """Clear the cells that beams see past, then mark those that are hit, not explained and not the robot's own."""
+        """Clears the cells that beams see past, then mark those that are hit, not explained and not the robot's own."""
         options = self._options
         X_WF = compose(X_WO, Pose2D.from_transform(scan.X_OB))
         changed = self._clear(scan, X_WF)
@@ -185,7 +185,7 @@ class LayeredCostmap:
             self._note_change()
 
     def _clear(self, scan: Scan, X_WF: Pose2D) -> bool:
-        """Forget the cells that the scan's beams see past; True when there were any."""
+        """Forgets the cells that the scan's beams see past; True when there were any."""
         active = self._active()
         if len(active) == 0:
             return False

@@ -50,7 +50,7 @@ class OdometryLocaliser:
         return LocalisationEstimate(self._stamp_s, self._X_WO.transform(), np.diag(variance), self._last is not None)
 
     def update(self, robot: Robot) -> None:
-        """Take in the newest odometry."""
+        """Takes in the newest odometry."""
         odometry = robot.odometry()
         if self._last is None:
             self._X_WO = compose(self._start, inverse(odometry.pose))

@@ -115,7 +115,7 @@ class _MapFile(BaseModel):
 
 
 def load_grid_map(path: Path) -> GridMap:
-    """Read a map_server YAML file and the picture that it names, as map_server reads them.
+    """Reads a map_server YAML file and the picture that it names, as map_server reads them.
 
     Raises:
         InputError: with file and line: the file is no such map, or its picture cannot be used.

@@ -98,7 +98,7 @@ class ScanMatchingLocaliser:
         return LocalisationEstimate(self._stamp_s, self._transformed[1], covariance, self._localised, self._health())
 
     def update(self, robot: Robot) -> None:
-        """Take in the newest scan, if it is new."""
+        """Takes in the newest scan, if it is new."""
         if self._initial is not None:
             self._X_WO = compose(self._initial, inverse(robot.odometry().pose))
             self._initial = None
@@ -171,7 +171,7 @@ class ScanMatchingLocaliser:
         return np.ascontiguousarray(points_F[outside_discs(points_W, self._left_out_W)])
 
     def _predict(self, X_OB: Pose2D) -> None:
-        """Move the belief along with odometry and let its spread grow."""
+        """Moves the belief along with odometry and lets its spread grow."""
         before, self._X_OB = self._X_OB or X_OB, X_OB
         step = relative(before, X_OB)
         distance, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
@@ -183,7 +183,7 @@ class ScanMatchingLocaliser:
         self._covariance = jacobian @ self._covariance @ jacobian.T + np.diag([along**2, along**2, yaw**2])
 
     def _correct(self, points_F: FloatArray) -> None:
-        """Match the scan from the belief on; poor matches are counted, not believed."""
+        """Matches the scan from the belief on; poor matches are counted, not believed."""
         assert self._X_OB is not None
         prior = compose(self._X_WO, self._X_OB)
         found = match(self._grid, points_F, prior, self._covariance, self._options.matching)
@@ -199,13 +199,13 @@ class ScanMatchingLocaliser:
         self._believe(found)
 
     def _note_poor(self, inlier_share: float) -> None:
-        """Count a scan of which the map explains too little."""
+        """Counts a scan of which the map explains too little."""
         self._inlier_share = inlier_share
         self._poor_scans += 1
         self._localised = self._localised and self._poor_scans < self._options.lost_scans
 
     def _frozen(self, scan: Scan) -> bool:
-        """Whether a scan repeats an earlier one, noise and all, although the robot has moved since."""
+        """Returns whether a scan repeats an earlier one, noise and all, although the robot has moved since."""
         last = self._scan
         if last is None or not scan.repeats(last):
             self._scan = scan

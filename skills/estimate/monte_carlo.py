@@ -87,7 +87,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         return self._filter
 
     def particles_W(self, most: int) -> FloatArray:
-        """See `skills.api.ParticleView`."""
+        """Sees `skills.api.ParticleView`."""
         weights = np.cumsum(self._filter.weights)
         ends = (np.arange(most) + 0.5) / most * weights[-1]
         chosen = np.unique(np.searchsorted(weights, ends))
@@ -126,7 +126,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         return LocalisationEstimate(scan.stamp_s, X_WO, best.covariance, True, best.inlier_share)
 
     def _take_in(self, points_F: FloatArray) -> None:
-        """Carry the belief on by scan matching; when it is time, weigh the particles, and see what they say."""
+        """Carries the belief on by scan matching; when it is time, weighs the particles, and see what they say."""
         if self._localised:
             self._expected = False
         if self._placed:
@@ -141,7 +141,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         return self._mass * self._inlier_share if self._placed else 0.0
 
     def _due(self) -> bool:
-        """Whether the robot has moved enough since the last time, or waits to know where it is."""
+        """Returns whether the robot has moved enough since the last time, or waits to know where it is."""
         assert self._X_OB is not None
         if self._weighed_at is None:
             return True
@@ -166,7 +166,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         self._lost_covariance = particles.covariance
 
     def _judge(self, points_F: FloatArray) -> None:
-        """Go to where the particles are; know the place, or not any more."""
+        """Goes to where the particles are; know the place, or not any more."""
         assert self._X_OB is not None
         options = self._own
         self._mass = self._filter.mass_near(compose(self._X_WO, self._X_OB)) if self._placed else 0.0

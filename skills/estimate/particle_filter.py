@@ -104,7 +104,7 @@ class ParticleFilter:
         return _spread(self.poses, self.weights)[1]
 
     def place(self, mean: Pose2D, covariance: FloatArray) -> None:
-        """Put all particles around a pose."""
+        """Puts all particles around a pose."""
         self._replace(self.around(mean, covariance, self._options.min_particles))
 
     def scatter(self) -> None:
@@ -134,7 +134,7 @@ class ParticleFilter:
         return np.asarray(drawn[np.sort(first)[:count]])
 
     def move(self, step: Pose2D) -> None:
-        """Move each particle by a step of odometry, in the body frame, with the odometry's errors."""
+        """Moves each particle by a step of odometry, in the body frame, with the odometry's errors."""
         options = self._options
         way, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
         along = options.roughening_m + options.drift_per_m * way
@@ -147,7 +147,7 @@ class ParticleFilter:
         self.poses[:, 2] = wrap(self.poses[:, 2] + step.yaw_rad + noise[:, 2])
 
     def weigh(self, points_F: FloatArray) -> None:
-        """Weigh each particle by the beams (M, 2) of a scan."""
+        """Weighs each particle by the beams (M, 2) of a scan."""
         options = self._options
         everything = self.log_likelihoods(self.poses, points_F)
         fit = float(self.weights @ np.exp(everything))
@@ -168,11 +168,11 @@ class ParticleFilter:
         return _log_likelihoods(self._field, self._standable, self._geometry, poses, points)
 
     def forget(self) -> None:
-        """Begin the averages of the likelihood anew."""
+        """Begins the averages of the likelihood anew."""
         self._slow = self._fast = 0.0
 
     def resample(self, injected: FloatArray | None = None) -> None:
-        """Draw as many particles as the KL divergence asks for; the `injected` (K, 3) join them, weighed as equals."""
+        """Draws as many particles as the KL divergence asks for; the `injected` (K, 3) join them, weighed as equals."""
         options, joining = self._options, 0 if injected is None else len(injected)
         drawn = self._draw(min(options.max_particles, 4 * max(len(self.poses), options.min_particles)))
         count = self._enough(self.poses[drawn])

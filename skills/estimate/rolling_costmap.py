@@ -81,7 +81,7 @@ class RollingCostmap:
         return self._stamp_s, self._returns_W
 
     def forget_seen(self, within_W: FloatArray | None = None) -> int:
-        """Forget all, or what lies within discs; the number of cells that were blocked."""
+        """Forgets all, or what lies within discs; the number of cells that were blocked."""
         forgotten = np.ones(self._odds.shape, dtype=np.bool_)
         if within_W is not None:
             rows, columns = np.indices(self._odds.shape).reshape(2, -1)
@@ -95,7 +95,7 @@ class RollingCostmap:
         return blocked
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Move the window along, and take in the newest scan, if it is new."""
+        """Moves the window along, and takes in the newest scan, if it is new."""
         X_WO = Pose2D.from_transform(localisation.X_WO)
         self._X_WB = compose(X_WO, robot.odometry().pose)
         self._filter = self._filter or SelfFilter.of(robot.capabilities())
@@ -109,7 +109,7 @@ class RollingCostmap:
         self._changed()
 
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        """Take in (N, 3) points of a depth camera that lie on things in the way; leave out the floor before."""
+        """Takes in (N, 3) points of a depth camera that lie on things in the way; leave out the floor before."""
         if self._corner_m is None or self._filter is None or len(points_W) == 0:
             return
         points = points_W[self._filter.foreign(in_body_axes(points_W, self._X_WB), np.empty((0, 3)))]
@@ -132,7 +132,7 @@ class RollingCostmap:
         return np.asarray(np.all((cells >= 0) & (cells < self._odds.shape), axis=1))
 
     def _follow(self, X_WF: Pose2D) -> None:
-        """Keep the robot in the middle half of the window; what lies in the old and the new one is kept."""
+        """Keeps the robot in the middle half of the window; what lies in the old and the new one is kept."""
         cell, count = self._options.cell_m, self._odds.shape[0]
         place = np.array([X_WF.x_m, X_WF.y_m])
         corner = np.round(place / cell - 0.5 * count)
@@ -271,7 +271,7 @@ def _trace(
     gains: tuple[float, float, float],
     own: tuple[float, float, float, float],
 ) -> None:
-    """Lower the odds along each column of beams and raise them half a cell behind its end, in place.
+    """Lowers the odds along each column of beams and raises them half a cell behind its end, in place.
 
     `frame` is the cell size and the corner, `gains` hit, miss and the range; `slope` is that of the lowest beam. The
     ground under the robot is known.

@@ -13,7 +13,7 @@ from skills.robot import FloatArray, Scan
 
 
 def clear_cells(scan: Scan, centres_F: FloatArray, cell_m: float) -> NDArray[np.bool_]:
-    """Whether the beams of a whole revolution see past each place (N, 3) at its height.
+    """Returns whether the beams of a whole revolution see past each place (N, 3) at its height.
 
     A place counts as free when all beams that could have hit it go on for 0.3 m at least. A place that no beam can hit
     (too low, too near) shares the fate of a free place beside it: both were seen on one thing. Frame F is the levelled
@@ -84,7 +84,7 @@ def mark_cells(
     until_s: FloatArray,
     height_m: FloatArray,
 ) -> bool:
-    """Mark hit cells in place; True when any cell became blocked that was not.
+    """Marks hit cells in place; True when any cell became blocked that was not.
 
     `times` is the scan's stamp, within how long another scan must have hit the cell or a neighbour, and how long a
     blocked cell is remembered (s).

@@ -59,7 +59,7 @@ class SelfFilter:
         return SelfFilter((float(x0), float(x1), float(y0), float(y1)), arm)
 
     def foreign(self, points_F: FloatArray, arm_F: FloatArray, *, holding: bool = False) -> NDArray[np.bool_]:
-        """Whether each (x, y, z) row is none of the robot's.
+        """Returns whether each (x, y, z) row is none of the robot's.
 
         All are given in one frame with the body's axes; `arm_F` holds the arm's points (`ArmShape`) and may be empty.
         While `holding`, what is about the hand counts as the thing in it.

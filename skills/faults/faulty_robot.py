@@ -34,11 +34,11 @@ class _Armed:
         return result
 
     def on(self, now_s: float) -> bool:
-        """Whether it is the time of the fault."""
+        """Returns whether it is the time of the fault."""
         return self.fault.from_s - 1e-9 <= now_s < self.fault.to_s - 1e-9
 
     def concerns(self, verb: str, arguments: tuple[Any, ...]) -> bool:
-        """Whether the fault sees a call."""
+        """Returns whether the fault sees a call."""
         if verb == "image" and self.fault.source not in (None, *arguments[:1]):
             return False
         return verb in self.fault.effect.verbs | self.fault.effect.always

@@ -53,7 +53,7 @@ class Fault:
     source: str | None = None
 
     def over_by(self, now_s: float) -> bool:
-        """Whether it is over at a time; one that happens once is, when it has begun before."""
+        """Returns whether it is over at a time; one that happens once is, when it has begun before."""
         return now_s >= self.to_s or (self.effect.once and now_s > self.from_s)
 
 
@@ -100,7 +100,7 @@ def _span(words: str, when: re.Match[str]) -> tuple[float, float]:
 
 
 def _check_source(source: str, effect: Effect, cameras: Sequence[str]) -> None:
-    """Raise ValueError unless the effect is one on pictures, and the source one of the robot's, where it is known."""
+    """Raises ValueError unless the effect is one on pictures, and the source one of the robot's, where it is known."""
     if effect.verbs != {"image"}:
         raise ValueError(f"'.{source}' names a camera, and this fault is none of a camera; leave '.{source}' out")
     if cameras and source not in cameras:

@@ -97,7 +97,7 @@ def one_line(text: str) -> str:
 
 
 def disk_is_full(error: BaseException) -> bool:
-    """Whether it was raised since no space is left."""
+    """Returns whether it was raised since no space is left."""
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
@@ -111,18 +111,18 @@ class Problems:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: object) -> bool:
-        """Note an InputError and go on; all else passes."""
+        """Notes an InputError and goes on; all else passes."""
         if isinstance(error, InputError):
             self.add(error)
             return True
         return False
 
     def add(self, error: InputError) -> None:
-        """Note an error and those that came with it."""
+        """Notes an error and those that came with it."""
         self._errors += [error, *error.others]
 
     def raise_any(self) -> None:
-        """Raise the first, with the others; do nothing when there is none."""
+        """Raises the first, with the others; do nothing when there is none."""
         if self._errors:
             first, *others = self._errors
             raise InputError(first.message, hint=first.hint, file=first.file, line=first.line, others=others)
@@ -167,7 +167,7 @@ def few(words: Iterable[str]) -> str:
 
 
 def count_text(count: int, noun: str) -> str:
-    """Count with its noun: "1 door", "2 doors"."""
+    """Counts with its noun: "1 door", "2 doors"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 

@@ -23,17 +23,17 @@ _HIDDEN: Final = 100
 
 
 def is_file(path: Path) -> bool:
-    """Whether a plain file is at a path; False where the system refuses the name or the folder."""
+    """Returns whether a plain file is at a path; False where the system refuses the name or the folder."""
     return os.path.isfile(path)  # noqa: PTH113 (Path.is_file raises for a name that is too long)
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a folder is at a path; False as for `is_file`."""
+    """Returns whether a folder is at a path; False as for `is_file`."""
     return os.path.isdir(path)  # noqa: PTH112 (Path.is_dir raises for a name that is too long)
 
 
 def is_there(path: Path) -> bool:
-    """Whether anything is at a path; False as for `is_file`."""
+    """Returns whether anything is at a path; False as for `is_file`."""
     return os.path.exists(path)  # noqa: PTH110 (Path.exists raises for a name that is too long)
 
 
@@ -55,7 +55,7 @@ def read_bytes(file: Path, *, most_bytes: int, hint: str = "name a file that exi
 
 
 def plain_file(file: Path, *, most_bytes: int, hint: str = "name a file that exists") -> None:
-    """Check a file that a library will read. Raises InputError as `read_bytes` does, which see."""
+    """Checks a file that a library will read. Raises InputError as `read_bytes` does, which see."""
     try:
         found = file.stat()
         _refuse_special(found.st_mode, file)

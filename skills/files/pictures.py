@@ -43,7 +43,7 @@ def read_pixels(file: Path, *, flags: int = cv2.IMREAD_UNCHANGED, most_pixels: i
 
 
 def check_picture(file: Path, *, most_pixels: int = MOST_PIXELS) -> None:
-    """Check a picture file that a library will read. Raises InputError as `read_pixels` does, but for damage."""
+    """Checks a picture file that a library will read. Raises InputError as `read_pixels` does, but for damage."""
     content = _content(file, most_pixels)
     if _size(content) == (0, 0):
         raise _unreadable(file, content)

@@ -65,7 +65,7 @@ def run_plugin(entry: EntryPoint, call: Callable[[], ResultT], *, limit_s: float
 
 
 def run_in_thread(call: Callable[[], ResultT], *, limit_s: float) -> ResultT:
-    """Call the code of a plug-in in a thread, and return its result.
+    """Calls the code of a plug-in in a thread, and returns its result.
 
     Raises PluginDefect: the code raised something, or is not done within the limit (s, on the wall's clock); then its
     thread is left behind.
@@ -87,7 +87,7 @@ def run_in_thread(call: Callable[[], ResultT], *, limit_s: float) -> ResultT:
 
 @contextmanager
 def _ended_after(entry: EntryPoint, limit_s: float) -> Iterator[None]:
-    """End the process when the block takes too long; our own modules are given all the time that they take."""
+    """Ends the process when the block takes too long; our own modules are given all the time that they take."""
     if distribution_of(entry) == OURS:
         yield
         return

@@ -53,7 +53,7 @@ class YamlSource:
 def read_yaml(
     path: Path | str, tags: frozenset[str] = frozenset(), *, hint: str = "name a file that exists"
 ) -> YamlSource:
-    """Read one YAML document of plain data; `tags` are those that may stand in it, `hint` is for a missing file.
+    """Reads one YAML document of plain data; `tags` are those that may stand in it, `hint` is for a missing file.
 
     Raises:
         InputError: the file cannot be read, is too large, is no YAML, or has a key twice, or a tag.
@@ -63,7 +63,7 @@ def read_yaml(
 
 
 def parse_yaml(text: str, file: Path, tags: frozenset[str] = frozenset()) -> YamlSource:
-    """Parse the text of such a document, which stands in a file. Raises InputError as `read_yaml`."""
+    """Parses the text of such a document, which stands in a file. Raises InputError as `read_yaml`."""
     try:
         _refuse_deep(text, file)
         root = as_written(_composed(text))
@@ -88,7 +88,7 @@ def parse_yaml(text: str, file: Path, tags: frozenset[str] = frozenset()) -> Yam
 
 
 def _refuse_deep(text: str, file: Path) -> None:
-    """Raise InputError before the composer, which calls itself for each level, runs out of stack."""
+    """Raises InputError before the composer, which calls itself for each level, runs out of stack."""
     most = text.count("[") + text.count("{") + max(map(len, text.splitlines()), default=0)
     if most <= _SURELY_FLAT:
         return

@@ -69,7 +69,7 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
         return self._ended(inputs, tuple(_observation(one, inputs) for one in found))
 
     def _turn(self) -> Routine[None]:
-        """Turn in place as far as the footprint stays clear."""
+        """Turns in place as far as the footprint stays clear."""
         turn_rad_s, for_s = self.options.turn_rad_s, self.options.turn_rad / self.options.turn_rad_s
         costmap, footprint = self.context.costmap, ArmFootprint(self.context).now()
 

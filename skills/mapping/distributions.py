@@ -59,7 +59,7 @@ class Distributions:
         self._moments: Moments = np.zeros((cells, cells, _QUARTERS, 6), dtype=np.float32)
 
     def add(self, points_F: FloatArray, X_AF: Pose2D) -> None:
-        """Add the points (N, 3) of a scan taken at a pose: x, y, and the direction that the surface faces (rad)."""
+        """Adds the points (N, 3) of a scan taken at a pose: x, y, and the direction that the surface faces (rad)."""
         _add(self._moments, self._low_m, points_F, np.array([X_AF.x_m, X_AF.y_m, X_AF.yaw_rad]))
 
     def align(

@@ -97,7 +97,7 @@ def _hollow(
 
 
 def save_grids(folder: Path, grids: Surveyed, resolution_m: float = RESOLUTION_M) -> Path:
-    """Write `scan` and `keepout` as PGM and YAML; the path of the scan map's YAML. Raises OSError."""
+    """Writes `scan` and `keepout` as PGM and YAML; the path of the scan map's YAML. Raises OSError."""
     for band, probability in grids.probabilities.items():
         grey = np.where(grids.observed[band], np.rint(254.0 * (1.0 - probability)), 128.0).astype(np.uint8)
         rows, columns = grey.shape
@@ -113,7 +113,7 @@ def save_grids(folder: Path, grids: Surveyed, resolution_m: float = RESOLUTION_M
 
 
 def save_graph(folder: Path, mapper: Mapper) -> None:
-    """Write pose graph and keyframes, from which `load_mapper` goes on. Raises OSError."""
+    """Writes pose graph and keyframes, from which `load_mapper` goes on. Raises OSError."""
     frames, graph = mapper.keyframes, mapper.graph
     document = {
         "form": _FORM,
@@ -261,7 +261,7 @@ def _frames(arrays: Mapping[str, Any], stamps_s: list[float]) -> list[Keyframe]:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Put a file in its place when it is whole."""
+    """Puts a file in its place when it is whole."""
     draft = path.with_name(f".{path.name}")
     draft.write_bytes(content)
     draft.replace(path)

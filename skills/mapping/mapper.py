@@ -139,7 +139,7 @@ class Mapper:
         return LocalisationEstimate(stamp_s, X_WO, self._covariance.copy(), seeing)
 
     def update(self, robot: Robot) -> None:
-        """Take in the newest scan, if it is new."""
+        """Takes in the newest scan, if it is new."""
         scan = robot.scan()
         if scan is None or (self._scan is not None and scan.stamp_s <= self._scan.stamp_s):
             return
@@ -182,7 +182,7 @@ class Mapper:
         return self._active[0]
 
     def _frozen(self, scan: Scan) -> bool:
-        """Whether a scan repeats the last one, noise and all, although the robot has moved."""
+        """Returns whether a scan repeats the last one, noise and all, although the robot has moved."""
         last = self._scan
         if last is None or not scan.repeats(last):
             return False
@@ -190,7 +190,7 @@ class Mapper:
         return math.hypot(step.x_m, step.y_m) > _FROZEN_M or abs(step.yaw_rad) > _FROZEN_RAD
 
     def _predict(self, step: Pose2D) -> None:
-        """Move along with odometry, and let the spread grow."""
+        """Moves along with odometry, and lets the spread grow."""
         options = self._options
         way, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
         old, self._X_AF = self._X_AF, compose(self._X_AF, step)
@@ -203,7 +203,7 @@ class Mapper:
         self._since_keyframe = (self._since_keyframe[0] + way, self._since_keyframe[1] + turn)
 
     def _matched(self, points_F: FloatArray) -> bool:
-        """Match a scan to the current submap; False when it explains too little."""
+        """Matches a scan to the current submap; False when it explains too little."""
         if not self._active:
             return not self._returning or self._recognised(points_F)
         distributions = self._current.distributions
@@ -254,7 +254,7 @@ class Mapper:
         self._active.append(submap)
 
     def _change_submaps(self, index: int) -> None:
-        """Begin the next submap when the current one is half full; go over to it when it is full."""
+        """Begins the next submap when the current one is half full; go over to it when it is full."""
         current, options = self._current, self._options
         full = max(current.way_m / options.submap_m, len(current.members) / options.submap_keyframes)
         if len(self._active) == 1 and full > 0.5:
@@ -276,7 +276,7 @@ class Mapper:
     # ---- loop closures
 
     def _close_loops(self, index: int) -> None:
-        """Look for a keyframe in the nearest old submap; take in what another one confirms."""
+        """Looks for a keyframe in the nearest old submap; take in what another one confirms."""
         found = self._found_in_old(index)
         if found is None:
             return
@@ -302,7 +302,7 @@ class Mapper:
         return sum(math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in pairwise(self.graph.poses[first : second + 1]))
 
     def _agree(self, edge: Edge, other: Edge) -> bool:
-        """Whether two closures give the same loop: once around both, and the way between them, leads back."""
+        """Returns whether two closures give the same loop: once around both, and the way between them, leads back."""
         if edge.second == other.second:
             return False
         poses = self.graph.poses

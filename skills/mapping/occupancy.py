@@ -95,7 +95,7 @@ class LayeredOccupancy:
         return np.asarray(np.where(beside, np.minimum(greatest, np.int8(_MISS)), greatest), dtype=np.int8)
 
     def _reach(self, X_WF: Pose2D) -> None:
-        """Grow so that all within the range of a pose lies on the grid."""
+        """Grows so that all within the range of a pose lies on the grid."""
         rows, columns = self.values.shape[1:]
         need = [
             (

@@ -48,12 +48,12 @@ class PoseGraph:
         return [edge for edge in self.edges if edge.closure]
 
     def optimise(self) -> None:
-        """Move the poses to where all edges fit best: first plainly, then with Huber's loss for closures."""
+        """Moves the poses to where all edges fit best: first plainly, then with Huber's loss for closures."""
         for robust in (False, True) if self.closures else (False,):
             self.poses = self._solved(robust)
 
     def drop_outliers(self, most_sigmas: float) -> list[Edge]:
-        """Take out closures that the rest contradicts, the worst first, and optimise again; those taken out."""
+        """Takes out closures that the rest contradicts, the worst first, and optimise again; those taken out."""
         dropped: list[Edge] = []
         while self.closures:
             worst = max(self.closures, key=lambda edge: edge.sigmas(self.poses))

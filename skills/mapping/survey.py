@@ -127,7 +127,7 @@ class Survey:
         return None if self._goal is None else (self._goal.purpose.value, self._goal.pose)
 
     def tick(self, now_s: float) -> None:
-        """Take in what the robot senses, and drive on."""
+        """Takes in what the robot senses, and drives on."""
         self.mapper.update(self._robot)
         options = self._options
         if self._blind(now_s) or not self.mapper.keyframes:
@@ -147,7 +147,7 @@ class Survey:
             self._drive(now_s)
 
     def stop(self) -> None:
-        """Stop the robot."""
+        """Stops the robot."""
         self._last = np.zeros(3)
         self._robot.stop(lease=self._lease)
 
@@ -171,7 +171,7 @@ class Survey:
     # ---- the map so far
 
     def _refresh(self, now_s: float, *, force: bool) -> None:
-        """Bring the grid for driving up to date, and about the robot the costmap."""
+        """Brings the grid for driving up to date, and about the robot the costmap."""
         mapper, options = self.mapper, self._options
         due = mapper.way_m - self._refreshed[0] > options.refresh_m or now_s - self._refreshed[1] > options.refresh_s
         if not force and not (due and len(self._inserted) < len(mapper.keyframes)):
@@ -185,7 +185,7 @@ class Survey:
         self._costmap = LayeredCostmap(self.known(options.around_m)[0], options.costmap)
 
     def _moved(self) -> bool:
-        """Whether keyframes have been corrected by more than the grid for driving stands."""
+        """Returns whether keyframes have been corrected by more than the grid for driving stands."""
         if self.mapper.revision == self._revision:
             return False
         self._revision = self.mapper.revision
@@ -224,7 +224,7 @@ class Survey:
     # ---- goals
 
     def _seen(self, goal: _Goal, now_s: float) -> bool:
-        """Whether a frontier is none any more, looked at when the costmap has been refreshed."""
+        """Returns whether a frontier is none any more, looked at when the costmap has been refreshed."""
         if goal.purpose is not Purpose.FRONTIER or self._refreshed[1] != now_s:
             return False
         window = tuple(
@@ -319,7 +319,7 @@ class Survey:
         return _Goal(Purpose.LOOP, pose, (pose.x_m, pose.y_m))
 
     def _unsure(self) -> bool:
-        """Whether the robot should recognise a place before it goes on."""
+        """Returns whether the robot should recognise a place before it goes on."""
         mapper, options = self.mapper, self._options
         if mapper.way_since_closure_m < options.back_after_m or not self._explored_since_loop:
             return False
@@ -339,7 +339,7 @@ class Survey:
     # ---- driving
 
     def _begin(self, goal: _Goal, now_s: float) -> bool:
-        """Plan a path to a goal; False when there is none."""
+        """Plans a path to a goal; False when there is none."""
         assert self._whole is not None
         options = self._options
         problem = options.planner.problem(

@@ -27,7 +27,7 @@ class Base:
         self.last_velocity: NDArray[np.float64] = np.zeros(3)
 
     def drive(self, velocity: tuple[float, float, float]) -> None:
-        """Move at a body-frame velocity (m/s, m/s, rad/s) until the next call, EXPIRY_S at the longest."""
+        """Moves at a body-frame velocity (m/s, m/s, rad/s) until the next call, EXPIRY_S at the longest."""
         until_s = self._context.clock.now() + EXPIRY_S
         self._command = self._context.robot.drive(*velocity, until_s=until_s, lease=self._context.lease)
         self.last_velocity = np.array(velocity)
@@ -44,14 +44,14 @@ class Base:
         return None
 
     def asks_again(self) -> bool:
-        """Ask a robot that refused once more, by a command to stand; False when patience or the lease is gone."""
+        """Asks a robot that refused once more, by a command to stand; False when patience or the lease is gone."""
         if self._context.robot.lease_holder() != self._context.lease or not self.patience.is_left():
             return False
         self.drive((0.0, 0.0, 0.0))
         return True
 
     def stop(self) -> None:
-        """Stop the last command, if it still runs, and nothing else."""
+        """Stops the last command, if it still runs, and nothing else."""
         self.last_velocity = np.zeros(3)
         if self._command is None:
             return

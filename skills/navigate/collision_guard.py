@@ -105,7 +105,7 @@ class CollisionGuard:
         return None
 
     def _follows(self, one: Moving, here: Pose2D, on_path: FloatArray) -> bool:
-        """Whether something comes from behind the robot and goes where it goes: standing would not help."""
+        """Returns whether something comes from behind the robot and goes where it goes: standing would not help."""
         way = on_path[-1, :2] - on_path[0, :2]
         if float(np.linalg.norm(way)) < 0.05:
             return False

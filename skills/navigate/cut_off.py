@@ -60,7 +60,7 @@ class DoorWatch:
         return tuple(self._closed)
 
     def look(self) -> None:
-        """Judge the doors in view by the newest scan."""
+        """Judges the doors in view by the newest scan."""
         scan, estimate = self._context.robot.scan(), self._context.localiser.estimate()
         if not self._context.doors or scan is None or not estimate.localised:
             return
@@ -80,7 +80,7 @@ class DoorWatch:
         return WithDoors(costmap, self.closed) if self._closed else costmap
 
     def forget_distant(self, here: Pose2D) -> bool:
-        """Forget what was seen in doorways too far away to be judged, once another door is closed; whether it did.
+        """Forgets what was seen in doorways too far away to be judged, once another door is closed; whether it did.
 
         A door that is seen in part, through another door, may leave a gap that looks too narrow.
         """
@@ -164,7 +164,7 @@ class Regions:
 
     @property
     def cut_off(self) -> bool:
-        """Whether the robot's region is known, and none of the goals lies in it."""
+        """Returns whether the robot's region is known, and none of the goals lies in it."""
         here = self._near((self._here.x_m, self._here.y_m))
         return bool(here) and not any(here & self._at((goal.x_m, goal.y_m)) for goal in self._goals)
 

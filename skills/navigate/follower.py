@@ -114,7 +114,7 @@ class PathFollower:
         return Drive((float(safe[0]), float(safe[1]), float(safe[2])), remaining, off_path_m, blocked_at)
 
     def _project(self, here: FloatArray) -> float:
-        """Move the index to the nearest pose of the path a little behind or ahead; returns the distance to it (m)."""
+        """Moves the index to the nearest pose of the path a little behind or ahead; returns the distance to it (m)."""
         first, last = max(0, self._index - 3), min(len(self._progress), self._index + 25)
         delta = self._path.poses[first:last] - here
         turns = wrap(delta[:, 2])
@@ -146,14 +146,14 @@ class PathFollower:
         return np.array([c * world[0] + s * world[1], -s * world[0] + c * world[1], world[2]])
 
     def _clip(self, velocity: FloatArray) -> FloatArray:
-        """Scale down to the speed limits, keeping the direction."""
+        """Scales down to the speed limits, keeping the direction."""
         options = self._options
         ahead = options.max_speed_m_s if velocity[0] >= 0.0 else options.backward_m_s
         share = np.abs(velocity) / np.array([ahead, options.lateral_m_s, options.turn_rad_s])
         return np.asarray(velocity / max(1.0, float(np.max(share))))
 
     def _slew(self, velocity: FloatArray, last: FloatArray) -> FloatArray:
-        """Keep to the accelerations; slowing down may be twice as quick."""
+        """Keeps to the accelerations; slowing down may be twice as quick."""
         options = self._options
         most = np.array([options.acceleration_m_s2, options.acceleration_m_s2, options.turn_acceleration_rad_s2])
         most = most * options.period_s * np.where(np.abs(velocity) < np.abs(last), 2.0, 1.0)

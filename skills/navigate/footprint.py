@@ -104,7 +104,7 @@ def footprint_clearance_m(costmap: FreeSpace, footprint: Footprint, poses: Float
 
 
 def footprint_clear(costmap: FreeSpace, footprint: Footprint, pose: Pose2D, margin_m: float = SAFE_MARGIN_M) -> bool:
-    """Whether the robot can stand at a pose with at least margin_m to everything."""
+    """Returns whether the robot can stand at a pose with at least margin_m to everything."""
     return bool(footprint_clearance_m(costmap, footprint, pose_array([pose]))[0] >= margin_m)
 
 

@@ -134,20 +134,20 @@ class GivingWay:
         self._making_room_since_s: float | None = None
 
     def begin(self) -> None:
-        """Ask for the right to go, from now on."""
+        """Asks for the right to go, from now on."""
         self._traffic.release()
         self._traffic.claim()
 
     def end(self) -> None:
-        """Give everything back."""
+        """Gives everything back."""
         self._traffic.release()
 
     def announce(self, follower: LocalController, footprint: Footprint) -> None:
-        """Tell what is left of the way."""
+        """Tells what is left of the way."""
         self._traffic.announce(follower.ahead(math.inf), footprint.discs)
 
     def stand(self, pose: Pose2D, footprint: Footprint) -> None:
-        """Tell that the robot stays where it is for now."""
+        """Tells that the robot stays where it is for now."""
         self._traffic.announce(np.array([[pose.x_m, pose.y_m, pose.yaw_rad]]), footprint.discs)
 
     def wish(self, pose: Pose2D, goal: Pose2D, footprint: Footprint) -> None:
@@ -179,7 +179,7 @@ class GivingWay:
         return None
 
     def let_pass(self, names: Sequence[str]) -> None:
-        """Change turns with robots for which we should have made way and cannot."""
+        """Changes turns with robots for which we should have made way and cannot."""
         for name in names:
             self._traffic.let_pass(name)
 
@@ -217,11 +217,11 @@ class GivingWay:
         return None
 
     def somebody_goes(self) -> bool:
-        """Whether another robot is on its way."""
+        """Returns whether another robot is on its way."""
         return any(one.path is not None for one in self._traffic.others())
 
     def is_robot(self, place_W: tuple[float, float]) -> bool:
-        """Whether another robot covers a place (x, y), or ends just before it."""
+        """Returns whether another robot covers a place (x, y), or ends just before it."""
         bodies = self.costmap(_Nothing(), Avoided.BODIES)
         return bool(bodies.clearance_m(np.array([place_W]))[0] < _BODY_M)
 
@@ -294,7 +294,7 @@ def first_that_suits(places_W: FloatArray, suits: Callable[[FloatArray], Pose2D 
 
 
 def _will_move(one: Neighbour) -> bool:
-    """Whether a robot goes on by itself, or clears a way that is reserved against it."""
+    """Returns whether a robot goes on by itself, or clears a way that is reserved against it."""
     return one.yields or (one.first and one.path is not None)
 
 

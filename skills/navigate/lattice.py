@@ -190,7 +190,7 @@ def _expand(
     reached_states: IntArray,
     reached_totals: FloatArray,
 ) -> int:
-    """Write the states that moves from a state reach more cheaply than before, and their costs; returns how many."""
+    """Writes the states that moves from a state reach more cheaply than before, and their costs; returns how many."""
     headings, columns = lattice.headings, lattice.columns
     cell, k = index // headings, index % headings
     i, j = cell // columns, cell % columns

@@ -42,7 +42,7 @@ class LowObstacleWatch:
         self._X_WO = RigidTransform()
 
     def step(self) -> None:
-        """Take in a picture that has arrived, if one has; ask for the next when its time has come. Never blocks."""
+        """Takes in a picture that has arrived, if one has; ask for the next when its time has come. Never blocks."""
         if self._job is not None:
             if self._job.done():
                 job, self._job = self._job, None

@@ -17,17 +17,17 @@ class MovingSkill(RoutineSkill[InputsT]):
         self._base = Base(context)
 
     def begin(self, inputs: InputsT) -> None:
-        """Forget an earlier attempt and prepare a new one."""
+        """Forgets an earlier attempt and prepares a new one."""
         super().begin(inputs)
         self._base = Base(self.context)
 
     def suspend(self) -> None:
-        """Stop the base at once; see `RoutineSkill.suspend`."""
+        """Stops the base at once; see `RoutineSkill.suspend`."""
         self._base.stop()
         super().suspend()
 
     def end(self) -> None:
-        """Stop what this skill set in motion."""
+        """Stops what this skill set in motion."""
         self._base.stop()
         super().end()
 
@@ -40,7 +40,7 @@ class MovingSkill(RoutineSkill[InputsT]):
         settle_s: float = 0.5,
         enough: Callable[[], bool] = lambda: False,
     ) -> Routine[None]:
-        """Move at a body-frame velocity (m/s, m/s, rad/s) for a time, or until it is `enough`; then rest.
+        """Moves at a body-frame velocity (m/s, m/s, rad/s) for a time, or until it is `enough`; then rest.
 
         Raises SkillFailure: the robot refused.
         """
@@ -51,7 +51,7 @@ class MovingSkill(RoutineSkill[InputsT]):
         yield from self.pause(settle_s, "coming to rest")
 
     def drive(self, velocity: tuple[float, float, float], running: Running) -> Routine[float]:
-        """Move at a body-frame velocity for one tick; for how long (s) the robot refused to. Raises SkillFailure."""
+        """Moves at a body-frame velocity for one tick; for how long (s) the robot refused to. Raises SkillFailure."""
         self._base.drive(velocity)
         yield running
         begun_s = self.context.clock.now()

@@ -78,7 +78,7 @@ class LatticePlanner:
         max_speed_m_s: float,
         work: WorkCounter = NO_WORK_COUNTER,
     ) -> Callable[[], Path]:
-        """Sample the costmap now; the call that comes back plans on that sample, and raises PlanningError."""
+        """Samples the costmap now; the call that comes back plans on that sample, and raises PlanningError."""
         options = replace(self, forward_m_s=min(self.forward_m_s, max_speed_m_s))
         return partial(solve, problem_of(costmap, footprint, start, goal, options, self.around_m, work))
 
@@ -96,7 +96,7 @@ class Problem:
 
     @property
     def sideways(self) -> bool:
-        """Whether the base can go sideways."""
+        """Returns whether the base can go sideways."""
         return self.footprint.base_kind is not BaseKind.DIFFERENTIAL
 
 
@@ -123,7 +123,7 @@ def problem_of(
     margin_m: float = 3.0,
     work: WorkCounter = NO_WORK_COUNTER,
 ) -> Problem:
-    """Sample the costmap on the box around start and goal, margin_m wider to all sides."""
+    """Samples the costmap on the box around start and goal, margin_m wider to all sides."""
     low = np.minimum([start.x_m, start.y_m], [goal.x_m, goal.y_m]) - margin_m
     high = np.maximum([start.x_m, start.y_m], [goal.x_m, goal.y_m]) + margin_m
     xs, ys = (np.arange(low[axis], high[axis] + FIELD_CELL_M, FIELD_CELL_M) for axis in (0, 1))
@@ -218,7 +218,7 @@ def _segment(problem: Problem, a: FloatArray, b: FloatArray, need: float) -> flo
 
 
 def _poses(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """Start and goal as rows x, y, yaw."""
+    """Starts and goal as rows x, y, yaw."""
     start, goal = (np.array([p.x_m, p.y_m, p.yaw_rad]) for p in (problem.start, problem.goal))
     return start, goal
 

@@ -360,7 +360,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return "The robot does not get on." if stuck else None
 
     def _lacks_clearance(self) -> bool:
-        """Whether obstacles leave the path too little clearance; checked every `review_s`."""
+        """Returns whether obstacles leave the path too little clearance; checked every `review_s`."""
         through = self._planning.avoided is Avoided.WORKING and self._planning.aside is None
         if through or not self.options.review_m or self._now() < self._review_due_s:
             return False
@@ -390,7 +390,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         return then if on_path else None
 
     def _arrived(self, share: float) -> bool:
-        """Whether the robot is within a share of the tolerances of its present goal."""
+        """Returns whether the robot is within a share of the tolerances of its present goal."""
         off = relative(self._planning.goal, self.context.pose())
         near = math.hypot(off.x_m, off.y_m) <= share * self._inputs.position_tolerance_m
         return near and abs(off.yaw_rad) <= share * self._inputs.yaw_tolerance_rad

@@ -61,7 +61,7 @@ def densify(poses: FloatArray, step_m: float) -> FloatArray:
 
 @compiled
 def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m: float) -> FloatArray:
-    """Pull poses between their neighbours, turn them along the way, push them off what is nearer than wide_m.
+    """Pulls poses between their neighbours, turns them along the way, pushes them off what is nearer than wide_m.
 
     The ends stay. A pose moves only where its clearance stays above margin_m or does not get worse.
     """

@@ -57,7 +57,7 @@ class Surroundings:
         self._measured_s = self._context.clock.now()
 
     def outgrown(self) -> bool:
-        """Whether the arm or its load now reaches beyond `footprint`; measured every _OUTLINE_PERIOD_S."""
+        """Returns whether the arm or its load now reaches beyond `footprint`; measured every _OUTLINE_PERIOD_S."""
         if self._context.clock.now() < self._measured_s + _OUTLINE_PERIOD_S:
             return False
         self._measured_s = self._context.clock.now()
@@ -94,7 +94,7 @@ class Surroundings:
         return self.doors.in_the_way(self.footprint, self._context.pose(), goals, people_W)
 
     def cut_off(self, goals: Sequence[Pose2D]) -> bool:
-        """Whether none of the goals can be reached for sure."""
+        """Returns whether none of the goals can be reached for sure."""
         return self.doors.regions(self.footprint, self._context.pose(), goals).cut_off
 
     def clear_obstacles(self) -> bool:

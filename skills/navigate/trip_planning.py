@@ -35,7 +35,7 @@ class _Presence:
         self.last_s = now_s
 
     def may_go(self, now_s: float, patience_s: float) -> bool:
-        """Whether they were near lately, and for less than `patience_s`."""
+        """Returns whether they were near lately, and for less than `patience_s`."""
         return now_s - self.last_s < self.gap_s and now_s - self.since_s < patience_s
 
 
@@ -70,7 +70,7 @@ class TripPlanning:
 
     @property
     def under_way(self) -> bool:
-        """Whether a plan is requested and not taken yet."""
+        """Returns whether a plan is requested and not taken yet."""
         return self._job is not None
 
     def ask(self, start: Pose2D | None = None, *, map_alone: bool = False) -> None:
@@ -221,7 +221,7 @@ class TripPlanning:
         return True
 
     def _people_may_go(self) -> bool:
-        """Whether people who are or were near may block the path only for now."""
+        """Returns whether people who are or were near may block the path only for now."""
         if self._around.persons():
             self._people.note(self._now())
         return self._people.may_go(self._now(), self._options.person_patience_s)

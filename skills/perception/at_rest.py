@@ -21,7 +21,7 @@ _AROUND_PX, _NEAREST_M = 5, 0.1
 
 
 def at_rest(first: Image, second: Image, X_WO: RigidTransform, p_W: FloatArray, within_m: float) -> bool:
-    """Whether two pictures of a still camera show the same about a point p_W (3,) of the world."""
+    """Returns whether two pictures of a still camera show the same about a point p_W (3,) of the world."""
     return changed_pixels(first, second, X_WO, p_W, within_m) < LEAST_CHANGED
 
 

@@ -65,7 +65,7 @@ def known_attributes() -> frozenset[str]:
 
 
 def shows(detected: Detection3D, attribute: str) -> bool:
-    """Whether an attribute fits. Raises KeyError for an unknown word."""
+    """Returns whether an attribute fits. Raises KeyError for an unknown word."""
     word = attribute.lower()
     if word in _BIGGER:
         return _is_big(detected) is _BIGGER[word]
@@ -73,6 +73,6 @@ def shows(detected: Detection3D, attribute: str) -> bool:
 
 
 def _is_big(detected: Detection3D) -> bool | None:
-    """Whether its longest side is beyond the middle of what is usual in its class; None for what has none."""
+    """Returns whether its longest side is beyond the middle of what is usual in its class; None for what has none."""
     form = class_forms().get(detected.class_name)
     return None if form is None else max(detected.size_m) > math.sqrt(form.length_m[0] * form.length_m[1])

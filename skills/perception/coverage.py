@@ -49,7 +49,7 @@ class Coverage:
         self._states = {name: np.zeros(len(points), dtype=np.int8) for name, points in self._points.items()}
 
     def add(self, image: Image, X_WO: RigidTransform) -> None:
-        """Take in a picture that was looked through."""
+        """Takes in a picture that was looked through."""
         for name, points in self._points.items():
             depth, seen = depth_ahead_m(image, X_WO, points)
             with np.errstate(invalid="ignore"):

@@ -97,7 +97,7 @@ class MovingWatch:
         return self._moving
 
     def _match(self, stamp_s: float, found: Sequence[FloatArray]) -> None:
-        """Let each track go on with the cluster nearest to where it was bound; what is left begins a new one."""
+        """Lets each track go on with the cluster nearest to where it was bound; what is left begins a new one."""
         left = list(found)
         for track in self._tracks:
             expected = track.expected_W(stamp_s)

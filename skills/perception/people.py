@@ -119,7 +119,7 @@ def _legs_sized(points_B: FloatArray) -> bool:
 
 
 def _alone(points_B: FloatArray, others: list[FloatArray]) -> bool:
-    """Whether no other cluster is close; walls and cupboards seldom stand alone."""
+    """Returns whether no other cluster is close; walls and cupboards seldom stand alone."""
     centre = points_B[:, :2].mean(axis=0)
     reach = float(np.max(np.linalg.norm(points_B[:, :2] - centre, axis=1))) + _ALONE_M
     return all(float(np.min(np.linalg.norm(other[:, :2] - centre, axis=1))) > reach for other in others)

@@ -94,7 +94,7 @@ class PeopleWatch:
         return tuple(one for one in self._seen if one.looks > 1 and self._remembered(one))
 
     def step(self, velocity: FloatArray) -> None:
-        """Take in what was seen; look again in time, towards a body-frame velocity (3,). Never blocks."""
+        """Takes in what was seen; look again in time, towards a body-frame velocity (3,). Never blocks."""
         if self._job is not None:
             if self._job.done():
                 job, self._job = self._job, None
@@ -145,7 +145,7 @@ class PeopleWatch:
         return _Look(tuple(found), tuple(images), X_WO, here_W)
 
     def _take(self, look: _Look) -> None:
-        """Bring what is known up to date, tell of it, and look again soon when somebody is new."""
+        """Brings what is known up to date, tells of it, and looks again soon when somebody is new."""
         before, stamp_s = self._seen, self._context.clock.now()
         for one in look.found:
             stamp_s = one.stamp_s
@@ -163,7 +163,7 @@ class PeopleWatch:
         return replace(one, missed=one.missed + 1) if due else one
 
     def _remembered(self, one: SeenPerson) -> bool:
-        """Whether somebody is still to be reckoned with."""
+        """Returns whether somebody is still to be reckoned with."""
         options = self._options
         age_s = self._context.clock.now() - one.stamp_s
         if one.missed >= options.misses or age_s > options.beside_s:
@@ -225,7 +225,7 @@ def _placed(image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D, 
 
 
 def _inside(image: Image, X_WO: RigidTransform, points_W: FloatArray, reach_m: float) -> bool:
-    """Whether any of some points (N, 3) lies well inside a picture, within reach of its camera."""
+    """Returns whether any of some points (N, 3) lies well inside a picture, within reach of its camera."""
     p_C = (X_WO @ image.frames.pose(image.camera_frame)).inverse().multiply(points_W.T)
     lens, z = image.intrinsics, np.maximum(p_C[2], 1e-6)
     u, v = p_C[0] / z * lens.fx + lens.cx, p_C[1] / z * lens.fy + lens.cy
@@ -234,7 +234,7 @@ def _inside(image: Image, X_WO: RigidTransform, points_W: FloatArray, reach_m: f
 
 
 def _shown(off_axis_rad: FloatArray, view_rad: float) -> bool:
-    """Whether any of some bearings lies so near to a camera's axis."""
+    """Returns whether any of some bearings lies so near to a camera's axis."""
     return bool(np.any(np.cos(off_axis_rad) > math.cos(view_rad)))
 
 

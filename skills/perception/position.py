@@ -112,7 +112,7 @@ class _Cut:
 
     @property
     def anywhere(self) -> bool:
-        """Whether any does."""
+        """Returns whether any does."""
         return self.top or self.bottom or self.side
 
 

@@ -100,7 +100,7 @@ class Tracker:
         return tuple(sorted(self._tracks.values(), key=lambda track: (-track.belief, track.number)))
 
     def update(self, seen: Sequence[Detection3D], in_plain_view: Callable[[Track], bool]) -> tuple[Track, ...]:
-        """Take in the detections of one picture; `in_plain_view` says whether it should show a track."""
+        """Takes in the detections of one picture; `in_plain_view` says whether it should show a track."""
         before, seen = tuple(self._tracks.values()), distinct(seen)
         pairs = _matched_surest_first(before, seen)
         for track in before:
@@ -173,7 +173,7 @@ def _matched(tracks: Sequence[Track], seen: Sequence[Detection3D]) -> dict[int, 
 
 
 def fits(track: Track, detected: Detection3D) -> bool:
-    """Whether a detection can be of a track's object: near enough, and of a class that it may have.
+    """Returns whether a detection can be of a track's object: near enough, and of a class that it may have.
 
     What is within 3 cm is the same object, whatever its class.
     """

@@ -53,7 +53,7 @@ def free_m(obstacles: FloatArray, heading_rad: float, capabilities: Capabilities
 
 
 def can_turn(obstacles: FloatArray, capabilities: Capabilities, options: FreeSpaceOptions) -> bool:
-    """Whether the body can turn on the spot."""
+    """Returns whether the body can turn on the spot."""
     radius = max(math.hypot(x, y) for x, y in capabilities.footprint_m) + options.turning_m
     return not len(obstacles) or float(np.hypot(obstacles[:, 0], obstacles[:, 1]).min()) > radius
 
@@ -89,7 +89,7 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
     options: RelocaliseOptions
 
     def run(self, inputs: RelocaliseInputs) -> Routine[Succeeded]:
-        """Search the whole map; turn a little, and again; after a round of that, from somewhere else."""
+        """Searches the whole map; turn a little, and again; after a round of that, from somewhere else."""
         localiser = self.context.localiser
         if not isinstance(localiser, SearchingLocaliser):
             raise SkillFailure(Cause.PRECONDITION, "the localiser of this robot cannot search the map")
@@ -107,7 +107,7 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
         raise SkillFailure(Cause.POSTCONDITION, "no place on the map fits what the robot sees")
 
     def _found(self, localiser: Localiser) -> Routine[bool]:
-        """Search with a new scan, believe what is found, and see whether the next scans agree."""
+        """Searches with a new scan, believe what is found, and see whether the next scans agree."""
         message = "searching the whole map"
         scan = yield from self._new_scan(message)
         assert isinstance(localiser, SearchingLocaliser)
@@ -124,7 +124,7 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
         return (yield from self._agreed(localiser))
 
     def _agreed(self, localiser: Localiser) -> Routine[bool]:
-        """Whether the scans of a whole second agree with the map."""
+        """Returns whether the scans of a whole second agree with the map."""
         context = self.context
         begun_s = context.clock.now()
         while (estimate := localiser.estimate()).localised:
@@ -146,7 +146,7 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
         return scan
 
     def _turn(self, turn_rad: float) -> Routine[None]:
-        """Turn slowly on the spot by a signed angle, where there is room for it; then rest."""
+        """Turns slowly on the spot by a signed angle, where there is room for it; then rest."""
         scan = yield from self._new_scan("looking for room to turn")
         capabilities, free_space = self.context.robot.capabilities(), self.options.free_space
         if not can_turn(obstacles_B(scan, capabilities, free_space), capabilities, free_space):

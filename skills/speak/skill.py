@@ -45,7 +45,7 @@ class Speak(Skill[SpeakInputs]):
     _begun_s: float | None = None
 
     def begin(self, inputs: SpeakInputs) -> None:
-        """Say it, unless it cannot be said."""
+        """Says it, unless it cannot be said."""
         self._text = " ".join(inputs.text.split())
         self._refusal = _refusal(self._text)
         self._begun_s = begun_s = self.context.clock.now()
@@ -55,7 +55,7 @@ class Speak(Skill[SpeakInputs]):
             self.context.publish(SPEECH_TOPIC, message)
 
     def step(self) -> Step:
-        """Wait until it is said."""
+        """Waits until it is said."""
         if self._refusal is not None:
             return self._refusal
         assert self._begun_s is not None

@@ -194,7 +194,7 @@ class Teleop:
         )
 
     def tick(self) -> None:
-        """Send the commands for the next period; `note` says what stands in the way of what is asked."""
+        """Sends the commands for the next period; `note` says what stands in the way of what is asked."""
         asked, at_s = self._asked
         now_s, until_s = self._context.clock.now(), at_s + self._options.life_s
         alive = now_s + self._options.period_s <= until_s + 1e-9

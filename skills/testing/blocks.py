@@ -39,7 +39,7 @@ class Block:
             raise ValueError(f"{self}: x0 < x1, y0 < y1 and z0 < z1 must hold")
 
     def holds(self, point_W: FloatArray, margin_m: float = 0.0) -> bool:
-        """Whether a point (3,) lies in the block, or within a margin of it."""
+        """Returns whether a point (3,) lies in the block, or within a margin of it."""
         low, high = np.array([self.x0, self.y0, self.z0]), np.array([self.x1, self.y1, self.z1])
         return bool(np.all(point_W >= low - margin_m) and np.all(point_W <= high + margin_m))
 

@@ -18,7 +18,7 @@ class VirtualClock:
         self._followers: list[Callable[[float], None]] = []
 
     def attach(self, follower: Callable[[float], None]) -> None:
-        """Call `follower(dt_s)` after each step of time."""
+        """Calls `follower(dt_s)` after each step of time."""
         self._followers.append(follower)
 
     def now(self) -> float:
@@ -26,7 +26,7 @@ class VirtualClock:
         return self._now_s
 
     def advance(self, dt_s: float) -> None:
-        """Let dt_s seconds pass, in whole steps of 0.01 s and a remainder."""
+        """Lets dt_s seconds pass, in whole steps of 0.01 s and a remainder."""
         whole, rest = divmod(round(dt_s, 9), STEP_S)
         steps = [STEP_S] * int(whole) + ([rest] if rest > 1e-9 else [])
         for step_s in steps:

@@ -32,26 +32,26 @@ class Commands:
         return command
 
     def begin(self, part: str, goal: Any, now_s: float, until_s: float) -> CommandId:
-        """Begin a command in place of the part's running one."""
+        """Begins a command in place of the part's running one."""
         command = self.note(CommandStatus(CommandState.RUNNING))
         self.finish(part, CommandState.STOPPED, f"replaced by command {command}")
         self._active[part] = ActiveCommand(command, goal, now_s, until_s)
         return command
 
     def finish(self, part: str, state: CommandState, reason: str = "") -> None:
-        """End the part's running command, if any."""
+        """Ends the part's running command, if any."""
         active = self._active.pop(part, None)
         if active is not None:
             self._statuses[active.id] = CommandStatus(state, reason)
 
     def stop(self, only: CommandId | None) -> None:
-        """Stop all running commands, or only one."""
+        """Stops all running commands, or only one."""
         for part, active in list(self._active.items()):
             if only in (None, active.id):
                 self.finish(part, CommandState.STOPPED, "stopped")
 
     def expire(self, now_s: float) -> None:
-        """End what has run out of time: a drive is done then, all else has not got there."""
+        """Ends what has run out of time: a drive is done then, all else has not got there."""
         for part, active in list(self._active.items()):
             if now_s > active.until_s:
                 late = (CommandState.DONE, "expired") if part == "drive" else (CommandState.STOPPED, "expired")

@@ -29,7 +29,7 @@ class KnownPlace:
         return LocalisationEstimate(self._stamp_s, self._X_WO, np.eye(3) * 1e-4, self.localised)
 
     def update(self, robot: Robot) -> None:
-        """Take in the odometry's stamp."""
+        """Takes in the odometry's stamp."""
         self._stamp_s = robot.odometry().stamp_s
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:

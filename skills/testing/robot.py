@@ -142,7 +142,7 @@ class ScriptedRobot:
 
     @property
     def holding(self) -> bool:
-        """Whether the gripper is closed about something."""
+        """Returns whether the gripper is closed about something."""
         met_rad = self.in_gripper_rad
         return met_rad is not None and self.clamp_force_n > 0.0 and self.opening <= met_rad + 0.02
 
@@ -170,7 +170,7 @@ class ScriptedRobot:
         return self._scan
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        """Take a picture with depth now, whichever is asked for. Raises ValueError for an unknown source."""
+        """Takes a picture with depth now, whichever is asked for. Raises ValueError for an unknown source."""
         self.calls.append("image")
         cameras = {each.source: each for each in self._capabilities.cameras}
         camera = cameras.get(source)
@@ -214,24 +214,24 @@ class ScriptedRobot:
         return self.present_faults
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Walk at a body-frame velocity until the clock reads until_s."""
+        """Walks at a body-frame velocity until the clock reads until_s."""
         fault = "" if all(map(math.isfinite, (vx, vy, wz))) else f"velocity ({vx}, {vy}, {wz}) is not finite"
         if vy != 0.0 and self._capabilities.base_kind is BaseKind.DIFFERENTIAL:
             fault = fault or "this base cannot go sideways"
         return self._begin("drive", np.array([vx, vy, wz]), until_s, lease, fault)
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Hold the body origin at a height above the floor and a pitch."""
+        """Holds the body origin at a height above the floor and a pitch."""
         low, high = self._capabilities.height_range_m
         fault = "" if low <= height_m <= high else f"height {height_m:.2f} m is not in [{low}, {high}]"
         return self._begin("stand", (height_m, pitch_rad), until_s, lease, fault)
 
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
-        """Lower the body to the floor."""
+        """Lowers the body to the floor."""
         return self._begin("stand", (0.2, 0.0), until_s, lease, "", verb="sit")
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
-        """Follow a joint trajectory from about where the arm is."""
+        """Follows a joint trajectory from about where the arm is."""
         fault = self._arm_fault(trajectory)
         return self._begin("move_arm", (trajectory, self.q_rad.copy()), until_s, lease, fault)
 
@@ -246,7 +246,7 @@ class ScriptedRobot:
         return "" if near else "the trajectory does not begin where the arm is"
 
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Turn the head; it is there at once."""
+        """Turns the head; it is there at once."""
         head = self._capabilities.head
         fault = "there is no head" if head is None else ""
         if head is not None:
@@ -256,12 +256,12 @@ class ScriptedRobot:
         return self._begin("point_head", (pan_rad, tilt_rad), until_s, lease, fault)
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move the gripper; it stops where something lies between its fingers."""
+        """Moves the gripper; it stops where something lies between its fingers."""
         fault = "" if self._capabilities.gripper is not None else "there is no gripper"
         return self._begin("set_gripper", (opening, force_n), until_s, lease, fault)
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
-        """Stop all motion, or only the given command; the gripper keeps its force."""
+        """Stops all motion, or only the given command; the gripper keeps its force."""
         self.calls.append("stop")
         if lease != self._lease:
             return self._commands.note(CommandStatus(CommandState.REFUSED, "the lease was taken away"))
@@ -274,20 +274,20 @@ class ScriptedRobot:
         return self._commands.status(command)
 
     def acquire_lease(self, holder: str) -> Lease:
-        """Take a free lease. Raises LeaseError when another holds it."""
+        """Takes a free lease. Raises LeaseError when another holds it."""
         if self._lease is not None:
             raise LeaseError(f"{self._name}: the lease is held by '{self._lease.holder}'")
         return self.take_lease(holder)
 
     def take_lease(self, holder: str) -> Lease:
-        """Take the lease from whoever holds it; the robot stops."""
+        """Takes the lease from whoever holds it; the robot stops."""
         self._commands.stop(None)
         self._lease_number += 1
         self._lease = Lease(self._name, holder, self._lease_number)
         return self._lease
 
     def return_lease(self, lease: Lease) -> None:
-        """Give the lease back; the robot stops."""
+        """Gives the lease back; the robot stops."""
         self.calls.append("return_lease")
         if lease == self._lease:
             self._commands.stop(None)

@@ -58,7 +58,7 @@ def evaluate_runs(
     before: Callable[[Sequence[RunSpec]], None] | None = None,
     checked: bool = False,
 ) -> Evaluated:
-    """Run what is still missing of the runs, and keep each result in the file `results`, files of runs in `out`.
+    """Runs what is still missing of the runs, and keeps each result in the file `results`, files of runs in `out`.
 
     Args:
         evaluation: the runs.
@@ -90,7 +90,7 @@ def evaluate_runs(
 def _work_through(
     missing: Sequence[RunSpec], kept: ResultsFile, pool: Pool, out: Path, progress: Progress, *, checked: bool
 ) -> None:
-    """Keep the result of each run as it ends; one that was cancelled is left to the next time."""
+    """Keeps the result of each run as it ends; one that was cancelled is left to the next time."""
     with pool.opened() as workers, progress(len(missing)) as advance:
         count, began = workers.count, time.monotonic()
         for finished in workers.give_out(partial(run_one, checked=checked), missing):
@@ -115,7 +115,7 @@ def _with_files(case: Case, folder: Path) -> Case:
 
 
 def refuse_impossible_runs(runs: Sequence[RunSpec]) -> None:
-    """Understand and check what differs by more than the seed, the light and the like. Raises InputError with all."""
+    """Understands and checks what differs by more than the seed, the light and the like. Raises InputError with all."""
     problems, seen = Problems(), set[str]()
     for run in runs:
         request = run.request
@@ -129,7 +129,7 @@ def refuse_impossible_runs(runs: Sequence[RunSpec]) -> None:
 
 
 def run_one(spec: RunSpec, *, checked: bool = False) -> Case:
-    """Run it from beginning to end. What goes wrong with it, a refusal included, is a result and raises nothing.
+    """Runs it from beginning to end. What goes wrong with it, a refusal included, is a result and raises nothing.
 
     When `checked`, what `errand check` finds refuses it.
     """
@@ -169,7 +169,7 @@ def _request(spec: RunSpec, folder: Path) -> Request:
         return request
 
     def copied(name: str, path: Path | None) -> Path | None:
-        """Write the texts of a file and of those beside it into a folder; the file's path there."""
+        """Writes the texts of a file and of those beside it into a folder; the file's path there."""
         if path is None:
             return None
         for each, text in spec.files.items():

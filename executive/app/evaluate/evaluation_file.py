@@ -42,7 +42,7 @@ FileFinder = Callable[[Path], Path]
 
 
 def is_evaluation(path: Path) -> bool:
-    """Whether a file is a scenario for evaluations, and no mission. Raises InputError: it cannot be read."""
+    """Returns whether a file is a scenario for evaluations, and no mission. Raises InputError: it cannot be read."""
     if path.suffix not in (".yaml", ".yml") or not is_file(path):
         return False
     data = read_yaml(path).data

@@ -208,7 +208,7 @@ class ResultsFile(Database):
     kind = RESULTS_FILE
 
     def begin(self, evaluation: Evaluation, *, code: str) -> None:
-        """Note all runs of an evaluation and the version that runs them, or check that they are those of the file.
+        """Notes all runs of an evaluation and the version that runs them, or checks that they are those of the file.
 
         Raises InputError: it holds the results of other runs, or of another version of Errand.
         """
@@ -236,7 +236,7 @@ class ResultsFile(Database):
         return {row["name"]: row["value"] for row in self.rows("SELECT name, value FROM about")}
 
     def note(self, **facts: str) -> None:
-        """Keep facts about the evaluation by name."""
+        """Keeps facts about the evaluation by name."""
         with self.writing() as connection:
             connection.executemany("INSERT OR REPLACE INTO about VALUES (?, ?)", facts.items())
 
@@ -245,7 +245,7 @@ class ResultsFile(Database):
         return frozenset(run_id for (run_id,) in self.rows("SELECT id FROM result"))
 
     def add(self, case: Case) -> bool:
-        """Keep a result, whole or not at all; False where the run had one already, which stays.
+        """Keeps a result, whole or not at all; False where the run had one already, which stays.
 
         Raises InputError: it cannot be written.
         """

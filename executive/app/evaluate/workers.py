@@ -62,7 +62,7 @@ class LocalWorkers:
     count: int
 
     def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:
-        """Have each item worked on once, and give each as it ends. What the function raises is raised here.
+        """Has each item worked on once, and gives each as it ends. What the function raises is raised here.
 
         Closing the iterator ends the processes.
         """
@@ -106,7 +106,7 @@ class _Process:
         return _Process()
 
     def end(self) -> None:
-        """End it at once, whatever it does."""
+        """Ends it at once, whatever it does."""
         for process in list((self._pool._processes or {}).values()):
             process.kill()
         self._pool.shutdown(wait=True, cancel_futures=True)
@@ -193,7 +193,7 @@ class ClusterWorkers:
                     raise InputError(f"no worker has been connected for {GONE_S:g} s", hint=_START_ONE) from error
 
     def _check(self) -> None:
-        """Refuse what would give other results. Raises InputError."""
+        """Refuses what would give other results. Raises InputError."""
         with _told_of_loss():
             try:
                 self._client.wait_for_workers(1, timeout=ANSWER_S)
@@ -226,7 +226,7 @@ def _code_here() -> str:
 
 
 def _checked(expected: str, function: Callable[[Item], Result], item: Item) -> Result:
-    """Work on an item where the code is the same."""
+    """Works on an item where the code is the same."""
     if installed_code() != expected:
         raise _OtherVersionError(f"a worker has another version of Errand ({installed_code()}; here it is {expected})")
     return function(item)

@@ -35,7 +35,7 @@ class Hooks:
 
     @staticmethod
     def pytest_errand_skill_tests(settings: Any) -> None:
-        """Change what all skill tests of the session share, before the first is collected.
+        """Changes what all skill tests of the session share, before the first is collected.
 
         `settings` is an `executive.testing.skill_suite.SkillTestSettings`: append to `fault_kinds`, add to `skills`,
         put other benches into `makers`.
@@ -43,12 +43,12 @@ class Hooks:
 
 
 def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
-    """Let a conftest change what skill tests share."""
+    """Lets a conftest change what skill tests share."""
     pluginmanager.add_hookspecs(Hooks)
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Collect the tests of a `*.skilltest.yaml` file."""
+    """Collects the tests of a `*.skilltest.yaml` file."""
     if not file_path.name.endswith(SUFFIX):
         return None
     from executive.testing.skill_suite import SkillTestModule
@@ -87,7 +87,7 @@ class SmallPlant:
 
 
 def _small_plant(folder: Path, *, can: bool = True) -> SmallPlant:
-    """Write the world into `folder` and put the robot into it, at (-0.5, 0) and 1.7 m before the table."""
+    """Writes the world into `folder` and puts the robot into it, at (-0.5, 0) and 1.7 m before the table."""
     from executive.app.robots import shared_detector
     from executive.testing.bench import SkillBench
     from executive.testing.small_room import write_small_room
@@ -139,7 +139,7 @@ def virtual_clock() -> VirtualClock:
 
 @pytest.fixture
 def make_scripted_robot(virtual_clock: VirtualClock, robot_capabilities: Capabilities) -> Callable[..., ScriptedRobot]:
-    """Make a scripted robot on the virtual clock, in the room with a table and a can.
+    """Makes a scripted robot on the virtual clock, in the room with a table and a can.
 
     Takes the options of `ScriptedRobot`: name, capabilities, blocks, start, seed.
     """
@@ -170,7 +170,7 @@ def skill_bench(scripted_robot: ScriptedRobot, virtual_clock: VirtualClock) -> S
 
 @pytest.fixture
 def skill_context(virtual_clock: VirtualClock) -> Callable[..., SkillContext]:
-    """Make the context of a skill for a robot: `skill_context(robot)`; takes the options of `SkillBench` besides."""
+    """Makes the context of a skill for a robot: `skill_context(robot)`; takes the options of `SkillBench` besides."""
     from executive.testing.bench import SkillBench
 
     def make(robot: ScriptedRobot, **options: Any) -> SkillContext:

@@ -78,7 +78,7 @@ class Branches(Base):
         return self.choose(row, contrary_of(supposed) if clause.kind is Cue.UNLESS else supposed, body, clauses, end)
 
     def _holds(self, text: str, row: Row) -> bool:
-        """Whether the text is a condition as it stands."""
+        """Returns whether the text is a condition as it stands."""
         try:
             state = self.read_together(row.plain, row.state).state if row.plain else row.state
             suppose(text, state, self.reader)
@@ -108,7 +108,7 @@ class Branches(Base):
         raise refusal
 
     def choose(self, row: Row, supposed: Supposed, body: Sequence[Clause], clauses: Sequence[Clause], end: int) -> int:
-        """Put the steps of both branches; `end` is behind the first."""
+        """Puts the steps of both branches; `end` is behind the first."""
         then, after = self.branch(body, supposed, supposed.holds)
         otherwise: Steps = ()
         other_state = supposed.fails
@@ -219,7 +219,7 @@ class Branches(Base):
         return end
 
     def repeat_of(self, row: Row, rounds: Rounds, body: Sequence[Clause]) -> None:
-        """Put rounds of what the clauses ask for."""
+        """Puts rounds of what the clauses ask for."""
         steps, state = self.nested(body, replace(rounds.state, goal=None, at=None))
         if rounds.loop.times is None and rounds.loop.every_s is None and not _worth_repeating(steps):
             raise RefusalError("I do not see what is to be repeated; say 'wait there until ...'", [text_of(body)])
@@ -282,7 +282,7 @@ class Branches(Base):
         raise RefusalError(f"I do not understand '{clause.cue} {text}'", [text])
 
     def beside(self, row: Row, where: str, body: Sequence[Clause]) -> None:
-        """Say something while going somewhere."""
+        """Says something while going somewhere."""
         reading = self.reader.commands_of(where, row.state, (verb("go"),))
         said = speech_in(body[0].text, self.reader) if len(body) == 1 else None
         if said is None or said.text is None or said.to is not None or len(reading.commands) != 1:
@@ -366,7 +366,7 @@ def _done(steps: Steps, said: str) -> Steps:
 
 
 def _worth_repeating(steps: Steps) -> bool:
-    """Whether it is more than to go to one place, or to charge."""
+    """Returns whether it is more than to go to one place, or to charge."""
     commands = [command for step in steps for each in step.walk() for command in each.commands]
     stays = len(commands) == 1 and commands[0].item is None and commands[0].task in (None, Task.CHARGE)
     return not stays or not all(isinstance(step, Do) for step in steps)

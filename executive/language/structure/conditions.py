@@ -102,7 +102,7 @@ def _button(words: str, state: State, reader: PlainReader) -> Supposed | None:
 
 
 def button_condition(button: str, words: str, state: State) -> Supposed:
-    """Whether a button is pressed, which is spoken of with its article; `words` say it."""
+    """Returns whether a button is pressed, which is spoken of with its article; `words` say it."""
     name = re.sub(r"^(?:the|a|any)\b\s*|\s*\bbutton$", "", button.strip(), flags=re.IGNORECASE).strip()
     return Supposed(ButtonPressed(button=name.lower() or "button"), words, state, state)
 
@@ -168,7 +168,7 @@ def _meeting(words: str, state: State, reader: PlainReader) -> Supposed | None:
 def meeting(
     who: str, where: str | None, words: str, state: State, reader: PlainReader, *, gone: bool = False
 ) -> Supposed:
-    """Whether somebody, or nobody, is where the robot is, or in a room; `words` say it. Raises RefusalError.
+    """Returns whether somebody, or nobody, is where the robot is, or in a room; `words` say it. Raises RefusalError.
 
     "There" may be a room that was spoken of.
     """

@@ -156,7 +156,7 @@ class PlainReader:
         return self.commands_of_items((verb("go"), *behind_preposition(items, "to")), state)
 
     def check(self, text: str, state: State, lead: Sequence[Item] = (), *, said: str | None = None) -> Supposed:
-        """Whether what the text states, or denies, is so; `said` says more of it."""
+        """Returns whether what the text states, or denies, is so; `said` says more of it."""
         read = self._run(Trace(text, lead=(verb("check"), Whether(), *lead), asked=True), upto="reading")
         assert read.affirmed is not None
         words = [token.word for token in read.tokens if token.index not in read.affirmed.silent]
@@ -166,11 +166,11 @@ class PlainReader:
         return found.denied(said or text) if read.affirmed.denied else found
 
     def exists(self, what: str, text: str, state: State) -> Supposed:
-        """Whether there is what is named, or is not ("no beer in the hall"); `text` says it."""
+        """Returns whether there is what is named, or is not ("no beer in the hall"); `text` says it."""
         return self.check(what, state, (_THERE_IS,), said=text)
 
     def look(self, who: str, room: str, text: str, state: State) -> Supposed:
-        """Whether somebody is in a room."""
+        """Returns whether somebody is in a room."""
         where = Chunk(phrase_of_name(room, NounKind.PLACE), "in", PrepositionRole.AT)
         return self.look_by_items((verb("check"), Whether(), *self.items_of(who), IS, where), text, state)
 
@@ -213,7 +213,7 @@ class PlainReader:
         return self.knowledge.room(goal)
 
     def is_somebody(self, who: str, state: State) -> bool:
-        """Whether it is a known person, somebody who was spoken of, or anybody at all."""
+        """Returns whether it is a known person, somebody who was spoken of, or anybody at all."""
         words = who.lower().removeprefix("a ").removeprefix("any ")
         if words in lexicon().anyone | lexicon().any_person or words in ("guest", "they"):
             return True

@@ -169,7 +169,7 @@ def speech_to(who: str, text: str, knowledge: Knowledge) -> Said:
 
 
 def _clause(text: str, parser: DependencyParser) -> bool:
-    """Whether it is a whole statement: a finite verb with its subject before it."""
+    """Returns whether it is a whole statement: a finite verb with its subject before it."""
     tokens = parser.parse(text)
     finite = {t.index for t in tokens if t.tag in ("VBZ", "VBP", "VBD", "MD")}
     verbs = finite | {t.index for t in tokens if t.relation == "root"}

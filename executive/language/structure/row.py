@@ -78,7 +78,7 @@ def end_of(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: 
 
 
 def same(one: Condition, other: Condition) -> bool:
-    """Whether they look at the same, whatever the verb was."""
+    """Returns whether they look at the same, whatever the verb was."""
     return one in (other, contrary(other))
 
 
@@ -105,7 +105,7 @@ def state_behind_both(one: State, other: State) -> State:
 
 
 def one_errand(reading: PlainReading) -> bool:
-    """Whether the commands are all about one thing, or only go somewhere and back."""
+    """Returns whether the commands are all about one thing, or only go somewhere and back."""
     things = {str(thing) for command in reading.commands for thing in (command.item, command.object) if thing}
     going = [action for action in reading.trace.resolved if action.kind is VerbKind.GO]
     bare = sum(command.item is None and command.task is None for command in reading.commands)
@@ -180,7 +180,7 @@ class Base:
         return self.sequence([replace(clauses[0], joint=""), *clauses[1:]], state)
 
     def flush(self, row: Row) -> None:
-        """Understand the clauses that are still to be understood."""
+        """Understands the clauses that are still to be understood."""
         if not row.plain:
             return
         last = row.plain[-1].text
@@ -196,18 +196,18 @@ class Base:
         return self.reader.commands_of(text_of([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead)
 
     def add(self, row: Row, reading: PlainReading) -> None:
-        """Put what a plain part asks for."""
+        """Puts what a plain part asks for."""
         self.notes += reading.trace.notes
         row.steps += steps_of_commands(reading.commands)
         before, row.state = row.state, reading.state
         row.asked = looked_at_by(reading, before, self.reader)
 
     def put(self, row: Row, block: Step, state: State) -> None:
-        """Put a block; `state` is what is known behind it."""
+        """Puts a block; `state` is what is known behind it."""
         self.put_done(row, ((block,), state, ()))
 
     def put_done(self, row: Row, done: Done) -> None:
-        """Put steps with what is known behind them, and notes."""
+        """Puts steps with what is known behind them, and notes."""
         steps, row.state, notes = done
         row.steps += steps
         row.asked = None

@@ -66,7 +66,7 @@ class Builder(Branches):
         return tuple(row.steps), row.state
 
     def _next(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
-        """Take the clause at `at`, and those that belong to it; the index of the one behind."""
+        """Takes the clause at `at`, and those that belong to it; the index of the one behind."""
         clause = clauses[at]
         if clause.anyway or clause.ends_anyway:
             return self.always(row, clauses, at)
@@ -86,7 +86,7 @@ class Builder(Branches):
         return self._act(row, clause, clauses, at)
 
     def _act(self, row: Row, clause: Clause, clauses: Sequence[Clause], at: int) -> int:
-        """Take the clause at `at`, which begins with what is to be done; the index of the one behind."""
+        """Takes the clause at `at`, which begins with what is to be done; the index of the one behind."""
         text = clause.text
         self.verb = match[0] if (match := ACTS.giving.match(text)) is not None else self.verb
         if ACTS.answered.fullmatch(text) is not None and self._answered(row):
@@ -108,7 +108,7 @@ class Builder(Branches):
         return at + 1
 
     def _answered(self, row: Row) -> bool:
-        """Whether what was looked at before is answered anyway."""
+        """Returns whether what was looked at before is answered anyway."""
         self.flush(row)
         last = row.steps[-1] if row.steps else None
         found = last is not None and bool(last.commands) and last.commands[-1].task is Task.FIND
@@ -172,7 +172,7 @@ class Builder(Branches):
         self.put(row, Speak(speak=template(said.text or told)), row.state)
 
     def _to(self, row: Row, to: Listener | None) -> None:
-        """Go to whom something is said."""
+        """Goes to whom something is said."""
         if to is None or not (to.who or to.where):
             return
         who = behind_preposition(self.reader.items_of(to.who), "to") if to.who and not to.speaker else ()
@@ -295,7 +295,7 @@ class Builder(Branches):
         return end
 
     def _in_each(self, row: Row, says: Clause) -> None:
-        """Say something in every room."""
+        """Says something in every room."""
         self.flush(row)
         for room in self.reader.knowledge.places:
             there = Chunk(phrase_of_name(room, NounKind.PLACE), "to", PrepositionRole.GOAL)

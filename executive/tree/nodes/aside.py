@@ -52,7 +52,7 @@ class InTheWay(ExplainedLeaf):
         return {options[name]: kind for name, kind in types.items()} | {options["clear_key"]: tuple[Circle, ...]}
 
     def update(self) -> Status:
-        """Write where it is, and where it must not be put."""
+        """Writes where it is, and where it must not be put."""
         board = self.context.board
         obstacle: ObjectObservation = board.get(self.blocking_key)[0]
         wanted: ObjectObservation = board.get(self.wanted_key)
@@ -96,7 +96,7 @@ def move_aside_plan(
     surfaces: tuple[Surface, ...] | FromBoard,
     tuck: NodeSpec,
 ) -> NodeSpec:
-    """Take the first object under the key `blocking`, and put it where it is not in the way of the one under `wanted`.
+    """Takes the first object under the key `blocking`, and put it where it is not in the way of the one under `wanted`.
 
     `tuck` draws the arm in between. What finds no room there is set down again anywhere on its surface, so that the
     gripper is free. In the end the robot goes back to where it stood, since from there a grasp was found without it.

@@ -18,7 +18,7 @@ from skills.robot import Pose2D
 
 
 def carry_plan(builder: PlanBuilder) -> NodeSpec:
-    """Carry the item to a person, to the start, or to a surface of a place."""
+    """Carries the item to a person, to the start, or to a surface of a place."""
     command = builder.command
     item = builder.known(command.item or command.object)
     goal = command.goal
@@ -36,7 +36,7 @@ def carry_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
-    """Carry it there and hold it out; the gripper opens when the person takes it."""
+    """Carries it there and holds it out; the gripper opens when the person takes it."""
     to = "the start" if isinstance(pose, FromBoard) else person
     ports = {"person": person, **({"thing": str(item)} if builder.has_ports("hand_over", ("thing",)) else {})}
     way = _holding(builder, item, f"to {to}", go_near_plan(builder, pose, to))
@@ -63,7 +63,7 @@ def put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> tuple[NodeSp
 
 
 def _put_on_plan(builder: PlanBuilder, item: Thing, surface: str, to: str) -> NodeSpec:
-    """Carry it there and put it down; both under guards."""
+    """Carries it there and puts it down; both under guards."""
     view, carry = pose_2d(builder.knowledge.surfaces[surface].viewpoints[0]), builder.at("carry")
     place = builder.skill("place", {"surface": builder.surface(surface)})
     return builder.sequence(

@@ -67,7 +67,7 @@ class ForEachFound(MemoryComposite):
         return {options["done"]: Seen, options["missed"]: Seen}
 
     def tick(self) -> Iterator[Behaviour]:
-        """Look anew in each round; until then the results of the round before are to be seen."""
+        """Looks anew in each round; until then the results of the round before are to be seen."""
         if self._index == 0 and self.children[0].status != Status.RUNNING:
             self._reset_children()
         yield from super().tick()
@@ -97,7 +97,7 @@ class ForEachFound(MemoryComposite):
             self._end(cause_of(look), f"{self._told()}, then {message_of(look)}")
 
     def _action_ended(self, action: Behaviour) -> None:
-        """Note what became of the object, and look anew."""
+        """Notes what became of the object, and looks anew."""
         seen: ObjectObservation = self.board.get(self.key)
         x, y, _ = seen.position_W
         missed = self._noted(self.missed)
@@ -148,7 +148,7 @@ def is_clearing(get: Command, bring: Command | None) -> bool:
 
 
 def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
-    """Look whether anything is left, and take it away, until nothing is; `builder` is that of the command to get it.
+    """Looks whether anything is left, and takes it away, until nothing is; `builder` is that of the command to get it.
 
     Raises InputError: it is not said from where to where, it is to be brought to a person, or where it is taken from.
     """
@@ -190,7 +190,7 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
 
 
 def refuse_everything(builder: PlanBuilder) -> None:
-    """Refuse to take everything in one go. Raises InputError: a command on its own that is about everything."""
+    """Refuses to take everything in one go. Raises InputError: a command on its own that is about everything."""
     command = builder.command
     if any(thing is not None and thing.name == EVERYTHING for thing in (command.item, command.object)):
         hint = "say from where to where in one step: 'move everything from the desk to the shelf'"

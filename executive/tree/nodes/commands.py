@@ -122,7 +122,7 @@ def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
 
 
 def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
-    """Find it, stand before it, take it, tuck the arm in.
+    """Finds it, stands before it, takes it, tuck the arm in.
 
     When standing or taking fails, what fits the failure is done and the robot looks again and tries anew; when nothing
     is to be found that is final. With `anywhere`, it is looked for elsewhere, too, when it is not in its place. What an
@@ -153,7 +153,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
 
 
 def go_plan(builder: PlanBuilder) -> NodeSpec:
-    """Go to a place, a person or the start; with an item in the gripper, carry it."""
+    """Goes to a place, a person or the start; with an item in the gripper, carries it."""
     command = builder.command
     if command.item is not None:
         return carry_plan(builder)
@@ -165,7 +165,7 @@ def go_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def wait_plan(builder: PlanBuilder) -> NodeSpec:
-    """Go to the place, where one is named, and wait there for a time.
+    """Goes to the place, where one is named, and waits there for a time.
 
     Raises InputError: it is no time, or too long a one.
     """
@@ -200,7 +200,7 @@ def are_trips(get: Command, bring: Command | None) -> bool:
 
 
 def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
-    """Get one and bring it there, as often as was said; `builder` is that of the command to get them.
+    """Gets one and brings it there, as often as was said; `builder` is that of the command to get them.
 
     Raises InputError: too many; to a person, who takes one; no place to take them from, or
     one where those that were brought would be found again.
@@ -226,7 +226,7 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
 
 
 def _trip(builder: PlanBuilder, bring: Command, number: int) -> NodeSpec:
-    """Get one object and bring it."""
+    """Gets one object and brings it."""
     trip = builder.at(f"trip-{number}")
     get_one = replace(trip.at("get"), command=replace(builder.command, object_count=1))
     bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))

@@ -80,7 +80,7 @@ class View:
         return f"{minutes // 60:02d}:{minutes % 60:02d}"
 
     def pressed(self, button: str) -> bool:
-        """Whether a button has been pressed since."""
+        """Returns whether a button has been pressed since."""
         return self.context.presses().get(button, 0) > self.presses.get(button, 0)
 
     def forget_presses(self) -> None:
@@ -267,12 +267,12 @@ class Decide(MemoryComposite):
         self.context.board.forget(key for key, look in self.decision.looks if not self._fresh(key, look.max_age_s))
 
     def _fresh(self, key: str, max_age_s: float) -> bool:
-        """Whether an answer of an earlier time need not be asked for again."""
+        """Returns whether an answer of an earlier time need not be asked for again."""
         old_s = self.context.clock.now() - self._given_s.get(key, -math.inf)
         return max_age_s > 0.0 and old_s <= max_age_s
 
     def _decided(self) -> bool:
-        """Whether it has come to an end."""
+        """Returns whether it has come to an end."""
         try:
             holds = self.decision.holds(self.view)
         except ExpressionError as error:

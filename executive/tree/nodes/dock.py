@@ -17,7 +17,7 @@ from skills.robot import Pose2D
 
 
 def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
-    """Stand on the dock and charge; where it does not charge, back off and dock again."""
+    """Stands on the dock and charge; where it does not charge, back off and docks again."""
     charge = builder.skill("charge", {"level": level})
     attempt = builder.at("attempt").sequence(
         "dock and charge", builder.navigate(dock, "the dock", exactly=True), charge
@@ -27,7 +27,7 @@ def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
 
 
 def charge_plan(builder: PlanBuilder) -> NodeSpec:
-    """Go to the dock and charge there. Raises InputError: anything else is said with it."""
+    """Goes to the dock and charge there. Raises InputError: anything else is said with it."""
     command, facts = builder.command, builder.knowledge
     if any(part is not None for part in (command.item, command.goal, command.object)):
         raise builder.error("the robot charges itself, at its dock", "say 'do: charge' alone")

@@ -29,7 +29,7 @@ _BODY_M: Final = (1.3, 0.7)
 
 
 def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str) -> NodeSpec:
-    """Go before the door in the room on one side, or else on the other, and look; the answer goes to `key`.
+    """Goes before the door in the room on one side, or else on the other, and looks; the answer goes to `key`.
 
     The side with more doors comes first: whoever must go through a door to look at it need not look.
 

@@ -79,7 +79,7 @@ class Fallen(ExplainedLeaf):
         return {options["pose_key"]: Pose2D, options["spot_key"]: spot, options["set_down_key"]: Surface, **surfaces}
 
     def initialise(self) -> None:
-        """Write where it is looked for: where the robot stands just now."""
+        """Writes where it is looked for: where the robot stands just now."""
         self.clear_explanation()
         self._end_s = self.context.clock.now() + self.settle_s
         pose = self.context.pose()
@@ -88,7 +88,7 @@ class Fallen(ExplainedLeaf):
         self._write(pose, self.ahead_m)
 
     def update(self) -> Status:
-        """Feel for a moment whether the gripper still holds something."""
+        """Feels for a moment whether the gripper still holds something."""
         if self.context.clock.now() < self._end_s:
             return self.say(f"feels whether the {self.thing} is still held", Status.RUNNING)
         towards = self._towards_free_floor()
@@ -101,7 +101,7 @@ class Fallen(ExplainedLeaf):
         return self.say(f"the {self.thing} {happened} on the way {self.to}; it {then}")
 
     def _write(self, pose: Pose2D, ahead_m: float) -> None:
-        """Write where the object lies: so far (m) before the body at a pose."""
+        """Writes where the object lies: so far (m) before the body at a pose."""
         board, spot = self.context.board, compose(pose, Pose2D(ahead_m, 0.0, 0.0))
         floor = floor_square(pose, ahead_m, self.half_m)
         board.put(self.pose_key, pose)
@@ -143,7 +143,7 @@ class SurfacesNear(ExplainedLeaf):
         return {options["key"]: tuple[Surface, ...]}
 
     def update(self) -> Status:
-        """Look which surfaces are near."""
+        """Looks which surfaces are near."""
         pose = self.context.pose()
         here = (pose.x_m, pose.y_m)
         near = sorted((distance_m(surface.polygon_W, here), k) for k, surface in enumerate(self.surfaces))
@@ -212,7 +212,7 @@ def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
 
 
 def _free_gripper_plan(builder: PlanBuilder, item: Thing, set_down_key: str) -> NodeSpec:
-    """Set down what is still held; where that fails, draw it in. An empty arm is stowed."""
+    """Sets down what is still held; where that fails, draws it in. An empty arm is stowed."""
     below = builder.at("set-down")
     set_down = below.skill("place", {"surface": FromBoard(set_down_key)})
     held = below.node("only if holding", f"set the {item} down", set_down)
@@ -227,7 +227,7 @@ def _stand_back_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def _look_plan(builder: PlanBuilder, item: Thing, keys: dict[str, str]) -> NodeSpec:
-    """Look from here where it fell and about there, then at the surfaces near, then at the floor from either side."""
+    """Looks from here where it fell and about there, then at the surfaces near, then at the floor from either side."""
     floor, detection = FromBoard(keys["floor"]), keys["detection"]
     aside = [
         below.sequence(
@@ -253,7 +253,7 @@ def _look_plan(builder: PlanBuilder, item: Thing, keys: dict[str, str]) -> NodeS
 
 
 def _near_plan(builder: PlanBuilder, item: Thing, detection: str) -> NodeSpec:
-    """Look at the surfaces near where it was lost."""
+    """Looks at the surfaces near where it was lost."""
     facts, near = builder.knowledge, builder.key("surfaces")
     surfaces = builder.node(
         "surfaces near",

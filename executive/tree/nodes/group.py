@@ -109,7 +109,7 @@ def framed(
 
 
 def _is_holding(condition: Condition) -> bool:
-    """Whether a condition says that the gripper holds something, alone or together with others."""
+    """Returns whether a condition says that the gripper holds something, alone or together with others."""
     match condition:
         case ValueIs(text=text):
             return text.strip() == "holding"

@@ -328,7 +328,7 @@ class Guard(ExplainedDecorator):
         self.condition = self.condition.for_run(self.context)
 
     def initialise(self) -> None:
-        """Forget for how long something was so."""
+        """Forgets for how long something was so."""
         self.condition.begin(self.context)
 
     def _held_back(self) -> Status | None:

@@ -96,7 +96,7 @@ class Interrupt(ExplainedDecorator):
             condition.begin(self.context)
 
     def wants_tick(self, mission: Behaviour) -> bool:
-        """Whether it is under way or called; `waiting` says what it waits for before it can tell."""
+        """Returns whether it is under way or called; `waiting` says what it waits for before it can tell."""
         self.waiting = ""
         if self.status == Status.RUNNING:
             return True
@@ -141,7 +141,7 @@ class Interrupts(MemoryComposite):
     kind = "interrupts"
 
     def tick(self) -> Iterator[Behaviour]:
-        """Look at the watches in order; tick the first that has to do, else the mission."""
+        """Looks at the watches in order; tick the first that has to do, else the mission."""
         watches: list[Any] = self.children[:-1]
         mission = self.children[-1]
         if self.status != Status.RUNNING:
@@ -161,7 +161,7 @@ class Interrupts(MemoryComposite):
         yield self
 
     def _hold(self, watch: Monitor | Interrupt, below: Sequence[Behaviour]) -> None:
-        """Let nothing below a watch move; give it up when the watch failed."""
+        """Lets nothing below a watch move; give it up when the watch failed."""
         self.current_child = watch
         if not watch.waiting and watch.status == Status.FAILURE:
             for child in below:

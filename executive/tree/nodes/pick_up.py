@@ -46,7 +46,7 @@ A lost object is searched where one was just seen, else looked for again, on the
 
 
 def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> NodeSpec:
-    """Drive to a pose, called `to`, or, when there is no path to it, to one nearby in the same room."""
+    """Drives to a pose, called `to`, or, when there is no path to it, to one nearby in the same room."""
     nearby = _nearby(builder, pose)
     direct = builder.navigate(pose, to, nearby_m=tuple(nearby))
     others = [
@@ -80,7 +80,7 @@ def pick_up_plan(
     *,
     seen: bool = False,
 ) -> NodeSpec:
-    """Find (`search`, which writes `key`), approach, grasp and tuck the arm in, with recoveries.
+    """Finds (`search`, which writes `key`), approaches, grasps and tuck the arm in, with recoveries.
 
     A failure ends with the arm stowed. With `seen`, an earlier node has just written `key`: only further attempts begin
     with the search.
@@ -130,7 +130,7 @@ def _grasp_plan(builder: PlanBuilder, near: str, tried: str, blocking: str | Non
 
 
 def tuck_plan(builder: PlanBuilder) -> NodeSpec:
-    """Draw the arm in, twice if need be; where that does not work but the object is held, go on with it."""
+    """Draws the arm in, twice if need be; where that does not work but the object is held, goes on with it."""
     causes = frozenset({Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION})
     twice = builder.node(
         "retry", "draw in the arm, twice if need be", builder.skill("stow"), part="tuck-in", attempts=2, causes=causes
@@ -150,12 +150,12 @@ def held_plan(builder: PlanBuilder, thing: Thing) -> NodeSpec:
 
 
 def known_held_plan(builder: PlanBuilder, thing: Thing) -> NodeSpec:
-    """Draw in what a grasp that failed or was broken off took hold of; only if that is the object."""
+    """Draws in what a grasp that failed or was broken off took hold of; only if that is the object."""
     known = {"known_as": builder.sought(thing.name), "attributes": thing.attributes}
     tuck = _tucked(builder, thing)
     return builder.node("only if holding", f"it took hold of the {thing}", tuck, part="only-if", **known)
 
 
 def _tucked(builder: PlanBuilder, thing: Thing) -> NodeSpec:
-    """Draw the arm in under a guard that the gripper holds the object."""
+    """Draws the arm in under a guard that the gripper holds the object."""
     return builder.node("guard", f"holding {thing}", tuck_plan(builder), part="held", condition=Holds(str(thing)))

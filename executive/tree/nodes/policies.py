@@ -49,11 +49,11 @@ class Timeout(ExplainedDecorator):
     clock: Clock
 
     def initialise(self) -> None:
-        """Start the time."""
+        """Starts the time."""
         self._time = StoppableTime(self.clock)
 
     def suspend(self) -> None:
-        """Stop counting until the next tick."""
+        """Stops counting until the next tick."""
         self._time.stop()
 
     def update(self) -> Status:
@@ -154,7 +154,7 @@ class AskOperator(Skip):
         return self.say(f"asks the operator: {text}", Status.RUNNING)
 
     def stop(self, new_status: Status) -> None:
-        """Take an open question back when the tree is stopped."""
+        """Takes an open question back when the tree is stopped."""
         if new_status == Status.INVALID and self._asked is not None:
             self._asked.withdraw()
             self._asked = None
@@ -242,12 +242,12 @@ class RememberPose(ExplainedLeaf):
         return {options["key"]: Pose2D}
 
     def initialise(self) -> None:
-        """Start the patience."""
+        """Starts the patience."""
         self.clear_explanation()
         self._started_s = self.context.clock.now()
 
     def update(self) -> Status:
-        """Write the pose, or wait for one."""
+        """Writes the pose, or waits for one."""
         if self.keep and self.key in self.context.board:
             return self.say("began before")
         if self.context.localiser.estimate().localised:

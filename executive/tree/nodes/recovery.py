@@ -33,7 +33,7 @@ class Trigger:
     own: bool = False
 
     def fits(self, attempt: Behaviour) -> bool:
-        """Whether an attempt failed so."""
+        """Returns whether an attempt failed so."""
         return any(self._is_it(node, attempt) for node in attempt.iterate())
 
     def _is_it(self, node: Behaviour, attempt: Behaviour) -> bool:
@@ -65,7 +65,7 @@ class Recovery:
         return replace(self, triggers=tuple(replace(each, node=paths[each.node or ""]) for each in self.triggers))
 
     def fits(self, attempt: Behaviour, board: Board) -> bool:
-        """Whether it is for the failure of an attempt."""
+        """Returns whether it is for the failure of an attempt."""
         if self.given is not None and not (self.given in board and board.get(self.given)):
             return False
         return any(trigger.fits(attempt) for trigger in self.triggers)
@@ -119,7 +119,7 @@ class Recover(MemoryComposite):
         return None
 
     def _take_over(self, child: Behaviour) -> None:
-        """See what comes of the attempt or the recovery that is under way."""
+        """Sees what comes of the attempt or the recovery that is under way."""
         if child.status == Status.RUNNING:
             self._go_on(message_of(child))
         elif self._index == 0:
@@ -142,13 +142,13 @@ class Recover(MemoryComposite):
             self._fail(tried)
 
     def _fits(self, number: int) -> bool:
-        """Whether a recovery is for the failure of the attempt, applies and is not used up."""
+        """Returns whether a recovery is for the failure of the attempt, applies and is not used up."""
         recovery, node = self.recoveries[number], self.children[number + 1]
         applies = not isinstance(node, Conditional) or node.applies()
         return applies and self._uses[number] < recovery.uses and recovery.fits(self.children[0], self.board)
 
     def _next_recovery(self) -> bool:
-        """Turn to the next recovery that is due; False when there is none."""
+        """Turns to the next recovery that is due; False when there is none."""
         if not self._due:
             return False
         chosen = self._due.pop(0)
@@ -170,7 +170,7 @@ class Recover(MemoryComposite):
             self._fail(f"; {recovery.name}: {message_of(recovery)}", error)
 
     def _fail(self, addition: str, cause: Cause | None = None) -> None:
-        """End with what is decisive, and what came last."""
+        """Ends with what is decisive, and what came last."""
         last = _AttemptFailure.of(self.children[0])
         decisive = self._farthest or last
         then = "" if decisive.message == last.message else f", then {last.message}"
@@ -217,7 +217,7 @@ class OnlyIfKnown(MemoryComposite):
         return {options["key"]: ObjectObservation}
 
     def applies(self) -> bool:
-        """Whether the key has been written."""
+        """Returns whether the key has been written."""
         return self.key in self.board
 
 
@@ -233,7 +233,7 @@ class OnlyIfHolding(MemoryComposite):
     attributes: tuple[str, ...] = ()
 
     def applies(self) -> bool:
-        """Whether something is held, or that object."""
+        """Returns whether something is held, or that object."""
         if not self.context.robot.gripper().holding:
             return False
         return self.known_as is None or is_known_as(self.context.payload.thing, self.known_as, self.attributes)

@@ -47,7 +47,7 @@ class Repeat(MemoryComposite):
     _due_s: float = field(default=0.0, init=False)
 
     def tick(self) -> Iterator[Behaviour]:
-        """Begin a round, decide, or tick the body."""
+        """Begins a round, decides, or tick the body."""
         if self.status != Status.RUNNING:
             self._restart()
         if self._phase == "start":
@@ -176,7 +176,7 @@ def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> As
 
 
 def _refuse_endless(block: model.Repeat, condition: Condition | None, builder: PlanBuilder) -> None:
-    """Refuse rounds that go on for ever: nothing that the condition reads can change. Raises InputError."""
+    """Refuses rounds that go on for ever: nothing that the condition reads can change. Raises InputError."""
     if condition is None or block.loop.times is not None or block.timeout_s is not None:
         return
     read: set[str] = set()

@@ -70,12 +70,12 @@ class Answer(ExplainedDecorator):
         return {options["key"]: bool, **({count: float} if count else {})}
 
     def say_again(self, status: Status, cause: Cause | None, message: str) -> None:
-        """Give the answer of before, too."""
+        """Gives the answer of before, too."""
         super().say_again(status, cause, message)
         self.answer = self.board.get(self.key) if status == Status.SUCCESS else None
 
     def initialise(self) -> None:
-        """Forget an earlier answer."""
+        """Forgets an earlier answer."""
         self.answer = None
 
     def update(self) -> Status:
@@ -222,7 +222,7 @@ def detect_plan(
     *,
     tallied: bool = False,
 ) -> NodeSpec:
-    """Look for the object on some surfaces, by name or from the blackboard, from where the robot stands."""
+    """Looks for the object on some surfaces, by name or from the blackboard, from where the robot stands."""
     where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(builder.surface, surfaces))
     ports = {"classes": builder.sought(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
     tally = {_TALLY: builder.key("all")} if tallied else {}
@@ -238,7 +238,7 @@ def find_again_plan(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, ...
 
 
 def search_plan(builder: PlanBuilder, thing: Thing, place: str | None, key: str, *, anywhere: bool = True) -> NodeSpec:
-    """Look from here when it was seen before, else at each surface in turn; the first detection ends the search.
+    """Looks from here when it was seen before, else at each surface in turn; the first detection ends the search.
 
     When it is nowhere in its place, look at some of its surfaces from aside, then, with `anywhere`, at surfaces
     elsewhere. Raises InputError: the place has no surfaces.
@@ -264,7 +264,7 @@ def search_plan(builder: PlanBuilder, thing: Thing, place: str | None, key: str,
 
 
 def _looks_from_aside(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, ...], key: str) -> Iterator[NodeSpec]:
-    """Look again at surfaces that have only one viewpoint, from beside it."""
+    """Looks again at surfaces that have only one viewpoint, from beside it."""
     facts = builder.knowledge.surfaces
     single = [name for name in surfaces if len(facts[name].viewpoints) == 1]
     for name in single[:MOST_ASIDE]:
@@ -294,7 +294,7 @@ def where(knowledge: Knowledge, place: str | None) -> str:
 
 
 def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
-    """Look at the surfaces of the place and answer yes or no; where it is asked where or how many, tell that, too.
+    """Looks at the surfaces of the place and answers yes or no; where it is asked where or how many, tell that, too.
 
     The answer goes to `answer_key`, which is a key of this subtree unless one is given.
 
@@ -358,7 +358,7 @@ def answering(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
 
 
 def refuse_several(builder: PlanBuilder) -> None:
-    """Refuse a count that no trips are made of; in a question and of a time any count will do.
+    """Refuses a count that no trips are made of; in a question and of a time any count will do.
 
     Raises InputError: more than one object, or an open number of objects.
     """

@@ -93,7 +93,7 @@ class SkillLeaf(ExplainedLeaf):
         return self.active and self._time.stopped
 
     def initialise(self) -> None:
-        """Begin a new attempt; a defect is kept for `update`, since an exception here would leave the tree hanging."""
+        """Begins a new attempt; a defect is kept for `update`, since an exception here would leave the tree hanging."""
         self.clear_explanation()
         self.progress = None
         self._false_start = self._guarded(self._begin)
@@ -114,7 +114,7 @@ class SkillLeaf(ExplainedLeaf):
         return Status.FAILURE if isinstance(step, Failed) else Status.SUCCESS
 
     def suspend(self) -> None:
-        """Let the skill stop its motion and keep its place; does nothing on an idle or suspended leaf."""
+        """Lets the skill stop its motion and keeps its place; does nothing on an idle or suspended leaf."""
         if not self.active or self.suspended:
             return
         active = self._first or self._skill
@@ -133,7 +133,7 @@ class SkillLeaf(ExplainedLeaf):
             self.clear_explanation()
 
     def abandon(self) -> None:
-        """End an active skill and say that it was cancelled; does nothing on an idle leaf."""
+        """Ends an active skill and says that it was cancelled; does nothing on an idle leaf."""
         if not self.active:
             return
         defect = self._ended()
@@ -194,12 +194,12 @@ class SkillLeaf(ExplainedLeaf):
         return step
 
     def _ended(self) -> Failed | None:
-        """Call `end` once; a Failed when it raised."""
+        """Calls `end` once; a Failed when it raised."""
         active, self._first, self._skill = self._first or self._skill, None, None
         return None if active is None else self._guarded(active.end)
 
     def _written(self, step: Succeeded | Failed) -> Succeeded | Failed:
-        """Put the outputs on the blackboard; a missing or wrongly typed output is a defect of the skill.
+        """Puts the outputs on the blackboard; a missing or wrongly typed output is a defect of the skill.
 
         A failure need not fill all ports: what it learnt is for the next attempt.
         """

@@ -63,7 +63,7 @@ class AskPeople(ExplainedLeaf):
         return {options["key"]: options["gives"]}
 
     def initialise(self) -> None:
-        """Put the question."""
+        """Puts the question."""
         self.clear_explanation()
         self._false_start = None
         self._until_s = self.context.clock.now() + self.limit_s
@@ -90,7 +90,7 @@ class AskPeople(ExplainedLeaf):
         return Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
-        """Take an open question back when it is stopped from outside."""
+        """Takes an open question back when it is stopped from outside."""
         if new_status != Status.INVALID:
             return
         if self._asked is not None:

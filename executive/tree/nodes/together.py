@@ -32,7 +32,7 @@ class Together(MemoryComposite):
     _done: list[Behaviour] = field(default_factory=list, init=False)
 
     def tick(self) -> Iterator[Behaviour]:
-        """Tick all that are not done."""
+        """Ticks all that are not done."""
         if self.status != Status.RUNNING:
             self._restart()
             self._failed, self._done = [], []
@@ -85,7 +85,7 @@ def _plan(assembler: Assembler, block: model.Together, builder: PlanBuilder) -> 
 
 
 def _refuse_collisions(branches: Sequence[NodeSpec], builder: PlanBuilder) -> None:
-    """Refuse branches that use the same part of the robot. Raises InputError."""
+    """Refuses branches that use the same part of the robot. Raises InputError."""
     users: dict[Part, int] = {}
     for number, branch in enumerate(branches, start=1):
         skills = (node.options["skill"] for node in branch.walk() if node.kind == "skill")

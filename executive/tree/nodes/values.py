@@ -42,7 +42,7 @@ class SetValues(ExplainedLeaf):
         return kinds
 
     def update(self) -> Status:
-        """Work them out."""
+        """Works them out."""
         told = []
         for key, each in self.values.items():
             try:

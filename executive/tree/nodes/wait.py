@@ -24,12 +24,12 @@ class Pause(ExplainedLeaf):
     clock: Clock
 
     def initialise(self) -> None:
-        """Start the time."""
+        """Starts the time."""
         self.clear_explanation()
         self._end_s = self.clock.now() + self.duration_s
 
     def update(self) -> Status:
-        """Wait until the time is over."""
+        """Waits until the time is over."""
         done = self.clock.now() >= self._end_s
         return self.say(f"waited {self.duration_s:g} s") if done else self.say("waits a moment", Status.RUNNING)
 
@@ -48,7 +48,7 @@ class WaitFor(ExplainedDecorator):
     clock: Clock
 
     def initialise(self) -> None:
-        """Ask at once; presses of buttons count from now on."""
+        """Asks at once; presses of buttons count from now on."""
         self._due_s = self.clock.now()
         if isinstance(self.decorated, Decide):
             self.decorated.view.forget_presses()
@@ -57,7 +57,7 @@ class WaitFor(ExplainedDecorator):
         return Status.RUNNING if self.clock.now() < self._due_s - 1e-9 else None
 
     def update(self) -> Status:
-        """Whether it holds."""
+        """Returns whether it holds."""
         status = self.pass_on()
         if status != Status.SUCCESS:
             return status
@@ -77,14 +77,14 @@ class WaitUntilClock(ExplainedLeaf):
     context: RunContext
 
     def initialise(self) -> None:
-        """See how far it is until then."""
+        """Sees how far it is until then."""
         self.clear_explanation()
         now_s = self.context.clock.now()
         ahead_s = (self.time_s - self.context.day_began_s - now_s) % DAY_S
         self._end_s = now_s + ahead_s if ahead_s <= DAY_S / 2 else now_s
 
     def update(self) -> Status:
-        """Wait until the time has come."""
+        """Waits until the time has come."""
         done = self.context.clock.now() >= self._end_s - 1e-9
         return self.say(f"it is {self.words}") if done else self.say(f"waits until {self.words}", Status.RUNNING)
 

@@ -76,7 +76,7 @@ class Mesh:
         return self.materials[name]
 
     def add_triangles(self, material: str, points: ArrayLike, normals: ArrayLike, uvs: ArrayLike) -> None:
-        """Add (N, 3, 3) corner points and normals with (N, 3, 2) texture coordinates. Raises KeyError."""
+        """Adds (N, 3, 3) corner points and normals with (N, 3, 2) texture coordinates. Raises KeyError."""
         self._material(material)
         group = self._groups.setdefault(material, _Triangles())
         group.points.append(np.asarray(points, dtype=float).reshape(-1, 3))
@@ -84,7 +84,7 @@ class Mesh:
         group.uvs.append(np.asarray(uvs, dtype=float).reshape(-1, 2))
 
     def add_rectangle(self, material: str, corner: ArrayLike, edge_u: ArrayLike, edge_v: ArrayLike) -> None:
-        """Add the rectangle from `corner` along two edges; its normal is edge_u x edge_v."""
+        """Adds the rectangle from `corner` along two edges; its normal is edge_u x edge_v."""
         p, u, v = (np.asarray(a, dtype=float) for a in (corner, edge_u, edge_v))
         tile = self._material(material).tile_m
         lengths = np.linalg.norm(u), np.linalg.norm(v)
@@ -113,7 +113,7 @@ class Mesh:
         *,
         faces: Mapping[str, str | None] | None = None,
     ) -> None:
-        """Add the box between two corners. `faces` gives other materials (or None: leave out) to -x, +x, ... +z."""
+        """Adds the box between two corners. `faces` gives other materials (or None: leave out) to -x, +x, ... +z."""
         a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
         x, y, z = np.diag(b - a)
         rectangles = {
@@ -132,7 +132,7 @@ class Mesh:
     def add_lathe(
         self, material: str, profile: Sequence[tuple[float, float]], *, centre: ArrayLike = (0, 0, 0), sides: int = 24
     ) -> None:
-        """Turn a profile of (radius, z), from the bottom up, about the vertical through `centre`."""
+        """Turns a profile of (radius, z), from the bottom up, about the vertical through `centre`."""
         outline = np.asarray(profile, dtype=float)
         steps = np.diff(outline, axis=0)
         lengths = np.linalg.norm(steps, axis=1)
@@ -158,13 +158,13 @@ class Mesh:
     def add_cylinder(
         self, material: str, radius: float, low: ArrayLike, height: float, *, cap: str | None = None, sides: int = 20
     ) -> None:
-        """Add an upright closed cylinder on the point `low`; its top may have another material."""
+        """Adds an upright closed cylinder on the point `low`; its top may have another material."""
         centre = np.asarray(low, dtype=float)
         self.add_lathe(material, [(0, 0), (radius, 0), (radius, height)], centre=centre, sides=sides)
         self.add_lathe(cap or material, [(radius, height), (0, height)], centre=centre, sides=sides)
 
     def add_mesh(self, other: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> None:
-        """Add another mesh, turned by the (3, 3) matrix R, then moved by p. R may scale, too."""
+        """Adds another mesh, turned by the (3, 3) matrix R, then moved by p. R may scale, too."""
         matrix, offset = np.asarray(R, dtype=float), np.asarray(p, dtype=float)
         to_normal = np.linalg.inv(matrix)
         for material, points, normals, uvs in other.groups():
@@ -256,6 +256,6 @@ def _mtl_entry(name: str, material: Material) -> str:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file with Unix line ends, making its folder."""
+    """Writes a text file with Unix line ends, making its folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8", newline="\n")

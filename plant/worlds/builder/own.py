@@ -50,7 +50,7 @@ directives:
 
 
 def world_from_grid(folder: Path, grid: Grid, *, start: Pose2D | None, wall_height_m: float) -> None:
-    """Write a world of which the occupied cells are walls. Raises WorldError: the robot finds no place in it."""
+    """Writes a world of which the occupied cells are walls. Raises WorldError: the robot finds no place in it."""
     grid = _workable(grid)
     walls = [_box(grid, cells, wall_height_m) for cells in rectangles(grid.cells == OCCUPIED)]
     _write(folder, walls, {"scan": grid, "keepout": grid}, start)
@@ -63,7 +63,7 @@ def world_from_cylinders(
     start: Pose2D | None,
     around: Sequence[tuple[float, float]] = (),
 ) -> None:
-    """Write a world of upright cylinders (x, y, radius, height), and 2 m around some points.
+    """Writes a world of upright cylinders (x, y, radius, height), and 2 m around some points.
 
     Raises WorldError: the robot finds no place in it.
     """

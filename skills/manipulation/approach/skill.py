@@ -124,7 +124,7 @@ class Approach(ApproachPorts, LookingSkill[ApproachInputs]):
         return free_places(point_W, context.pose(), context.costmap, footprint, distances_m, distances_m[0])
 
     def _why_none(self, seen: ObjectObservation) -> str:
-        """Whether the object itself is beyond the gripper, or only the places about it are."""
+        """Returns whether the object itself is beyond the gripper, or only the places about it are."""
         target, p_BS = observed_target(seen, self.X_WB()), self.model.p_BS
         if self.context.stack.grasp_planner.candidates(target, p_BS=p_BS, gripper=self.gripper):
             return f"there is no free place to stand from which the {seen.thing} is within reach"

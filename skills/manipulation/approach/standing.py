@@ -35,7 +35,7 @@ class Standing:
 
 
 def is_comfortable(pose: Pose2D, point_W: tuple[float, float], arm: ArmCapabilities) -> bool:
-    """Whether the point lies before the robot at a good distance already."""
+    """Returns whether the point lies before the robot at a good distance already."""
     nearest_m, farthest_m = arm.comfortable_m
     dx, dy = point_W[0] - pose.x_m, point_W[1] - pose.y_m
     bearing = wrap(math.atan2(dy, dx) - pose.yaw_rad)
@@ -108,7 +108,7 @@ def _cost(pose: Pose2D, here: Pose2D, off_m: float) -> float:
 
 
 def go_to_one(skill: RoutineSkill[Any], goals: Sequence[NavigateInputs]) -> Routine[None]:
-    """Drive to the first of some goals to which there is a path. Raises SkillFailure."""
+    """Drives to the first of some goals to which there is a path. Raises SkillFailure."""
     for k, goal in enumerate(goals, start=1):
         try:
             yield from skill.perform(Navigate(skill.context), goal)

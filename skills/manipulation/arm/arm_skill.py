@@ -67,7 +67,7 @@ class GripperTurn:
 
     @property
     def closes(self) -> bool:
-        """Whether it ends narrower than it began."""
+        """Returns whether it ends narrower than it began."""
         return self.to_rad < self.from_rad
 
     @property
@@ -110,12 +110,12 @@ class ArmSkill(RoutineSkill[InputsT]):
         self._rng = np.random.default_rng(context.seed)
 
     def begin(self, inputs: InputsT) -> None:
-        """Forget an earlier attempt: what stood around, what was held, the random numbers drawn."""
+        """Forgets an earlier attempt: what stood around, what was held, the random numbers drawn."""
         self._forget()
         super().begin(inputs)
 
     def resume(self, inputs: InputsT) -> None:
-        """Go on after a pause or a restart: what stood around may have moved."""
+        """Goes on after a pause or a restart: what stood around may have moved."""
         if not self.can_go_on():
             self._forget()
         super().resume(inputs)
@@ -142,12 +142,12 @@ class ArmSkill(RoutineSkill[InputsT]):
         return SkillFailure(Cause.POSTCONDITION, message)
 
     def hand_near(self, p_W: FloatArray, within_m: float) -> bool:
-        """Whether the hand is this near to a point in the world."""
+        """Returns whether the hand is this near to a point in the world."""
         p_BP = self.X_WB().inverse() @ np.asarray(p_W)
         return float(np.linalg.norm(self.model.X_BH(self.q_rad()).translation() - p_BP)) < within_m
 
     def try_shift_hand(self, offset_B: FloatArray, message: str, *, clear_of_boxes: bool = False) -> Routine[bool]:
-        """Shift the hand where a straight way is found; whether there was one. It may have to touch nothing."""
+        """Shifts the hand where a straight way is found; whether there was one. It may have to touch nothing."""
         try:
             yield from self.shift_hand(offset_B, message, clear_of_boxes=clear_of_boxes)
         except SkillFailure as failure:
@@ -251,7 +251,7 @@ class ArmSkill(RoutineSkill[InputsT]):
     def move_to(
         self, goal: Goal, message: str, speed_rad_s: float | None = None, opening: float | None = None
     ) -> Routine[FloatArray]:
-        """Plan to the configuration that `goal(scene, q_now)` gives, and go there; gives that configuration.
+        """Plans to the configuration that `goal(scene, q_now)` gives, and goes there; gives that configuration.
 
         The gripper comes to `opening` on the way, as long as its wider opening is free of contact there; what it
         cannot do on the way it does before when it closes, afterwards when it opens.
@@ -300,7 +300,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         clear_of_boxes: bool = False,
         guard: Callable[[FloatArray], bool] | None = None,
     ) -> Routine[bool]:
-        """Move the hand straight to p_BH with the orientation that it has; whether `guard` stopped it (see `follow`).
+        """Moves the hand straight to p_BH with the orientation that it has; whether `guard` stopped it (see `follow`).
 
         The line begins at the joint angles of the arm, or at `q_from_rad`, which the arm about has. With
         `clear_of_boxes` it must not touch what stands around.
@@ -321,7 +321,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return (yield from self.follow(trajectory, message, guard))
 
     def shift_hand(self, offset_B: FloatArray, message: str, *, clear_of_boxes: bool = False) -> Routine[None]:
-        """Move the hand straight by an offset in the body frame."""
+        """Moves the hand straight by an offset in the body frame."""
         p_BH = self.model.X_BH(self.q_rad()).translation() + offset_B
         yield from self.move_straight(p_BH, message, clear_of_boxes=clear_of_boxes)
 
@@ -385,7 +385,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return min(self.context.robot.gripper().opening + self.gripper.like_turn(_RELEASE_RAD), most * self.widest)
 
     def leave_object(self) -> Routine[bool]:
-        """Take fixed finger and palm off what was let go of, and draw the hand back; whether there was a way.
+        """Takes fixed finger and palm off what was let go of, and draws the hand back; whether there was a way.
 
         Fingers that both open are off it already.
         """
@@ -400,7 +400,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         return False
 
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
-        """Close the gripper and fold the arm onto the body; nothing is done where it lies there already."""
+        """Closes the gripper and fold the arm onto the body; nothing is done where it lies there already."""
         stowed = self.model.stowed_rad
         gripper = self.context.robot.gripper()
         closing_rad = 0.0 if not gripper.holding and gripper.opening > self.gripper.like_turn(0.05) else None
@@ -414,7 +414,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         yield from self.stand_at(self.context.robot.capabilities().standing_height_m, message)
 
     def try_stow(self) -> Routine[None]:
-        """Stow where a way is found; used on the way out of failures."""
+        """Stows where a way is found; used on the way out of failures."""
         try:
             yield from self.stow("stowing the arm after the failure")
         except SkillFailure:

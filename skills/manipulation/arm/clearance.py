@@ -53,7 +53,7 @@ def touching(
     R_BX: FloatArray,
     p_BX: FloatArray,
 ) -> bool:
-    """Whether in any configuration of path_rad (K, J) any of S shapes comes within a padding of any of N boxes.
+    """Returns whether in any configuration of path_rad (K, J) any of S shapes comes within a padding of any of N boxes.
 
     Joint j turns about `axes` (J, 3) in its frame F, which is fixed to the link before it, the body for the first:
     R_PF (J, 3, 3), p_PF (J, 3). Shapes come in G groups that hang on one link: `group_joints` (G,) move the links, or
@@ -100,7 +100,7 @@ def touching(
 def _place_links(
     R: FloatArray, p: FloatArray, q_rad: FloatArray, axes: FloatArray, R_PF: FloatArray, p_PF: FloatArray
 ) -> None:
-    """Put the poses of body and J links, in the body frame, into R (J + 1, 3, 3) and p (J + 1, 3)."""
+    """Puts the poses of body and J links, in the body frame, into R (J + 1, 3, 3) and p (J + 1, 3)."""
     R[0], p[0] = np.eye(3), np.zeros(3)
     for j in range(q_rad.shape[0]):
         _place(R[j + 1], p[j + 1], R[j], p[j], R_PF[j], p_PF[j])
@@ -129,7 +129,7 @@ def box_gaps(
 def _place(
     R_AC: FloatArray, p_AC: FloatArray, R_AB: FloatArray, p_AB: FloatArray, R: FloatArray, p: FloatArray
 ) -> None:
-    """Put X_AB @ X_BC into R_AC and p_AC."""
+    """Puts X_AB @ X_BC into R_AC and p_AC."""
     for i in range(3):
         p_AC[i] = p_AB[i] + R_AB[i, 0] * p[0] + R_AB[i, 1] * p[1] + R_AB[i, 2] * p[2]
         for j in range(3):
@@ -138,7 +138,7 @@ def _place(
 
 @compiled
 def _turn(R: FloatArray, axis: FloatArray, angle_rad: float) -> None:
-    """Turn R about a unit axis of its own, by Rodrigues' formula."""
+    """Turns R about a unit axis of its own, by Rodrigues' formula."""
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     x, y, z = axis[0], axis[1], axis[2]
     for i in range(3):

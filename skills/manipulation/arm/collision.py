@@ -94,7 +94,7 @@ class ArmScene:
         self.set_joints(joint_positions_rad)
 
     def set_boxes(self, boxes: Sequence[Box], X_BF: RigidTransform | None = None) -> None:
-        """Replace the boxes around the robot, given in frame F, the body's own where X_BF is left out."""
+        """Replaces the boxes around the robot, given in frame F, the body's own where X_BF is left out."""
         self._boxes, self._X_BF = tuple(boxes), RigidTransform() if X_BF is None else X_BF
         self._obstacles = None
 
@@ -118,7 +118,7 @@ class ArmScene:
         return max(0.0, ahead_m + _LINK_RADIUS_M), max(0.0, beside_m + _LINK_RADIUS_M)
 
     def hold(self, boxes: Sequence[Box]) -> None:
-        """Replace the boxes fixed to the hand (frame H), for a thing held."""
+        """Replaces the boxes fixed to the hand (frame H), for a thing held."""
         self._robot.hold(tuple(boxes))
         self._obstacles = None
 
@@ -143,7 +143,7 @@ class ArmScene:
         self._obstacles = None
 
     def free(self, q_rad: FloatArray) -> bool:
-        """Whether arm angles q_rad (J,) collide with nothing."""
+        """Returns whether arm angles q_rad (J,) collide with nothing."""
         self._work.count("arm_configuration_checks")
         if self._around().meet(np.asarray(q_rad, dtype=float)[None]):
             return False
@@ -168,7 +168,7 @@ class ArmScene:
             self._turn_joints(joints)
 
     def edge_free(self, q_from_rad: FloatArray, q_to_rad: FloatArray) -> bool:
-        """Whether the straight joint motion between two configurations collides with nothing."""
+        """Returns whether the straight joint motion between two configurations collides with nothing."""
         self._work.count("arm_edge_checks")
         steps = max(1, math.ceil(float(np.linalg.norm(q_to_rad - q_from_rad)) / EDGE_STEP_RAD))
         if self._around().meet(np.linspace(q_from_rad, q_to_rad, steps + 1)):
@@ -176,7 +176,7 @@ class ArmScene:
         return bool(self._robot.checker.CheckEdgeCollisionFree(self._full(q_from_rad), self._full(q_to_rad)))
 
     def path_free(self, path_rad: FloatArray) -> bool:
-        """Whether every configuration of a dense path (K, J) is free."""
+        """Returns whether every configuration of a dense path (K, J) is free."""
         return all(self.free(q) for q in path_rad)
 
     def gravity_efforts(self, q_rad: FloatArray) -> FloatArray:
@@ -245,7 +245,7 @@ class _Obstacles:
         self._any_fixed = self._touch(_ALL_OR_NONE, np.zeros((1, len(axes))), _rows(self._fixed))
 
     def meet(self, path_rad: FloatArray) -> bool:
-        """Whether the robot comes within the padding of a box, the arm in any of the configurations (K, J)."""
+        """Returns whether the robot comes within the padding of a box, the arm in any of the configurations (K, J)."""
         return self._any_fixed or self._touch(_ALL_OR_NONE, path_rad, self._moved_rows)
 
     def touched(self, q_rad: FloatArray) -> list[str]:
@@ -328,7 +328,7 @@ class _Robot:
         return q
 
     def hold(self, boxes: tuple[Box, ...]) -> None:
-        """Put boxes into the hand (frame H) instead of those of before."""
+        """Puts boxes into the hand (frame H) instead of those of before."""
         from pydrake.geometry import Box as BoxShape
         from pydrake.planning import BodyShapeDescription
 
@@ -358,7 +358,7 @@ class _Robot:
         return sorted(shapes, key=lambda shape: shape.joint)
 
     def allow_stowed_contacts(self) -> None:
-        """Allow the contacts that there are when the arm is stowed: resting there is what stowing means."""
+        """Allows the contacts that there are when the arm is stowed: resting there is what stowing means."""
         for a, b in _contacts(self.checker, self.positions(self._model.stowed_rad, {})):
             one, other = self.plant.GetBodyByName(a), self.plant.GetBodyByName(b)
             self.checker.SetCollisionFilteredBetween(one, other, True)

@@ -108,6 +108,6 @@ def firmer_n(force_n: float, capabilities: Capabilities) -> float:
 
 
 def grip_again(robot: Robot, force_n: float, *, clock: Clock, lease: Lease) -> CommandId:
-    """Close the gripper about what slips at force_n, more firmly; other motion goes on meanwhile."""
+    """Closes the gripper about what slips at force_n, more firmly; other motion goes on meanwhile."""
     firmly_n = firmer_n(force_n, robot.capabilities())
     return robot.set_gripper(0.0, firmly_n, until_s=clock.now() + GRIP_AGAIN_S, lease=lease)

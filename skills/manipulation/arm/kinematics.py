@@ -60,7 +60,7 @@ class ArmModel:
 
     @cached_property
     def lower_rad(self) -> FloatArray:
-        """Lower joint limits (J,)."""
+        """Lowers joint limits (J,)."""
         return np.array([joint.lower_rad for joint in self.joints])
 
     @cached_property
@@ -97,7 +97,7 @@ class ArmModel:
         return rotation, positions
 
     def within_limits(self, q_rad: FloatArray, margin_rad: float = 0.0) -> bool:
-        """Whether q_rad keeps margin_rad from every limit."""
+        """Returns whether q_rad keeps margin_rad from every limit."""
         return bool(np.all(q_rad >= self.lower_rad + margin_rad) and np.all(q_rad <= self.upper_rad - margin_rad))
 
     def turned_near(self, q_rad: FloatArray, q_near_rad: FloatArray) -> FloatArray:
@@ -122,7 +122,7 @@ class ArmModel:
         return tuple(q for q in solutions if self.within_limits(q, margin_rad))
 
     def reaches(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> bool:
-        """Whether there are joint angles that put the hand at X_BH and keep margin_rad from the limits."""
+        """Returns whether there are joint angles that put the hand at X_BH and keep margin_rad from the limits."""
         if self._seven is not None:
             return self._seven.reaches(X_BH, margin_rad)
         return bool(self.inverse(X_BH, margin_rad))
@@ -236,7 +236,7 @@ def _read_joint(element: ElementTree.Element) -> ChainJoint:
 
 
 def _check_structure(joints: tuple[ChainJoint, ...]) -> None:
-    """Raise ValueError when the closed-form inverse does not fit the chain."""
+    """Raises ValueError when the closed-form inverse does not fit the chain."""
     axes = tuple(tuple(round(a) for a in joint.axis) for joint in joints)
     offsets = [joint.X_PF.translation() for joint in joints]
     turns = [joint.X_PF.rotation() for joint in joints]

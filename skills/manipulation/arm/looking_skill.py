@@ -44,7 +44,7 @@ class LookingSkill(ArmSkill[InputsT]):
         speed_rad_s: float | None = None,
         raised_m: float | None = None,
     ) -> Routine[None]:
-        """Point the camera that looks for objects at p_BT.
+        """Points the camera that looks for objects at p_BT.
 
         One on the hand goes to the first possible of some viewpoints; one on the head turns there, from a body that is
         raised by so much where that is given, and the arm is out of its view. Raises SkillFailure.
@@ -76,7 +76,7 @@ class LookingSkill(ArmSkill[InputsT]):
         yield from self.persist(attempt, message)
 
     def look_from(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[None]:
-        """Go where `goal` says to take a picture; an empty gripper, which else stands before the camera, opens."""
+        """Goes where `goal` says to take a picture; an empty gripper, which else stands before the camera, opens."""
         gripper = self.context.robot.gripper()
         opens = not gripper.holding and gripper.opening < 0.9 * self.widest
         yield from self.move_to(goal, message, speed_rad_s, opening=0.98 * self.widest if opens else None)
@@ -121,7 +121,7 @@ class LookingSkill(ArmSkill[InputsT]):
         return (yield from self.sense(taken, latency_s=PICTURE_LATENCY_S, name=f"{name} picture", message=message))
 
     def at_rest_since(self, image: Image, p_W: FloatArray, within_m: float, message: str) -> Routine[bool]:
-        """Whether more depth pictures, each a moment after the one before, show the same as `image` about p_W.
+        """Returns whether more depth pictures, each a moment after the one before, show the same as `image` about p_W.
 
         Their intervals differ: what rolls to and fro may be back at one time, and not at the next.
         """

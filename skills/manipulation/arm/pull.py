@@ -49,7 +49,7 @@ class PullWatch:
     _felt: int = field(default=0, init=False)
 
     def felt(self, stamp_s: float, q_rad: FloatArray, efforts_nm: FloatArray) -> bool:
-        """Take in a reading, unless it was taken in before; whether somebody pulls."""
+        """Takes in a reading, unless it was taken in before; whether somebody pulls."""
         if stamp_s > self._stamp_s:
             self._stamp_s = stamp_s
             self._take(q_rad, efforts_nm)

@@ -53,7 +53,7 @@ class SevenJoints:
         return np.asarray(found[np.argsort(np.max(strain, axis=1, initial=0.0), kind="stable")])
 
     def reaches(self, X_BL: RigidTransform, margin_rad: float) -> bool:
-        """Whether there are joint angles that put the last link at X_BL."""
+        """Returns whether there are joint angles that put the last link at X_BL."""
         found, pose, limits = np.empty((1, JOINTS)), self._pose(X_BL), self._limits(margin_rad)
         for pans in (self._pans(_FOR_REACH, margin_rad), self._pans(2 * _PANS, margin_rad)):
             if _solve(*pose, pans, *limits, False, True, found):
@@ -100,7 +100,7 @@ def _solve(
     first_only: bool,
     found: NDArray[np.float64],
 ) -> int:
-    """Write solutions into the rows of `found` (N, 7), within limits; how many there are."""
+    """Writes solutions into the rows of `found` (N, 7), within limits; how many there are."""
     ahead, up, a, f = lengths
     count = 0
     for k in range(len(pans)):

@@ -43,7 +43,7 @@ class Target:
 
     @property
     def upright(self) -> bool:
-        """Whether it stands high enough to be taken from the side."""
+        """Returns whether it stands high enough to be taken from the side."""
         return self.height_m > 0.075
 
 

@@ -41,7 +41,7 @@ def others_first(
 
 
 def same_grasp(one: TriedGrasp, other: TriedGrasp) -> bool:
-    """Whether two grasps are the same but for small differences; the gripper may be turned over."""
+    """Returns whether two grasps are the same but for small differences; the gripper may be turned over."""
     least = math.cos(SAME_TURN_RAD)
     pointing = float(np.dot(one.pointing_W, other.pointing_W))
     closing = abs(float(np.dot(one.closing_W, other.closing_W)))

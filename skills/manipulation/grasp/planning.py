@@ -68,7 +68,7 @@ class Surroundings:
     reach_m: float = np.inf
 
     def lets_rise(self, lift_B: FloatArray) -> bool:
-        """Whether the object meets nothing on a straight way up.
+        """Returns whether the object meets nothing on a straight way up.
 
         It is taken a little smaller than its box, so that what it stands on and beside is off it. What overlaps it all
         the same is a part of it: seen from high up, a screwdriver's shaft is an object of its own beside the handle.
@@ -210,7 +210,7 @@ def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -
 
 
 def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, margin_rad: float = 0.08) -> bool:
-    """Whether the arm reaches a grasp, its pre-grasp and the end of its lift; contact is not looked at."""
+    """Returns whether the arm reaches a grasp, its pre-grasp and the end of its lift; contact is not looked at."""
     X_BH, distance = candidate.X_BH, PREGRASPS_M[-1]
     if not (model.reaches(X_BH, margin_rad) and model.reaches(candidate.retreated(distance), margin_rad)):
         return False

@@ -143,7 +143,7 @@ class _Picture:
 
     @property
     def shows_place(self) -> bool:
-        """Whether pixels that tell show half of where the object was, at least."""
+        """Returns whether pixels that tell show half of where the object was, at least."""
         outline = self._outline(np.zeros(3))
         return bool(outline.sum() > 0 and (outline & self.known).sum() > 0.5 * outline.sum())
 

@@ -107,7 +107,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         return view, plan
 
     def _taken(self, view: CloseView, plan: GraspPlan, inputs: GraspInputs) -> Routine[bool]:
-        """Reach for the object and take it, unless it is seen to have moved away: then whether it has."""
+        """Reaches for the object and takes it, unless it is seen to have moved away: then whether it has."""
         seen = inputs.observation
         self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
         aimed = yield from self._reach(view, plan, str(seen.thing))
@@ -117,7 +117,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         return False
 
     def _reach(self, view: CloseView, plan: GraspPlan, thing: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
-        """Bring the hand to the pre-grasp; view and plan as they are aimed there (see `_aimed`)."""
+        """Brings the hand to the pre-grasp; view and plans as they are aimed there (see `_aimed`)."""
         yield from self.follow(plan.to_pregrasp, f"reaching for the {thing}")
         return (yield from self._aimed(view, plan, thing))
 
@@ -150,7 +150,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
     def _plan_from_a_height(
         self, seen: ObjectObservation, avoid: tuple[TriedGrasp, ...]
     ) -> Routine[tuple[CloseView, GraspPlan]]:
-        """Look and plan with the body at the height that suits best, or at another where that one does not do."""
+        """Looks and plans with the body at the height that suits best, or at another where that one does not do."""
 
         heights_m = yield from self._heights(seen)
         message = f"standing up to the {seen.thing}"
@@ -188,12 +188,12 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         return (yield from self.compute(choose, latency_s=0.1, name="choose a height", message=message))
 
     def begin(self, inputs: GraspInputs) -> None:
-        """Forget an earlier attempt, but not the grasps that `inputs` names."""
+        """Forgets an earlier attempt, but not the grasps that `inputs` names."""
         self._tried, self._watch = inputs.avoid, None
         super().begin(inputs)
 
     def resume(self, inputs: GraspInputs) -> None:
-        """Go on after a pause or a restart; what happened meanwhile is no slip."""
+        """Goes on after a pause or a restart; what happened meanwhile is no slip."""
         self._tried, self._watch = inputs.avoid, None if self._watch is None else self.hold_watch()
         super().resume(inputs)
 
@@ -282,7 +282,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         return (yield from self.compute(look, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message))
 
     def _looks_closely(self, p_BT: FloatArray) -> bool:
-        """Whether a camera on the hand looks closely at a point already, past an open gripper."""
+        """Returns whether a camera on the hand looks closely at a point already, past an open gripper."""
         camera = self.object_camera
         open_wide = self.context.robot.gripper().opening > WIDE * self.widest
         return camera.on_hand and open_wide and sees_closely(self.model.X_BH(self.q_rad()) @ camera.X_FC, p_BT)
@@ -354,14 +354,14 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         yield from self.move_gripper(0.0, firmly_n, f"lifting the {thing}")
 
     def _refuse_known_heavy(self, seen: ObjectObservation) -> None:
-        """Raise SkillFailure with cause PRECONDITION for what is known, by its class and size, to be too heavy."""
+        """Raises SkillFailure with cause PRECONDITION for what is known, by its class and size, to be too heavy."""
         arm = self.context.robot.capabilities().arm
         too_heavy = None if arm is None else known_too_heavy(seen, arm.max_payload_kg)
         if too_heavy is not None:
             raise SkillFailure(Cause.PRECONDITION, too_heavy)
 
     def _refuse_heavy(self, mass_kg: float, lift_B: FloatArray, thing: str) -> Routine[None]:
-        """Set down again what weighs more than the arm may carry, and raise SkillFailure with cause PRECONDITION."""
+        """Sets down again what weighs more than the arm may carry, and raises SkillFailure with cause PRECONDITION."""
         arm = self.context.robot.capabilities().arm
         if arm is None or mass_kg <= arm.max_payload_kg:
             return
@@ -407,7 +407,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         return gripper.opening
 
     def _carry(self, grasp: GraspCandidate, thing: str, gently: bool) -> Routine[None]:
-        """Draw back from the surface, hold the object near the body, and check once more."""
+        """Draws back from the surface, holds the object near the body, and checks once more."""
         opening, self._watch = self._check_held(thing, None), self.hold_watch()
         message = f"carrying the {thing}"
         for up_m in _PULL_BACK_UP_M:

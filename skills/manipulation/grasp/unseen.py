@@ -22,7 +22,7 @@ _FEWEST = 3
 
 
 def look_into_unseen(skill: LookingSkill[Any], seen: ObjectObservation, arm_W: FloatArray) -> Routine[bool]:
-    """Look once at where the arm (points, world) would be near an object and no picture has looked; whether it did.
+    """Looks once at where the arm (points, world) would be near an object and no picture has looked; whether it did.
 
     It is not done where the object is too far to see what is about it, and where the arm finds no way to look.
     """

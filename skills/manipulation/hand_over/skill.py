@@ -67,17 +67,17 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
     options: HandOverOptions
 
     def begin(self, inputs: HandOverInputs) -> None:
-        """Forget an earlier attempt."""
+        """Forgets an earlier attempt."""
         self._watch, self.checkpoint = None, {}
         super().begin(inputs)
 
     def resume(self, inputs: HandOverInputs) -> None:
-        """Go on after a pause or a restart; what happened meanwhile is no slip."""
+        """Goes on after a pause or a restart; what happened meanwhile is no slip."""
         self._watch = None if self._watch is None else self.hold_watch()
         super().resume(inputs)
 
     def end(self) -> None:
-        """Withdraw the offer."""
+        """Withdraws the offer."""
         self.context.payload.offered = False
         super().end()
 
@@ -97,7 +97,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         return self._given(inputs, seen)
 
     def _give(self, inputs: HandOverInputs) -> Routine[Seen]:
-        """Hold the object out and let go of it; what became of it."""
+        """Holds the object out and lets go of it; what became of it."""
         self._watch = self.hold_watch()
         person = yield from self._find(inputs.person)
         if not _well_placed(self._ahead(person), self.options.stand_off_range_m):
@@ -116,7 +116,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         return (yield from self._let_go(inputs, held_kg))
 
     def run_again(self, inputs: HandOverInputs) -> Routine[Succeeded]:
-        """Go on from an attempt that was broken off; what was let go of is looked for with the person."""
+        """Goes on from an attempt that was broken off; what was let go of is looked for with the person."""
         self._watch = None
         if not self.checkpoint.get("lets_go"):
             return (yield from self.run(inputs))
@@ -140,7 +140,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         return Succeeded(f"gave the {thing} to {person}")
 
     def _taken(self, inputs: HandOverInputs) -> Routine[bool]:
-        """Wait for a pull at the object, or for the operator's word; False when the time is over.
+        """Waits for a pull at the object, or for the operator's word; False when the time is over.
 
         True as well when the object is out of the gripper: somebody pulled it out, or it has fallen.
         """
@@ -183,7 +183,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         return (yield from self.verify(thing, inputs.person, release_from(self.checkpoint["release"])))
 
     def _feels_nothing(self, message: str) -> Routine[bool]:
-        """Wait until the gripper feels nothing; False when it still does after a while."""
+        """Waits until the gripper feels nothing; False when it still does after a while."""
         end_s = self.context.clock.now() + _FREE_S
         while self.context.robot.gripper().holding:
             if self.context.clock.now() > end_s:
@@ -192,7 +192,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         return True
 
     def _shake(self, message: str) -> Routine[None]:
-        """Open wide, and turn the hand to and fro: what sticks to a finger comes off."""
+        """Opens wide, and turns the hand to and fro: what sticks to a finger comes off."""
         yield from self.move_gripper(_WIDE * self.widest, GRIPPER_FORCE_N, message)
         q, wrist = self.q_rad(), np.eye(len(self.model.names))[-1]
         turns = [q + turn_rad * wrist for turn_rad in _SHAKE_RAD]
@@ -228,7 +228,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         return replace(seen[-1], place_W=(x, y))
 
     def _go_before(self, person: SeenPerson, name: str) -> Routine[None]:
-        """Drive to the nearest free pose that faces the person."""
+        """Drives to the nearest free pose that faces the person."""
         poses = facing_poses(person.place_W, self.context.pose(), self.options.stand_off_m)
         footprint = ArmFootprint(self.context).now()
         free = [pose for pose in poses if footprint_clear(self.context.costmap, footprint, pose)]
@@ -254,7 +254,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         yield from self.move_to(goal, f"holding the object out to {name}", speed_rad_s=0.8)
 
     def _check(self, person: SeenPerson, name: str) -> None:
-        """Raise SkillFailure unless the object is held out near the person."""
+        """Raises SkillFailure unless the object is held out near the person."""
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the object was lost while it was held out to {name}")
         p_BT = self.model.X_BH(self.q_rad()) @ self.p_HT

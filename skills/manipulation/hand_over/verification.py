@@ -114,7 +114,7 @@ class HandOverVerification(LookingSkill[InputsT]):
         return [place for place in places if place[2] < highest_m]
 
     def _turn_to(self, p_WT: FloatArray, viewpoints_B: Sequence[FloatArray], thing: str, message: str) -> Routine[None]:
-        """Point the camera at a point of the world; a hand that finds no way there looks from where it is."""
+        """Points the camera at a point of the world; a hand that finds no way there looks from where it is."""
         try:
             yield from self.look_at(self.X_WB().inverse() @ p_WT, viewpoints_B, message)
         except SkillFailure as failure:
@@ -133,7 +133,7 @@ class HandOverVerification(LookingSkill[InputsT]):
         return (yield from self.compute(look, latency_s=DETECTION_LATENCY_S, name="look who has it", message=message))
 
     def _stow_beside(self, release: Release, message: str) -> Routine[None]:
-        """Stow the arm around the hands, or the tray, that bear the object now.
+        """Stows the arm around the hands, or the tray, that bear the object now.
 
         A hand that comes straight from there first comes near the body: a long way round would swing it through what
         no camera has seen. Where there is no way, the robot backs off a little first; then any way will do.

@@ -79,7 +79,7 @@ class HeldObject:
         return [(ABOVE_M, 0.0), (LEAST_ABOVE_M, 0.0), *tilted]
 
     def _is_flat(self) -> bool:
-        """Whether the object is too low for its width to fall over when the gripper lets go of it tilted."""
+        """Returns whether the object is too low for its width to fall over when the gripper lets go of it tilted."""
         x, y, height = np.ptp(self.corners_H @ self.R_BH.matrix().T, axis=0)
         return bool(height < _FLAT * min(x, y))
 
@@ -156,7 +156,7 @@ def reaches(model: ArmModel, X_BH: RigidTransform) -> bool:
 
 
 def _can_put_down(scene: ArmScene, q_rad: FloatArray, above_m: float, planner: ArmPlanner, release: Release) -> bool:
-    """Whether the hand can go down from there and, with its finger open, back again."""
+    """Returns whether the hand can go down from there and, with its finger open, back again."""
     X_BH = scene.model.X_BH(q_rad)
     lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, above_m])
     back = lowered @ RigidTransform([-_LEAST_BACK_M, 0.0, 0.0])

@@ -92,7 +92,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return "the object is still in the gripper" if self.context.robot.gripper().holding else None
 
     def run(self, inputs: PlaceInputs) -> Routine[Succeeded]:
-        """Go near, look, put down, look again."""
+        """Goes near, looks, puts down, looks again."""
         surface = inputs.surface
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
@@ -111,7 +111,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return Succeeded(f"put the object down on the {surface.name}")
 
     def _put_down(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[None]:
-        """Find a spot, lower the object, let go, check, stow."""
+        """Finds a spot, lowers the object, lets go, checks, stow."""
         above = yield from self._find_spot(surface, held, carried)
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
@@ -213,7 +213,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return body_heights_m(surface.height_m, self.context.robot.capabilities())
 
     def _go_near(self, surface: Surface, held: HeldObject) -> Routine[None]:
-        """Drive nearer when the spots nearby are out of the arm's reach."""
+        """Drives nearer when the spots nearby are out of the arm's reach."""
         pose, near = self.context.pose(), spaced_spots(_by_distance(self._spots(surface), self.X_WB()))[:_OTHER_SPOTS]
         for spot in near:
             offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
@@ -224,7 +224,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         yield from self._go_before(near, surface, held)
 
     def _go_before(self, candidates: Sequence[FloatArray], surface: Surface, held: HeldObject) -> Routine[FloatArray]:
-        """Drive to where the first of some spots that can be is within the arm's reach, or as near as may be.
+        """Drives to where the first of some spots that can be is within the arm's reach, or as near as may be.
 
         Gives that spot. Raises SkillFailure with cause PLANNING: there is no free place before any of them.
         """
@@ -245,13 +245,13 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return spot
 
     def _tucked(self) -> bool:
-        """Whether the hand is drawn in to the body."""
+        """Returns whether the hand is drawn in to the body."""
         X_BH, tuck_x_m = self.model.X_BH(self.q_rad()), self.arm.tuck_x_m
         beside = abs(float(X_BH.rotation().matrix()[1, 0])) > _BESIDE
         return bool(tuck_x_m) and beside and float(X_BH.translation()[0]) < max(tuck_x_m) + _TUCKED_M
 
     def _draw_in(self, held: HeldObject) -> Routine[bool]:
-        """Draw in what sticks out over the surface while the robot drives up to it; whether the arm can."""
+        """Draws in what sticks out over the surface while the robot drives up to it; whether the arm can."""
         arm, R_BH = self.arm, self.model.X_BH(self.q_rad()).rotation()
         if not arm.tuck_x_m or self._tucked():
             return bool(arm.tuck_x_m)
@@ -269,7 +269,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return True
 
     def _hold_ahead(self, surface: Surface, carried: RotationMatrix) -> Routine[None]:
-        """Take what was drawn in out of the view of a camera on the head."""
+        """Takes what was drawn in out of the view of a camera on the head."""
         if not self._tucked():
             return
         arm, self.boxes = self.arm, surface_boxes([surface], self.X_WB())
@@ -337,7 +337,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return max(views, key=lambda view: len(view.plane_points), default=None)
 
     def _go_above(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[PrePlacePose]:
-        """Bring the object above the best free spot."""
+        """Brings the object above the best free spot."""
         X_WB = self.X_WB()
         free = free_spots(view, self._spots(surface))
         if len(free) == 0:
@@ -354,7 +354,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return PrePlacePose(q_rad, float(X_BH.translation()[2] - on_top[0][2]) - held.drop_m(X_BH.rotation()))
 
     def _bring(self, goal: Goal, held: HeldObject, message: str) -> Routine[FloatArray]:
-        """Go to a goal on a path on which what is held touches nothing; where there is none, the arm at least."""
+        """Goes to a goal on a path on which what is held touches nothing; where there is none, the arm at least."""
         found: list[FloatArray] = []
 
         def noted(scene: ArmScene, q: FloatArray) -> FloatArray:
@@ -369,7 +369,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return (yield from self.move_to(lambda scene, q: found[0], message, speed_rad_s=0.8))
 
     def _lower(self, surface: Surface, above: PrePlacePose) -> Routine[None]:
-        """Go down slowly until the hand is held up, by contact, or the height is that of the surface.
+        """Goes down slowly until the hand is held up, by contact, or the height is that of the surface.
 
         The path down begins at the angles for which it was found to be possible, and not at those of the arm: they
         differ a little, and near a singular posture that may make the difference between a path and none.
@@ -408,7 +408,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
             raise SkillFailure(Cause.PLANNING, "the hand cannot be drawn back from the object")
 
     def _check(self, surface: Surface, spot_W: FloatArray, put_down: Sequence[Box] = ()) -> Routine[None]:
-        """Raise SkillFailure with cause POSTCONDITION unless something stands, at rest, where the object was put.
+        """Raises SkillFailure with cause POSTCONDITION unless something stands, at rest, where the object was put.
 
         The arm goes round `put_down`, the object's box (B), on its way.
         """

@@ -16,7 +16,7 @@ class PoseArm(PoseArmPorts, ArmSkill[PoseArmInputs]):
     """The skill that `PoseArmPorts` declares."""
 
     def run(self, inputs: PoseArmInputs) -> Routine[Succeeded]:
-        """Move there."""
+        """Moves there."""
         goal = np.array(inputs.joints_rad)
         if len(goal) != len(self.model.names):
             text = f"the pose has {len(goal)} joint angles, the arm has {len(self.model.names)} joints"

@@ -140,7 +140,7 @@ class AugmentedDetector:
         )
 
     def _in_doubt(self, found: Sequence[Detection]) -> bool:
-        """Whether one view finds what may or may not be there."""
+        """Returns whether one view finds what may or may not be there."""
         scores = [score for one in found for score in (one.score, *(score for _, score in one.alternatives))]
         return any(self.options.low < score < self.options.high for score in scores)
 
@@ -174,7 +174,7 @@ class _Group:
     seen: dict[int, tuple[float, Box]] = field(default_factory=dict)
 
     def is_of(self, class_name: str, box: Box) -> bool:
-        """Whether a box is on the same object, and of the same class."""
+        """Returns whether a box is on the same object, and of the same class."""
         return class_name == self.class_name and box_overlap(self.box, box) > _SAME_OBJECT
 
     def row(self, views: Sequence[View], shape: Sequence[int]) -> tuple[NDArray[np.float64], float, str]:

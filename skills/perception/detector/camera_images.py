@@ -64,17 +64,17 @@ def found_in_grey(detector: Detector, images: Sequence[Image], class_name: str) 
 
 
 def is_dark(image: Image) -> bool:
-    """Whether nobody could see anything in a picture: it is black all over."""
+    """Returns whether nobody could see anything in a picture: it is black all over."""
     return bool(image.grey.mean() < _DARK_MEAN and image.grey.std() < _DARK_SPREAD)
 
 
 def without_depth(image: Image) -> bool:
-    """Whether an image for which depth was asked has none anywhere."""
+    """Returns whether an image for which depth was asked has none anywhere."""
     return image.depth_m.size > 0 and not bool(np.any(image.depth_m > 0.0))
 
 
 def on_its_head(image: Image) -> bool:
-    """Whether what is below in the picture is above in the world."""
+    """Returns whether what is below in the picture is above in the world."""
     R_OC = image.frames.pose(image.camera_frame).rotation().matrix()
     return bool(R_OC[2, 1] > _DOWN_IS_UP)
 

@@ -154,7 +154,7 @@ class _Reader:
             raise self.error(f"the model has other inputs or outputs: {_told(inputs)} -> {_told(outputs)}")
 
     def try_out(self, session: onnxruntime.InferenceSession, classes: int) -> None:
-        """Run once on zeros: the first run takes longer, and shows damage that loading does not."""
+        """Runs once on zeros: the first run takes longer, and shows damage that loading does not."""
         ports = self.kind.inputs(classes)
         nothing = {name: np.zeros((1, *shape), dtype=_NUMPY[of]) for name, (of, shape) in ports.items()}
         try:
@@ -177,7 +177,7 @@ def _session_options() -> onnxruntime.SessionOptions:
 
 @cache
 def adds_byte_products_exactly(cpu_info: Path = _CPU_INFO) -> bool:
-    """Whether the processor adds products of bytes in 32 bits at once (VNNI), by what Linux tells of it.
+    """Returns whether the processor adds products of bytes in 32 bits at once (VNNI), by what Linux tells of it.
 
     Where it does not, or nothing is told, ONNX Runtime's quickest way adds two of them in 16 bits first, and cuts off
     what is too large.

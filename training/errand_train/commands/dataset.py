@@ -59,7 +59,7 @@ def render_command(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Render pictures of objects in random rooms, with boxes and masks as COCO files."""
+    """Renders pictures of objects in random rooms, with boxes and masks as COCO files."""
     console = console_for(as_json)
     began = time.monotonic()
     pool = Pool(jobs or os.cpu_count() or 1, workers, scheduler)

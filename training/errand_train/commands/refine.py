@@ -47,7 +47,7 @@ def refine_command(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Train the refinement network, which takes crops of the proposals, or the classifier network; export it."""
+    """Trains the refinement network, which takes crops of the proposals, or the classifier network; export it."""
     console = console_for(as_json)
     check_folders(data, out, resume)
     check_time(minutes, epochs)

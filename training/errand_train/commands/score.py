@@ -64,7 +64,7 @@ def score_command(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Judge the detector by labelled pictures: average precision as COCO has it, precision, recall, speed."""
+    """Judges the detector by labelled pictures: average precision as COCO has it, precision, recalls, speed."""
     console = console_for(as_json)
     check_libraries(("pycocotools",), "scoring")
     drawing = _png(sheet)
@@ -89,7 +89,7 @@ def score_command(
 
 
 def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, views: bool) -> _Work:
-    """Read the labels, and see that all pictures are there. Raises InputError."""
+    """Reads the labels, and see that all pictures are there. Raises InputError."""
     try:
         labelled = pictures_of_coco(_document(data), detector.class_names)[:limit]
     except ValueError as error:

@@ -60,7 +60,7 @@ def _bins_json(bins: Sequence[Bin]) -> list[dict[str, Any]]:
 
 
 def show_scores(console: Console, scores: Mapping[str, Score], pictures_per_second: float) -> None:
-    """Print the tables of each camera, or of all pictures, and the speed."""
+    """Prints the tables of each camera, or of all pictures, and the speed."""
     for name, one in scores.items():
         if name != "all" or len(scores) == 1:
             _show(console, name, one)
@@ -68,7 +68,7 @@ def show_scores(console: Console, scores: Mapping[str, Score], pictures_per_seco
 
 
 def _show(console: Console, camera: str, score: Score) -> None:
-    """Print tables and a line on the rest."""
+    """Prints tables and a line on the rest."""
     if camera != "all":
         console.print(f"{camera} camera" if camera == "hand" else f"{camera} cameras")
     figures = [(one.name, one.labels, one.ap50, one.ap50_95, one.precision, one.recall) for one in score.classes]

@@ -44,7 +44,7 @@ def train_command(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Train the detector and export it as ONNX; write checkpoints and figures during training."""
+    """Trains the detector and exports it as ONNX; write checkpoints and figures during training."""
     console = console_for(as_json)
     check_folders(data, out, resume)
     check_time(minutes, epochs)

@@ -74,7 +74,7 @@ def annotation(
 
 
 def lost_in_the_dark(picture: NDArray[np.uint8], mask: Mask) -> bool:
-    """Whether nobody could see the object of a mask in the picture, (H, W) or (H, W, 3): all black."""
+    """Returns whether nobody could see the object of a mask in the picture, (H, W) or (H, W, 3): all black."""
     seen = picture[mask].astype(np.float32)
     return bool(seen.mean() < DARKEST_MEAN and seen.std() < DARKEST_SPREAD)
 

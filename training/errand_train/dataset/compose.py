@@ -124,7 +124,7 @@ class _Table:
         self.seats: list[tuple[float, float, float, float]] = []
 
     def place(self, model: ObjectModel, supports: Sequence[Support]) -> None:
-        """Put an object on a support or on the floor where it fits; leave it away when it fits nowhere."""
+        """Puts an object on a support or on the floor where it fits; leave it away when it fits nowhere."""
         pose = choose(self._rng, model, resting_poses(model), toppled=self._toppled)
         points = model.surface.points @ pose.R.T
         outline = points[ConvexHull(points[:, :2]).vertices, :2]

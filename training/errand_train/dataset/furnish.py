@@ -104,7 +104,7 @@ def cabinet(rng: np.random.Generator, m: Materials) -> Furnished:
 
 
 def shelf(rng: np.random.Generator, m: Materials) -> Furnished:
-    """Open shelves on which objects stand."""
+    """Opens shelves on which objects stand."""
     w, d, h, boards = _of(rng, 0.6, 1.4), _of(rng, 0.26, 0.45), _of(rng, 0.8, 1.9), int(rng.integers(2, 5))
     body, back, side = _one(rng, _BODIES), int(rng.random() < 0.7), 0.025
     pitch, tops = (h - side) / boards, []

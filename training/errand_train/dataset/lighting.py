@@ -23,7 +23,7 @@ class Lighting:
 
     @property
     def physical(self) -> bool:
-        """Whether light is reckoned physically."""
+        """Returns whether light is reckoned physically."""
         return self.style == PHYSICAL
 
 

@@ -18,7 +18,7 @@ _COUNTED, _IGNORED = (60, 230, 60), (60, 60, 240)
 
 
 def contact_sheet(folder: Path, shots: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Write a grid of pictures spread over the data set: counted labels in green, ignored ones in red."""
+    """Writes a grid of pictures spread over the data set: counted labels in green, ignored ones in red."""
     count = min(COLUMNS * ROWS, len(shots))
     chosen = [shots[k] for k in np.linspace(0, len(shots) - 1, count).astype(int)]
     cells = [_cell(folder, shot) for shot in chosen]

@@ -64,7 +64,7 @@ class Shot:
 
 
 def is_validation(index: int) -> bool:
-    """Whether the scene of a number holds held-out instances, layouts and textures."""
+    """Returns whether the scene of a number holds held-out instances, layouts and textures."""
     return index % VALIDATION_EVERY == VALIDATION_EVERY - 1
 
 
@@ -74,7 +74,7 @@ def views_in(index: int) -> int:
 
 
 def render_scene(seed: int, index: int, others: Sequence[ObjectModel] = ()) -> list[Shot]:
-    """Render the pictures of a scene, the same for the same arguments; `others` replace some of its distractors."""
+    """Renders the pictures of a scene, the same for the same arguments; `others` replace some of its distractors."""
     rng = np.random.default_rng([seed, index, 71])
     scene = compose(rng, index, for_training=not is_validation(index), others=others)
     lighting = random_lighting(rng, scene.room)
@@ -181,7 +181,7 @@ def _jaw_for(held: Held) -> float:
 
 
 def _mesh_file(folder: Path, name: str, mesh: Mesh, room: Room | None, physical: bool) -> MeshShape:
-    """Write a mesh for this scene only."""
+    """Writes a mesh for this scene only."""
     shown = {mesh.materials[material].texture for material, *_ in mesh.groups()}
     for role, number in room.textures if room else ():
         if texture_file(role, number) in shown:

@@ -159,7 +159,7 @@ def _set(
     supports: list[Support],
     obstacles: list[Obstacle],
 ) -> None:
-    """Put a piece with the middle of its back at a point, its y axis along `into_wall`, unless it would overlap."""
+    """Puts a piece with the middle of its back at a point, its y axis along `into_wall`, unless it would overlap."""
     x_axis = np.array([into_wall[1], -into_wall[0], 0.0])
     R = np.column_stack([x_axis, into_wall, [0, 0, 1.0]])
     new = [_bounds(shape, R, back) for shape in made.piece.collisions]

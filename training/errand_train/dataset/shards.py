@@ -77,7 +77,7 @@ def render(
     give_out: GiveOut = one_by_one,
     others: Path | None = None,
 ) -> Summary:
-    """Render what is still missing of a data set and write its COCO files. Raises DatasetError.
+    """Renders what is still missing of a data set and writes its COCO files. Raises DatasetError.
 
     `progress` is told how many scenes are there, and how many there will be. `give_out` has the scenes made. `others`
     is a folder of models of no class, each in a folder of its own, which replace some distractors for training.
@@ -130,7 +130,7 @@ def _model_folders(others: Path) -> tuple[Path, ...]:
 
 
 def _claim(out: Path, seed: int, others: Sequence[Path]) -> None:
-    """Make the folder ours, or check that it is: of the same seed, sources and others."""
+    """Makes the folder ours, or checks that it is: of the same seed, sources and others."""
     wanted = {"format": FORMAT, "seed": seed, "sources": digest(), **_others_entry(others)}
     path = out / MANIFEST
     if not out.exists() or not any(out.iterdir()):
@@ -187,7 +187,7 @@ def _scene_folder(out: Path, index: int) -> Path:
 def _rendered(
     out: Path, make: Callable[[int], Mapping[str, bytes]], missing: list[int], give_out: GiveOut
 ) -> Iterator[int]:
-    """Have scenes made and write each whole into its folder; each number as soon as that is there."""
+    """Has scenes made and writes each whole into its folder; each number as soon as that is there."""
     for index, files in give_out(make, missing):
         if files is None:
             raise _LostSceneError(f"{out}: the processes that rendered scene {index} were killed")
@@ -203,7 +203,7 @@ def _write_files(files: Mapping[str, bytes], folder: Path) -> None:
 
 
 def scene_files(seed: int, others: Sequence[Path], index: int) -> Mapping[str, bytes]:
-    """Render one scene; its files by name. `others` are folders of further distractors."""
+    """Renders one scene; its files by name. `others` are folders of further distractors."""
     cv2.setNumThreads(1)
     shown_as = _scene_folder(Path(), index)
     pictures: dict[str, bytes] = {}
@@ -224,7 +224,7 @@ def _encoded(number: int, shot: Shot) -> bytes:
 
 
 def _assemble(out: Path, images: int, seed: int) -> Summary:
-    """Write the COCO files of the first pictures, and the contact sheet."""
+    """Writes the COCO files of the first pictures, and the contact sheet."""
     shots = list(_shots(out, images))
     info = {"description": "Errand: rendered rooms", "version": FORMAT, "seed": seed, "sources": digest()}
     for split in SPLITS:
@@ -259,7 +259,7 @@ def _summary(shots: list[Mapping[str, Any]]) -> Summary:
 
 
 def _write_whole(path: Path, text: str) -> None:
-    """Write a file that is never seen half-written."""
+    """Writes a file that is never seen half-written."""
     fresh = path.with_name(f".{path.name}.part")
     fresh.write_text(text, encoding="utf-8")
     fresh.replace(path)

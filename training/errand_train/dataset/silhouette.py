@@ -52,7 +52,7 @@ def silhouette(points_C: FloatArray, faces: NDArray[np.int64], camera: Intrinsic
 
 @_compiled
 def _draw(canvas: NDArray[np.uint8], u: FloatArray, v: FloatArray, faces: NDArray[np.int64]) -> None:
-    """Set every pixel whose centre lies in a triangle."""
+    """Sets every pixel whose centre lies in a triangle."""
     height, width = canvas.shape
     for t in range(faces.shape[0]):
         x0, x1, x2 = u[faces[t, 0]], u[faces[t, 1]], u[faces[t, 2]]

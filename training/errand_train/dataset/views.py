@@ -138,7 +138,7 @@ def _body_view(rng: np.random.Generator, room: Room, thing: Placed, specs: Mappi
 
 
 def _free(eye: FloatArray, room: Room) -> bool:
-    """Whether a camera may be at a point: inside the room and in no furniture."""
+    """Returns whether a camera may be at a point: inside the room and in no furniture."""
     w, d, h = room.size_m
     if not (0.08 < eye[0] < w - 0.08 and 0.08 < eye[1] < d - 0.08 and 0.05 < eye[2] < h - 0.08):
         return False
@@ -146,7 +146,7 @@ def _free(eye: FloatArray, room: Room) -> bool:
 
 
 def _sees(view: View, obstacles: Sequence[Obstacle], aim: FloatArray) -> bool:
-    """Whether the point is in the picture and no furniture hides it."""
+    """Returns whether the point is in the picture and no furniture hides it."""
     in_camera = np.asarray(view.X_WC.inverse() @ aim)
     camera = view.intrinsics
     if in_camera[2] < 0.15:

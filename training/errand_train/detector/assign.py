@@ -44,7 +44,7 @@ class Assigned:
 def assign(
     scores: Tensor, boxes: Tensor, middles: Tensor, truth: TruthBatch, most_cells: int = _MOST_CELLS
 ) -> Assigned:
-    """Assign the cells of N pictures to at most G objects each, `most_cells` to each object.
+    """Assigns the cells of N pictures to at most G objects each, `most_cells` to each object.
 
     scores (N, A, K) from 0 to 1, boxes (N, A, 4), middles (A, 2).
     """
@@ -64,7 +64,7 @@ def assign(
 
 
 def _inside(middles: Tensor, truth: Tensor) -> Tensor:
-    """Whether cells' middles lie in boxes (N, G, A), of which the sides are taken to be at least so long."""
+    """Returns whether cells' middles lie in boxes (N, G, A), of which the sides are taken to be at least so long."""
     centre, half = (truth[..., :2] + truth[..., 2:]) / 2, (truth[..., 2:] - truth[..., :2]) / 2
     half = half.clamp(min=_LEAST_SIDE_PX / 2)
     away = (middles[None, None] - centre[:, :, None]).abs()

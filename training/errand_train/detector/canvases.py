@@ -73,7 +73,7 @@ class CanvasMaker:
     def _fill(
         self, canvas: Picture, cell: Cell, index: int, options: CanvasOptions, random: np.random.Generator
     ) -> Targets:
-        """Draw one picture into a cell; its labels there."""
+        """Draws one picture into a cell; its labels there."""
         labels = self.pictures[index].labels
         choose = _whole if options.whole else _window
         affine = choose(labels, cell, options, random)
@@ -143,7 +143,7 @@ def _whole(_labels: Labels, cell: Cell, options: CanvasOptions, random: np.rando
 
 
 def _warp(store: PictureStore, index: int, affine: Floats, canvas: Picture, cell: Cell) -> None:
-    """Draw a stored picture into a cell of the canvas under an affine map of pixel edges."""
+    """Draws a stored picture into a cell of the canvas under an affine map of pixel edges."""
     local = affine.astype(np.float64)
     local[:, 2] -= (cell.x0, cell.y0)
     canvas[cell.y0 : cell.y1, cell.x0 : cell.x1] = store.scales(index).cut(local, cell.size)

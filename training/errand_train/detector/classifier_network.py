@@ -50,12 +50,12 @@ class ClassifierNetwork(CropNetwork):
         return self.trust * before + self.scores(known), moved(boxes, _SIDES_SCALE * self.sides(known).float())
 
     def stop_learning(self) -> None:
-        """Add only a part of what it adds in training: `USED`."""
+        """Adds only a part of what it adds in training: `USED`."""
         self.add(USED)
 
     @torch.no_grad()
     def add(self, share: float) -> None:
-        """Add a share, or a multiple, of what it adds to logits and boxes from now on."""
+        """Adds a share, or a multiple, of what it adds to logits and boxes from now on."""
         self.trust.sub_(1.0).mul_(share).add_(1.0)
         for layer in (self.scores, self.sides):
             layer.weight.mul_(share)

@@ -76,7 +76,7 @@ def export(
     facts: Mapping[str, str],
     score_offsets: Sequence[float] | None = None,
 ) -> None:
-    """Write the ONNX file with its format, class names and other facts; whole or not at all.
+    """Writes the ONNX file with its format, class names and other facts; whole or not at all.
 
     `facts` of a crop network must hold the digest of the file of the network before it: as `first` that of the proposal
     network, as `second` that of the refinement network. `score_offsets` are added to the logits of each class.

@@ -61,7 +61,7 @@ class Learner(Generic[Network]):
         return made
 
     def take_step(self, losses_now: Callable[[], Losses], rate: float) -> tuple[float, float]:
-        """Take a step along the gradients of `losses_now`; returns score loss and box loss."""
+        """Takes a step along the gradients of `losses_now`; returns score loss and box loss."""
         for group in self._optimiser.param_groups:
             group["lr"] = rate
         self.network.train()
@@ -82,11 +82,11 @@ class Learner(Generic[Network]):
         return tuple(part.to(self.device) for part in parts)
 
     def begin_average(self) -> None:
-        """Let the average be the network as it is now."""
+        """Lets the average be the network as it is now."""
         self.average.load_state_dict(self.network.state_dict())
 
     def save(self, file: Path) -> None:
-        """Write everything; whole or not at all."""
+        """Writes everything; whole or not at all."""
         state = {
             "format": FORMAT,
             "network": self.network.state_dict(),
@@ -99,7 +99,7 @@ class Learner(Generic[Network]):
         fresh.replace(file)
 
     def restore(self, file: Path) -> None:
-        """Go on where a file left off. Raises TrainingDataError."""
+        """Goes on where a file left off. Raises TrainingDataError."""
         state = read_checkpoint(file)
         _take(self.network, state["network"], file)
         _take(self._average, state["average"], file)
@@ -107,7 +107,7 @@ class Learner(Generic[Network]):
         self.progress = Progress(**state["progress"])
 
     def start_from(self, file: Path, batches: Iterable[Batch | CropBatch]) -> None:
-        """Take over the weights of an ONNX file, with statistics of batches, or the averaged ones of a checkpoint.
+        """Takes over the weights of an ONNX file, with statistics of batches, or the averaged ones of a checkpoint.
 
         All else starts again. Raises TrainingDataError.
         """
@@ -119,7 +119,7 @@ class Learner(Generic[Network]):
             self.start_from_checkpoint(file)
 
     def start_from_checkpoint(self, file: Path) -> None:
-        """Take over a checkpoint's averaged weights; all else starts again. Raises TrainingDataError."""
+        """Takes over a checkpoint's averaged weights; all else starts again. Raises TrainingDataError."""
         _take(self._average, read_checkpoint(file)["average"], file)
         self._average.n_averaged.zero_()
         self.network.load_state_dict(self.average.state_dict())
@@ -149,7 +149,7 @@ class ProposalLearner(Learner[DetectorNetwork]):
         return ProposalLearner(DetectorNetwork(classes), device)
 
     def step(self, batch: Batch, rate: float) -> tuple[float, float]:
-        """Train on one batch; returns score loss and box loss."""
+        """Trains on one batch; returns score loss and box loss."""
         return self.take_step(lambda: self._losses(batch), rate)
 
     def _losses(self, batch: Batch) -> Losses:
@@ -176,7 +176,7 @@ class CropLearner(Learner[CropNetwork]):
         return CropLearner(ClassifierNetwork(classes) if classifier else RefinementNetwork(classes), device)
 
     def begin(self, first: Path, batches: Iterable[CropBatch]) -> None:
-        """Take over the weights to begin with; what has none there stays as it is. Raises TrainingDataError.
+        """Takes over the weights to begin with; what has none there stays as it is. Raises TrainingDataError.
 
         The refinement network begins with the proposal network's ONNX file and statistics of batches, the classifier
         with ImageNet's weights.
@@ -199,7 +199,7 @@ class CropLearner(Learner[CropNetwork]):
         self.early = made.to(self.device, memory_format=torch.channels_last)
 
     def step(self, batch: CropBatch, rate: float) -> tuple[float, float]:
-        """Train on one batch; returns score loss and box loss."""
+        """Trains on one batch; returns score loss and box loss."""
         return self.take_step(lambda: self._losses(batch), rate)
 
     def _losses(self, batch: CropBatch) -> Losses:
@@ -215,7 +215,7 @@ class CropLearner(Learner[CropNetwork]):
 
 
 def quick_in_bfloat16(device: torch.device) -> bool:
-    """Whether bfloat16 saves time: on processors without it, it costs twice as much."""
+    """Returns whether bfloat16 saves time: on processors without it, it costs twice as much."""
     capabilities = torch.cpu.get_capabilities()
     return device.type != "cpu" or any(capabilities.get(name, False) for name in ("amx_bf16", "avx512_bf16"))
 

@@ -146,7 +146,7 @@ class LiteBackbone(EarlyLayers):
         return at16, self.stage32(at16)
 
     def take_bytes(self) -> None:
-        """Take values from 0 to 255 from now on."""
+        """Takes values from 0 to 255 from now on."""
         self.one = 1.0
 
     def begin_with_imagenet(self) -> None:

@@ -70,7 +70,7 @@ class Loop:
             self.report(Report(done, progress.steps, made.taken / max(took, 1e-6), made.losses))
 
     def _examine(self) -> None:
-        """Write the ONNX file and the checkpoint, and report the figures of held-out pictures."""
+        """Writes the ONNX file and the checkpoint, and report the figures of held-out pictures."""
         done = self._done()
         figures = self.written(done >= 1.0)
         self._note({"progress": done, **figures})
@@ -79,7 +79,7 @@ class Loop:
         self._since = time.monotonic()
 
     def _note(self, row: Mapping[str, float]) -> None:
-        """Append a row to the journal: losses of a step, or figures of held-out pictures."""
+        """Appends a row to the journal: losses of a step, or figures of held-out pictures."""
         with (self.out / JOURNAL).open("a", encoding="utf-8") as journal:
             journal.write(json.dumps(row) + "\n")
 

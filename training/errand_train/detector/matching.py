@@ -66,7 +66,7 @@ def evaluated(
     class_names: Sequence[str],
     counts: Callable[[Label], bool] = lambda label: label.counts,
 ) -> Evaluation:
-    """Evaluate what was found in each picture. Labels that do not count are passed over."""
+    """Evaluates what was found in each picture. Labels that do not count are passed over."""
     from pycocotools.cocoeval import COCOeval  # takes long to import
 
     labels = [(k, one) for k, picture in enumerate(pictures) for one in picture.labels if one.class_name in class_names]

@@ -123,7 +123,7 @@ class EarlyLayers(nn.Module):
         raise NotImplementedError
 
     def take_bytes(self) -> None:
-        """Take values from 0 to 255 from now on."""
+        """Takes values from 0 to 255 from now on."""
         raise NotImplementedError
 
 
@@ -144,7 +144,7 @@ class CascadeNetwork(nn.Module):
         raise NotImplementedError
 
     def stop_learning(self) -> None:
-        """Change what is to be otherwise in use than in training: nothing, unless said."""
+        """Changes what is to be otherwise in use than in training: nothing, unless said."""
 
 
 class Backbone(EarlyLayers):
@@ -178,7 +178,7 @@ class Backbone(EarlyLayers):
 
     @torch.no_grad()
     def take_bytes(self) -> None:
-        """Take values from 0 to 255 from now on."""
+        """Takes values from 0 to 255 from now on."""
         self.stem[0][0].weight.mul_(1.0 / 255.0)
 
     def late(self, at8: Tensor) -> tuple[Tensor, Tensor, Tensor]:

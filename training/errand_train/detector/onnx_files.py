@@ -26,7 +26,7 @@ _SHORT: Final = ".short"
 
 
 def write_sealed(model: onnx.ModelProto, file: Path, facts: Mapping[str, str]) -> None:
-    """Write a model's file with facts as its metadata; whole or not at all."""
+    """Writes a model's file with facts as its metadata; whole or not at all."""
     del model.metadata_props[:]
     for key, value in facts.items():
         model.metadata_props.add(key=key, value=value)

@@ -43,14 +43,14 @@ class ProposalTable:
         return len(self.pictures)
 
     def save(self, file: Path) -> None:
-        """Write it; whole or not at all."""
+        """Writes it; whole or not at all."""
         fresh = file.with_name(f".{file.name}.new.npz")
         np.savez(fresh, **vars(self))
         fresh.replace(file)
 
     @staticmethod
     def read(file: Path) -> ProposalTable:
-        """Read what was written."""
+        """Reads what was written."""
         with np.load(file) as kept:
             return ProposalTable(**{name: kept[name] for name in ProposalTable.__dataclass_fields__})
 

@@ -48,7 +48,7 @@ Given = Mapping[str, NDArray[Any]]
 
 
 def quantised_detector(file: Path, data: Path, out: Path) -> Path:
-    """Write the network of a file, and those beside it, into a folder; gives the first's file.
+    """Writes the network of a file, and those beside it, into a folder; gives the first's file.
 
     Those that are quantised already stay as they are. Ranges are measured on pictures of the data set `data` that
     were trained on. Raises TrainingDataError for files that cannot be used, or when there is nothing to do.
@@ -184,7 +184,7 @@ def _crops(look: Callable[[Scales], Proposals], pictures: Sequence[Scales]) -> l
 def write_quantised(
     file: Path, given: Sequence[Given], out: Path, other_facts: Mapping[str, str] | None = None
 ) -> None:
-    """Write the network of a file so that it is quantised; it tells what it did, and `other_facts`."""
+    """Writes the network of a file so that it is quantised; it tells what it did, and `other_facts`."""
     model = onnx.load(file)
     facts = {**facts_of(model), **(other_facts or {}), QUANTISED: "yes"}
     write_sealed(quantised(model, given), out, facts)

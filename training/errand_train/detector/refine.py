@@ -52,7 +52,7 @@ def refine(options: RefineOptions, report: Callable[[Report], None]) -> Path:
 
 
 def _copy(model: Path, file: Path, options: RefineOptions) -> None:
-    """Copy a network's file to the output folder; a resumed training keeps the one that it had."""
+    """Copies a network's file to the output folder; a resumed training keeps the one that it had."""
     try:
         if not file.is_file() or not (options.resume or model.samefile(file)):
             shutil.copyfile(model, file)
@@ -89,7 +89,7 @@ def _proposals_of(
 
 
 def _begin(learner: CropLearner, options: RefineOptions, feed: CropFeed) -> None:
-    """Give the learner the weights that it begins with. Raises TrainingDataError."""
+    """Gives the learner the weights that it begins with. Raises TrainingDataError."""
     checkpoint, size = options.out / CHECKPOINT, options.batch
     some = (feed.batch(k * size, size) for k in range(SETTLED_BY))
     if options.resume and checkpoint.is_file():

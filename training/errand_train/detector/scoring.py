@@ -74,7 +74,7 @@ class Score:
 
 
 def score(pictures: Sequence[LabelledPicture], found: Sequence[Found], class_names: Sequence[str]) -> Score:
-    """Judge what was found in each picture. Raises ValueError when there are not as many of one as of the other."""
+    """Judges what was found in each picture. Raises ValueError when there are not as many of one as of the other."""
     if len(pictures) != len(found):
         raise ValueError(f"there are {len(pictures)} pictures, and detections for {len(found)}")
     evaluation = evaluated(pictures, found, class_names)
@@ -133,7 +133,7 @@ class Judged:
 
 
 def judged(picture: LabelledPicture, found: Found, class_names: Sequence[str]) -> Judged:
-    """Sort a picture's detections and labels."""
+    """Sorts a picture's detections and labels."""
     sure = tuple(one for one in found if one.score >= SURE_SCORE)
     evaluation = evaluated([picture], [sure], class_names)
     matches = [one for name in class_names for one in evaluation.matches(name)]
@@ -210,7 +210,7 @@ def _labels_found(
 def _bins(
     labels: Sequence[tuple[Label, bool]], edges: Sequence[float], value_of: Callable[[Label], float | None]
 ) -> tuple[Bin, ...]:
-    """Recall between each two limits; labels without a value are left out, and so are bins when none has one."""
+    """Recalls between each two limits; labels without a value are left out, and so are bins when none has one."""
     known = [(value, hit) for label, hit in labels if (value := value_of(label)) is not None]
     if not known:
         return ()

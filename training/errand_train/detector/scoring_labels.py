@@ -34,22 +34,22 @@ class Label:
 
     @property
     def judged(self) -> bool:
-        """Whether the file asks for it at all."""
+        """Returns whether the file asks for it at all."""
         return not (self.crowd or self.ignore)
 
     @property
     def large_enough(self) -> bool:
-        """Whether its box is at least 24 pixels long and 8 wide."""
+        """Returns whether its box is at least 24 pixels long and 8 wide."""
         return large_enough(self.box)
 
     @property
     def seen_enough(self) -> bool:
-        """Whether at least 40 % of it are seen; taken for granted where unknown."""
+        """Returns whether at least 40 % of it are seen; taken for granted where unknown."""
         return self.visibility is None or self.visibility >= LEAST_VISIBILITY
 
     @property
     def counts(self) -> bool:
-        """Whether it counts in the main figures."""
+        """Returns whether it counts in the main figures."""
         return self.judged and self.large_enough and self.seen_enough
 
 
@@ -70,7 +70,7 @@ class LabelledPicture:
 
     @property
     def only_distractors(self) -> bool:
-        """Whether it holds nothing of any class, not even something to ignore."""
+        """Returns whether it holds nothing of any class, not even something to ignore."""
         return not self.labels
 
 
@@ -80,7 +80,7 @@ def long_side_px(box: Box) -> float:
 
 
 def large_enough(box: Box) -> bool:
-    """Whether a box is of a size that counts."""
+    """Returns whether a box is of a size that counts."""
     return long_side_px(box) >= LEAST_LONG_PX and min(box[2] - box[0], box[3] - box[1]) >= LEAST_SHORT_PX
 
 

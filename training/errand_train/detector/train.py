@@ -61,7 +61,7 @@ def run_loop(
     belongs: Mapping[str, str] | None = None,
     networks: int = 1,
 ) -> Path:
-    """Train until the time is over; return the ONNX `file` of the averaged network, the last of so many `networks`.
+    """Trains until the time is over; return the ONNX `file` of the averaged network, the last of so many `networks`.
 
     `belongs` tells of the network before it. At the end scores are calibrated by pictures of the training split.
     """

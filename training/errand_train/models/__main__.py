@@ -21,7 +21,7 @@ from plant.scene_pictures import save_png
 
 
 def build(folder: Path) -> None:
-    """Write every model into its own folder. The same source gives the same bytes."""
+    """Writes every model into its own folder. The same source gives the same bytes."""
     models = (
         (objects.coke(), coke_appearance()),
         (objects.beer(), beer_appearance()),
@@ -35,7 +35,7 @@ def build(folder: Path) -> None:
 
 
 def write_model(folder: Path, model: Model, appearance: Appearance) -> None:
-    """Write SDF, OBJ, material file and pictures of one model."""
+    """Writes SDF, OBJ, material file and pictures of one model."""
     write_text(folder / f"{model.name}.sdf", model_sdf(model))
     write_text(folder / f"{model.name}.obj", obj_text(appearance.mesh, f"{model.name}.mtl"))
     write_text(folder / f"{model.name}.mtl", mtl_text(appearance.mesh, "palette.png"))

@@ -15,7 +15,7 @@ Radii = ArrayLike
 
 
 def add_grid(mesh: Mesh, material: str, points: ArrayLike, uvs: ArrayLike | None = None, *, ring: bool = False) -> None:
-    """Add a smooth surface through a grid of points (R, C, 3).
+    """Adds a smooth surface through a grid of points (R, C, 3).
 
     It looks to the side where rows x columns points: for rings from the bottom up, counter-clockwise seen from
     above, that is outward. With `ring` the last column equals the first. Without `uvs` (R, C, 2) the texture is
@@ -97,7 +97,7 @@ def _frames(line: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def add_fan(mesh: Mesh, material: str, ring: ArrayLike) -> None:
-    """Add the flat cap inside a ring (N, 3) that runs counter-clockwise as seen from outside."""
+    """Adds the flat cap inside a ring (N, 3) that runs counter-clockwise as seen from outside."""
     rim = np.asarray(ring, dtype=float)
     middle = rim[:-1].mean(axis=0)
     normal = np.cross(rim[:-1] - middle, rim[1:] - middle).sum(axis=0)
@@ -113,7 +113,7 @@ def add_fan(mesh: Mesh, material: str, ring: ArrayLike) -> None:
 def add_ellipsoid(
     mesh: Mesh, material: str, centre: ArrayLike, radii: ArrayLike, R: ArrayLike | None = None, *, sides: int = 20
 ) -> None:
-    """Add an ellipsoid with half axes `radii`, turned by R."""
+    """Adds an ellipsoid with half axes `radii`, turned by R."""
     height, angle = np.linspace(-np.pi / 2, np.pi / 2, sides // 2 + 3), np.linspace(0, 2 * np.pi, sides + 1)
     part = Mesh(mesh.materials)
     across, up = np.meshgrid(np.cos(height), angle, indexing="ij")
@@ -127,7 +127,7 @@ def add_ellipsoid(
 def add_rounded_box(
     mesh: Mesh, material: str, low: ArrayLike, high: ArrayLike, radius: float, *, top: str | None = None
 ) -> None:
-    """Add a box whose edges are rounded; its upper face may have another material."""
+    """Adds a box whose edges are rounded; its upper face may have another material."""
     a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     radius = min(radius, float(np.min(b - a)) / 2.02)
     outline = rounded_rectangle((b - a)[:2], radius) + (a + b)[:2] / 2

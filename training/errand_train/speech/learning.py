@@ -45,7 +45,7 @@ class Lessons:
 
 
 def learn(net: AdaptedWhisper, batches: Iterator[Batch], lessons: Lessons) -> Iterator[int]:
-    """Learn step by step; yields the number of steps so far."""
+    """Learns step by step; yields the number of steps so far."""
     learned = [part for part in net.parameters() if part.requires_grad]
     optimiser = torch.optim.AdamW(learned, weight_decay=0.0, betas=(0.9, 0.98))
     for step, batch in enumerate(islice(batches, lessons.steps)):

@@ -20,7 +20,7 @@ from plant.worlds.world import PACKAGE_NAME, ROBOTS, TRUTH, WORLDS_FOLDER
 
 
 def build(plan: Plan, folder: Path, package: str, maps: str = TRUTH) -> None:
-    """Write meshes, models, directives and surveyed maps of a world. The same source gives the same bytes.
+    """Writes meshes, models, directives and surveyed maps of a world. The same source gives the same bytes.
 
     `package` is what its files call the folder, as in `errand/worlds/flat`; `maps` is the folder's of the grids.
     """

@@ -31,7 +31,7 @@ class Piece:
     """A piece of furniture: visual geometry, and the primitive shapes that are solid about it."""
 
     def __init__(self, name: str, materials: Mapping[str, Material], **values: float | str) -> None:
-        """Build the piece with these parameters. Raises KeyError, ValueError for those that do not fit."""
+        """Builds the piece with these parameters. Raises KeyError, ValueError for those that do not fit."""
         self.mesh, self.collisions = Mesh(materials), list[Shape]()
         defaults: Mapping[str, Any] = _pieces()[name].get("let", {})
         self._rng = np.random.default_rng(int({**defaults, **values}.get("seed", 0)))
@@ -50,7 +50,7 @@ class Piece:
         self._add([name, values], {})
 
     def _add(self, part: Any, names: Names) -> None:
-        """Add a call of an operation or of another piece, or a group of parts as often as it says."""
+        """Adds a call of an operation or of another piece, or a group of parts as often as it says."""
         if isinstance(part, Mapping):
             for scope in self._rounds(part.get("each", {}), names):
                 self._let(scope, part.get("let", {}))

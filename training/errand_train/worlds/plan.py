@@ -64,7 +64,7 @@ class Placed(BaseModel):
 
     @property
     def yaw_rad(self) -> float:
-        """Turn of the piece's frame about the vertical."""
+        """Turns of the piece's frame about the vertical."""
         return _FACING_YAW_RAD[self.facing]
 
 
@@ -84,7 +84,7 @@ class Plan(BaseModel):
     furniture: dict[str, Placed]
 
     def width_m(self, door: Door) -> float:
-        """Clear width of a door."""
+        """Clears width of a door."""
         return self.door_width_m if door.own_width_m is None else door.own_width_m
 
 

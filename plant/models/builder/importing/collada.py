@@ -33,7 +33,7 @@ class Collada:
 
 
 def read_collada(path: Path) -> Collada:
-    """Read a COLLADA file.
+    """Reads a COLLADA file.
 
     Raises:
         ObjectImportError: it is no COLLADA, or is damaged.

@@ -66,7 +66,7 @@ class Wanted:
     close_holes: bool = False
 
     def refuse_wrong(self) -> None:
-        """Raise ObjectImportError for a value that cannot be."""
+        """Raises ObjectImportError for a value that cannot be."""
         catalogue = load_catalogue()
         if re.fullmatch(NAME, self.name) is None:
             hint = "use letters, digits and _, a letter first, at most 40"
@@ -100,7 +100,7 @@ class _Body:
 
 
 def import_object(mesh: Path, wanted: Wanted, folder: Path) -> ImportedObject:
-    """Write the model of a mesh file into a folder that is there: SDF, OBJ, pictures, and what they are.
+    """Writes the model of a mesh file into a folder that is there: SDF, OBJ, pictures, and what they are.
 
     The object keeps its side that is down where it can rest on it; else it is laid down where it is lowest.
 
@@ -153,7 +153,7 @@ def _turned(patch: Patch, which: NDArray[np.bool_]) -> Patch:
 
 
 def _refuse_size(size_m: FloatArray, scale: float) -> None:
-    """Refuse what is no object for a table: the unit of the file is another one, then."""
+    """Refuses what is no object for a table: the unit of the file is another one, then."""
     told = " x ".join(f"{value:.3g}" for value in size_m)
     if size_m.max() > LARGEST_M:
         raise ObjectImportError(f"it is {told} m large", _scale_hint(float(size_m.max()), scale))
@@ -171,7 +171,7 @@ def _scale_hint(largest_m: float, scale: float) -> str:
 
 
 def _refuse_impossible(mass: MassProperties) -> None:
-    """Refuse an inertia that no body has: pieces that are inside out count as holes."""
+    """Refuses an inertia that no body has: pieces that are inside out count as holes."""
     moments = np.linalg.eigvalsh(mass.inertia)
     if moments[0] <= 0.0 or moments[2] > (1.0 + 1e-6) * (moments[0] + moments[1]):
         hint = "unite its pieces to one body and let its normals be calculated again, or import its hull"

@@ -72,7 +72,7 @@ def outward(points: FloatArray, faces: Faces, piece: NDArray[np.int64]) -> NDArr
 
 
 def _is_inside(probe: FloatArray, triangles: FloatArray) -> bool:
-    """Whether a closed surface winds about all of some points."""
+    """Returns whether a closed surface winds about all of some points."""
     for point in probe:
         a, b, c = (triangles[:, k] - point for k in range(3))
         la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))

@@ -75,7 +75,7 @@ def numbers(category: str, *, for_training: bool) -> list[int]:
 
 
 def is_untextured(category: str, seed: int) -> bool:
-    """Whether an instance is untextured: plain colours, and for one of a class a few basic solids.
+    """Returns whether an instance is untextured: plain colours, and for one of a class a few basic solids.
 
     So are all people from number 48 on.
     """
@@ -86,12 +86,12 @@ def is_untextured(category: str, seed: int) -> bool:
 
 
 def repainted(category: str, seed: int) -> bool:
-    """Whether an instance of a class is of its usual form, but in plain colours without pictures."""
+    """Returns whether an instance of a class is of its usual form, but in plain colours without pictures."""
     return category in _ONE_COLOUR and seed >= VALIDATION_BELOW and seed % 5 == REPAINTED_OF_FIVE
 
 
 def make(category: str, seed: int) -> tuple[Finished, str, str]:
-    """Make an instance without writing it: the model, its kind and its main colour. Raises KeyError, ValueError."""
+    """Makes an instance without writing it: the model, its kind and its main colour. Raises KeyError, ValueError."""
     plain = is_untextured(category, seed)
     basic = load_recipes("untextured") if plain else {}
     recipe = basic.get(category) or {**load_recipes("classes"), **load_recipes("distractors")}.get(category)

@@ -70,20 +70,20 @@ class Draft:
     def solid(
         self, part: Mesh, density: float, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0), *, body: Mesh | None = None
     ) -> None:
-        """Add a part of solid matter at a pose, its triangles turned outward. An open part needs its closed `body`."""
+        """Adds a part of solid matter at a pose, its triangles turned outward. An open part needs its closed `body`."""
         placed = outward(part, R, p)
         self.mesh.add_mesh(placed)
         self._bodies.append(solid_mass(outward(body, R, p) if body else placed, density))
         self._collide(placed)
 
     def shell(self, part: Mesh, density: float, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> None:
-        """Add a part that is a thin shell."""
+        """Adds a part that is a thin shell."""
         placed = self.visual(part, R, p)
         self._bodies.append(shell_mass(placed, density))
         self._collide(placed)
 
     def visual(self, part: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> Mesh:
-        """Add a part that weighs nothing; the part as placed."""
+        """Adds a part that weighs nothing; the part as placed."""
         placed = Mesh(self.materials)
         placed.add_mesh(part, R, p)
         self.mesh.add_mesh(placed)
@@ -123,7 +123,7 @@ class Draft:
 
 
 def _is_round(points: FloatArray, size: FloatArray) -> bool:
-    """Whether points (N, 3) about their middle fill a circle seen from above."""
+    """Returns whether points (N, 3) about their middle fill a circle seen from above."""
     widest = float(np.hypot(points[:, 0], points[:, 1]).max())
     return bool(abs(size[0] - size[1]) < 0.02 * size[0] and widest < 0.52 * size[0])
 

@@ -62,7 +62,7 @@ def _called(colour: ArrayLike) -> str:
 def apply_finish(
     draft: Draft, name: str, finish: Finish, main: tuple[str, ArrayLike], names: Mapping[str, float]
 ) -> None:
-    """Give the draft a material by its finish. Raises ValueError for an unknown texture or colour."""
+    """Gives the draft a material by its finish. Raises ValueError for an unknown texture or colour."""
     _, colour = draw_colour(draft.rng, finish.colour, main)
     colour = np.clip(colour * finish.dim, 0, 1)
     if finish.texture == "plain":

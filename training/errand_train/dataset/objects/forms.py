@@ -41,7 +41,7 @@ FORMS: Final[Mapping[tuple[str, str], int]] = MappingProxyType(
 
 
 def write_forms(folder: Path) -> None:
-    """Write each form into `CLASS/FORM` below a folder. The same sources give the same bytes."""
+    """Writes each form into `CLASS/FORM` below a folder. The same sources give the same bytes."""
     for (category, form), number in FORMS.items():
         made, kind, _ = make(category, number)
         model = Model(category, f"{category}.obj", made.collisions, made.mass, comment=f"{kind} {category}")

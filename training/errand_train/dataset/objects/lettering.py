@@ -53,7 +53,7 @@ def word_mask(text: str, shape: tuple[int, int], *, face: int = 0, fill: float =
 
 
 def blend(image: FloatArray, mask: FloatArray, colour: ArrayLike, corner: tuple[int, int] = (0, 0)) -> None:
-    """Lay a colour over a picture (in place) where the mask covers; `corner` is the mask's (row, column)."""
+    """Lays a colour over a picture (in place) where the mask covers; `corner` is the mask's (row, column)."""
     rows = slice(max(corner[0], 0), min(corner[0] + mask.shape[0], image.shape[0]))
     columns = slice(max(corner[1], 0), min(corner[1] + mask.shape[1], image.shape[1]))
     if rows.start >= rows.stop or columns.start >= columns.stop:
@@ -65,7 +65,7 @@ def blend(image: FloatArray, mask: FloatArray, colour: ArrayLike, corner: tuple[
 def write_word(
     image: FloatArray, text: str, box: tuple[float, float, float, float], colour: ArrayLike, *, face: int = 0
 ) -> None:
-    """Write a word (in place) into a box (top, left, bottom, right) given as shares of the picture."""
+    """Writes a word (in place) into a box (top, left, bottom, right) given as shares of the picture."""
     h, w = image.shape[:2]
     top, left, bottom, right = (round(v * s) for v, s in zip(box, (h, w, h, w), strict=True))
     blend(image, word_mask(text, (max(bottom - top, 2), max(right - left, 2)), face=face), colour, (top, left))

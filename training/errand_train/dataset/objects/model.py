@@ -23,7 +23,7 @@ MODEL_FACTS = "model.json"
 
 
 def held_out(number: int) -> bool:
-    """Whether an instance, texture or layout of this number is kept from training: every fourth is."""
+    """Returns whether an instance, texture or layout of this number is kept from training: every fourth is."""
     return number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
 
 
@@ -75,7 +75,7 @@ class ObjectModel:
 
     @property
     def held_out(self) -> bool:
-        """Whether it is kept from training."""
+        """Returns whether it is kept from training."""
         return held_out(self.seed)
 
     @cached_property
@@ -86,7 +86,7 @@ class ObjectModel:
 
 
 def write_model(folder: Path, model: ObjectModel, made: Finished) -> None:
-    """Write all files of a model into a folder."""
+    """Writes all files of a model into a folder."""
     sdf = Model(
         model.category, model.obj_path.name, made.collisions, made.mass, comment=f"{model.kind} {model.category}"
     )

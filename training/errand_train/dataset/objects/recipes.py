@@ -118,7 +118,7 @@ def load_recipes(name: str) -> Mapping[str, Recipe]:
 
 
 def build(category: str, recipe: Recipe, draft: Draft) -> tuple[Finished, str, str]:
-    """Make an instance: the model, its kind and its main colour. Raises ValueError for what the recipe gets wrong."""
+    """Makes an instance: the model, its kind and its main colour. Raises ValueError for what the recipe gets wrong."""
     rng, name = draft.rng, category.replace("_", " ")
     kind = Kind()
     if recipe.kinds:
@@ -139,7 +139,7 @@ def build(category: str, recipe: Recipe, draft: Draft) -> tuple[Finished, str, s
 
 
 def _draw(names: Names, table: Mapping[str, Range], rng: np.random.Generator) -> None:
-    """Add names: even draws between two bounds, or the values of expressions."""
+    """Adds names: even draws between two bounds, or the values of expressions."""
     for name, value in table.items():
         if isinstance(value, tuple):
             low, high = (evaluate(bound, names, rng) for bound in value)
@@ -155,7 +155,7 @@ class _Assembly:
     draft: Draft
 
     def add(self, part: Part, names: Names, R: ArrayLike, p: FloatArray) -> None:
-        """Add a part at a pose, so often as it says."""
+        """Adds a part at a pose, so often as it says."""
         rng = self.draft.rng
         for scope in self._rounds(part, names):
             if rng.random() >= evaluate(part.chance, scope, rng):
@@ -209,7 +209,7 @@ class _Assembly:
                 self.draft.visual(mesh, R, p)
 
     def _lathe(self, material: str, part: Part, names: Names, mesh: Mesh) -> Mesh:
-        """Turn the profile about z; `bands` of heights have materials of their own. Returns the closed body."""
+        """Turns the profile about z; `bands` of heights have materials of their own. Returns the closed body."""
         line = np.maximum(self._points(part, names, 2), [0.0, -np.inf])
         sides = round(self._number(part.sides, names))
         bands = [(name, self._number(low, names), self._number(high, names)) for name, low, high in part.bands]

@@ -37,7 +37,7 @@ def _cell(model: ObjectModel, size: tuple[int, int]) -> Picture:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Write one sheet for each category, and one of all distractors."""
+    """Writes one sheet for each category, and one of all distractors."""
     folder, categories = Path(arguments[0]), arguments[1:] or [*CLASSES, "distractors"]
     for category in categories:
         if category == "distractors":

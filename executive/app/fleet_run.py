@@ -34,7 +34,7 @@ from executive.run.visitor import RunSettings
 from executive.run.worker import LockStepWorker
 from executive.store.assignments import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from plant.worlds.world import World
 from skills.files.errors import InputError, Problems
 

@@ -17,7 +17,7 @@ from executive.app.simulated import SimulatedBackend
 from executive.app.worlds import open_world
 from executive.mission.request import Request
 from executive.words.mission import DEFAULT_WORLD
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from skills.estimate.compiled import CompiledFunction
 
 _MISSION: Final = """

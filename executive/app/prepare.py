@@ -21,7 +21,7 @@ from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge, Pose
 from executive.words.mission import DEFAULT_WORLD, Mission, MissionPart, QuestionPolicy
-from executive.words.robots import RobotConfig, robot_called, robots_in
+from executive.words.robot_config import RobotConfig, robot_called, robots_in
 from executive.words.yaml_steps import steps_from_lines
 from plant.worlds.world import ObjectRule, World, WorldError
 from skills.files.errors import InputError, Problems, listing, suggestion
@@ -97,7 +97,7 @@ class Setting:
 
     def understand(self) -> Understanding:
         """What the request's sentence asks of the only robot, or of each. Raises InputError: it is not understood."""
-        from executive.language.robots import understand_for_robots  # which a mission file does not need
+        from executive.language.several_robots import understand_for_robots  # which a mission file does not need
         from executive.language.understand import Status, ask_until_clear, understand
 
         meaning: Callable[..., Understanding] = understand

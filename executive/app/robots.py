@@ -14,7 +14,7 @@ import numpy as np
 from executive.mission.request import Start
 from executive.mission.stack_file import load_stack
 from executive.words.knowledge import Knowledge, Pose, RobotFacts
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from plant.kinds import robot_kind
 from plant.worlds.world import World
 from skills.files.errors import InputError

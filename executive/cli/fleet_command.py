@@ -15,7 +15,7 @@ from executive.mission.request import Request
 from executive.store.assignments import GivenMissions
 from executive.store.missions import STORE as STORE_NAME
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.words.robots import robot_called
+from executive.words.robot_config import robot_called
 from skills.files.errors import InputError
 from skills.files.outside import is_folder
 

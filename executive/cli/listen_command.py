@@ -27,7 +27,7 @@ from executive.speech.voice import Voice, installed_voice
 from executive.speech.whisper import load_whisper
 from executive.words.knowledge import Knowledge
 from executive.words.mission import DEFAULT_WORLD
-from executive.words.robots import RobotConfig, display_name
+from executive.words.robot_config import RobotConfig, display_name
 from skills.files.errors import InputError, listing
 
 _METER_WIDTH = 24

@@ -8,7 +8,7 @@ From Python, beside a run:
     print(reply.text)
 """
 
+from executive.conversation.dialogue import Conversation
 from executive.conversation.parts import Reply, ReplyKind, Speech
-from executive.conversation.talk import Conversation
 
 __all__ = ["Conversation", "Reply", "ReplyKind", "Speech"]

@@ -12,7 +12,7 @@ from typing import Final
 from executive.language.cleaning import addressed_to
 from executive.language.lexicon import Patterns, any_of, lexicon, read_table
 from executive.language.questions import RefusalError
-from executive.words.robots import display_name, robot_called
+from executive.words.robot_config import display_name, robot_called
 from skills.files.errors import listing
 
 _NUMBERS: Final = {"two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "both": 2}

@@ -9,7 +9,7 @@ from typing import Any
 from executive.language.actions import Action
 from executive.language.command_frames import spoken_command
 from executive.language.items import Predicate, spoken_words
-from executive.language.steps import Trace
+from executive.language.pipeline import Trace
 from executive.language.tokens import Token
 from executive.words.yaml_steps import steps_to_yaml
 

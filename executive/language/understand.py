@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from executive.language.cleaning import clean, foreign_reason, placeholder, strip_wake
 from executive.language.parser import DependencyParser
+from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, with_answer
 from executive.language.reference import Memory
 from executive.language.spelling import Corrected, correct_spelling
-from executive.language.steps import Steps, Trace
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands
@@ -140,17 +140,17 @@ def understand(
     said = Corrected(called.text)
     if correct and knowledge is not None:
         said = correct_spelling(called.text, knowledge, parser)
-    found = meaning(Trace(said.text, memory or Memory()), Steps(parser, knowledge))
+    found = meaning(Trace(said.text, memory or Memory()), Pipeline(parser, knowledge))
     return replace(found, text=sentence, notes=(*said.notes, *found.notes), addressed=addressed)
 
 
-def meaning(said: Trace, steps: Steps, clauses: Sequence[Clause] | None = None) -> Understanding:
+def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = None) -> Understanding:
     """What a text for one robot means, which is that of an empty trace; its clauses where they are known."""
-    trace = steps.run(said)
-    if steps.knowledge is not None and _MENTIONED.search(said.text) is not None:
+    trace = pipeline.run(said)
+    if pipeline.knowledge is not None and _MENTIONED.search(said.text) is not None:
         from executive.language.structure.sentence import structured
 
-        trace = structured(trace, clauses, steps, said.memory)
+        trace = structured(trace, clauses, pipeline, said.memory)
     refusal = trace.refusal
     if refusal is None:
         ok = Understanding(said.text, Status.OK, trace.commands, notes=trace.notes, memory=trace.memory, trace=trace)

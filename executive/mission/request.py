@@ -15,7 +15,7 @@ from pydantic.dataclasses import dataclass
 from executive.mission.scenario import NO_SCENARIO, Scenario
 from executive.words.mission import QuestionPolicy
 from executive.words.option import Option
-from executive.words.robots import RobotConfig, parse_robots, pose_in
+from executive.words.robot_config import RobotConfig, parse_robots, pose_in
 from executive.words.variation import NO_VARIATION, Variation
 from skills.files.errors import InputError
 from skills.files.outside import is_there

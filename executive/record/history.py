@@ -34,7 +34,7 @@ from executive.record.schemas import (
 )
 from executive.tree.node_view import NodeView, logged_view
 from executive.tree.snapshot import NodeState
-from executive.words.robots import robot_called
+from executive.words.robot_config import robot_called
 from skills.api import Cause, ObjectObservation, Thing
 from skills.detect.words import told_apart
 from skills.files.errors import InputError

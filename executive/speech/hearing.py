@@ -10,8 +10,8 @@ from typing import Final
 from executive.language.cleaning import SAME_NAME, Address, heard_wake
 from executive.language.lexicon import lexicon
 from executive.language.parser import DependencyParser
-from executive.language.robots import understand_for_robots
 from executive.language.roles import HERE
+from executive.language.several_robots import understand_for_robots
 from executive.language.spelling import SoundAlikes, sound_distance
 from executive.language.understand import Status, Understanding
 from executive.speech.interpret import Reading

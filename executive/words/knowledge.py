@@ -9,7 +9,7 @@ from typing import Annotated, Final
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.words.command import Task
-from executive.words.robots import RobotsFile
+from executive.words.robot_config import RobotsFile
 from skills.files.errors import InputError, suggestion
 from skills.files.schema import Name, validate
 from skills.files.yaml_source import YamlSource, read_yaml

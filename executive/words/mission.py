@@ -12,7 +12,7 @@ from executive.words.command import Command
 from executive.words.forms import Strict
 from executive.words.knowledge import Corner
 from executive.words.policy import OnFailure, OperatorQuestion, Policy
-from executive.words.robots import RobotsFile
+from executive.words.robot_config import RobotsFile
 from executive.words.step import Given, Placed, Scalar, Step
 from executive.words.steps import Branch, Handler, Steps, While
 from skills.files.errors import SourceLine

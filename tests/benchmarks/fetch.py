@@ -28,7 +28,7 @@ from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 
 ROBOT: Final = "bob"
 WORLD: Final = "flat"

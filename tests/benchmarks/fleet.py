@@ -44,7 +44,7 @@ from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from tests.executive.conftest import (
     FETCH,
     KNOWLEDGE,

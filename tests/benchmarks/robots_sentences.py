@@ -19,7 +19,7 @@ import yaml
 
 from executive.language.addressees import Whom
 from executive.language.parser import load_parser
-from executive.language.robots import understand_for_robots
+from executive.language.several_robots import understand_for_robots
 from executive.language.understand import Part, Status, Understanding
 from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world

@@ -24,7 +24,7 @@ from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.run.visitor import Progress, RunVisitor
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from skills.robot import Pose2D
 from tests.benchmarks.traffic_cases import meeting, missions
 

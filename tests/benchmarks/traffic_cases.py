@@ -10,7 +10,7 @@ import numpy as np
 
 from executive.app.worlds import knowledge_of, open_world
 from executive.words.knowledge import Door, Knowledge
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from plant.kinds import robot_kind
 from plant.worlds.world import World
 from skills.estimate.grid_map import GridMap, load_grid_map

@@ -15,7 +15,7 @@ from executive.app.mission_files import mission_file
 from executive.mission.request import Request
 from executive.mission.scenario import NO_SCENARIO, RandomFaults, Scenario
 from executive.mission.stack_file import stack_file
-from executive.words.robots import NamedRobot, RobotConfig, robots_in
+from executive.words.robot_config import NamedRobot, RobotConfig, robots_in
 from executive.words.slug import slug
 from executive.words.variation import (
     NORMAL_LIGHT,

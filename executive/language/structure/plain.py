@@ -11,10 +11,10 @@ from executive.language.items import Adverb, Being, Chunk, Item, Whether, verb
 from executive.language.lexicon import PrepositionRole, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
+from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.steps import Steps, Trace
 from executive.language.tokens import Token
 from executive.words.command import START, Command, Task
 from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
@@ -111,11 +111,11 @@ _THERE_IS: Final = Being("there is", existential=True, asked=False)
 class PlainReader:
     """Understands plain parts in one world. Its methods raise RefusalError."""
 
-    steps: Steps
+    pipeline: Pipeline
     knowledge: Knowledge
 
     def _run(self, trace: Trace, *, behind: str | None = None, upto: str | None = None) -> Trace:
-        found = self.steps.run(trace, behind=behind, upto=upto)
+        found = self.pipeline.run(trace, behind=behind, upto=upto)
         if found.refusal is not None:
             raise found.refusal
         return found

@@ -128,7 +128,7 @@ def speech_in(text: str, reader: PlainReader) -> Said | None:
 
     Raises RefusalError: what it asks to say cannot be said for somebody else, or to nobody who is known.
     """
-    forms, parser = _of_world(reader.knowledge), reader.steps.parser
+    forms, parser = _of_world(reader.knowledge), reader.pipeline.parser
     if (match := forms.say_to.fullmatch(text) or forms.say_whom.fullmatch(text)) is not None:
         return Said(_words(match["text"], parser), _listener(match))
     if forms.says_inside.match(text) is not None:

@@ -13,13 +13,12 @@ from executive.language.clauses import ACTS, Clause, Cue, cue_behind, cut, split
 from executive.language.items import Adverb, Chunk, verb
 from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
+from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.steps import Steps as PlainSteps
-from executive.language.steps import Trace
-from executive.language.structure.branches import Branches
 from executive.language.structure.conditions import suppose
+from executive.language.structure.decisions import Branches
 from executive.language.structure.plain import PlainReader, State, at_start, behind_preposition, phrase_of_name
 from executive.language.structure.requests import (
     Asked,
@@ -309,7 +308,7 @@ MOST_NESTED: Final = 2
 MOST_CLAUSES: Final = 24
 
 
-def structured(plain: Trace, clauses: Sequence[Clause] | None, steps: PlainSteps, memory: Memory) -> Trace:
+def structured(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pipeline, memory: Memory) -> Trace:
     """The trace of a sentence that decides, repeats, waits, says or asks, from that of its plain reading.
 
     It is the plain one where the sentence lists plain commands nevertheless: where it could be read as such a list,
@@ -317,7 +316,7 @@ def structured(plain: Trace, clauses: Sequence[Clause] | None, steps: PlainSteps
     and `memory` is what was spoken of before.
     """
     try:
-        return _structured(plain, split(plain.text).clauses if clauses is None else clauses, steps, memory)
+        return _structured(plain, split(plain.text).clauses if clauses is None else clauses, pipeline, memory)
     except RefusalError as refusal:
         return replace(plain, refusal=refusal, refused_at="structure")
     except ValidationError as error:
@@ -325,16 +324,16 @@ def structured(plain: Trace, clauses: Sequence[Clause] | None, steps: PlainSteps
         return replace(plain, refusal=RefusalError(f"a number in it {wrong}"), refused_at="structure")
 
 
-def _structured(plain: Trace, clauses: Sequence[Clause], plain_steps: PlainSteps, memory: Memory) -> Trace:
+def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, memory: Memory) -> Trace:
     """The same. Raises RefusalError: something is not surely understood; the message names the words."""
     decides = any(one.kind is not None or cue_behind(one.text) is not None for one in clauses)
     if plain.refusal is None and not decides:
         return plain
     if len(clauses) > MOST_CLAUSES:
         raise RefusalError(f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most")
-    assert plain_steps.knowledge is not None
-    builder = Builder(PlainReader(plain_steps, plain_steps.knowledge))
-    steps, state = builder.sequence(clauses, at_start(plain_steps.knowledge, memory))
+    assert pipeline.knowledge is not None
+    builder = Builder(PlainReader(pipeline, pipeline.knowledge))
+    steps, state = builder.sequence(clauses, at_start(pipeline.knowledge, memory))
     if all(isinstance(step, Do) for step in steps) and not builder.special:
         return plain
     if max(map(_depth, steps), default=0) > MOST_NESTED:

@@ -9,7 +9,7 @@ from executive.app.prepare import prepare
 from executive.app.worlds import open_world
 from executive.cli.run_command import refuse_unaddressed
 from executive.mission.request import Request
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 

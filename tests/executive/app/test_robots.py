@@ -6,7 +6,7 @@ import pytest
 
 from executive.app.robots import PlacedRobot, knowledge_for, placed_robots
 from executive.app.worlds import knowledge_of, open_world
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from plant.worlds.seeding import place_people
 from skills.files.errors import InputError
 from skills.robot import Pose2D

@@ -8,7 +8,7 @@ from executive.conversation import ReplyKind
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.control_state import Mode
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 
 TWO = (
     RobotConfig("Alice", "spot"),

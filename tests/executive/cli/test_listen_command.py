@@ -14,7 +14,7 @@ from executive.cli.listen_command import answer_line, hear_request, show_hearing
 from executive.language.understand import Status, Understanding
 from executive.mission.request import Request
 from executive.speech.listener import follow
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from skills.files.errors import InputError
 
 GO = "Hey Alice, go to the kitchen."

@@ -4,7 +4,7 @@ import pytest
 
 from executive.mission.load import for_robot, load_mission, overridden
 from executive.mission.resolve import mission_from_file
-from executive.words.robots import RobotConfig, robots_in
+from executive.words.robot_config import RobotConfig, robots_in
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from executive.mission.request import Request, start_in
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 

@@ -15,7 +15,7 @@ from executive.run.visitor import TickNote
 from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.snapshot import Change, NodeState
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from skills.api import Cause
 from skills.files.errors import InputError
 from skills.robot import Pose2D

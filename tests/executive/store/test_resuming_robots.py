@@ -16,7 +16,7 @@ from executive.tree.registry import installed_skills
 from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from executive.words.robots import RobotConfig
+from executive.words.robot_config import RobotConfig
 from skills.api import Cause, Failed, Running, Succeeded
 
 TAKE_AND_PUT = (

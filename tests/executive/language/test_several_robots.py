@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from executive.language.addressees import Whom
-from executive.language.robots import understand_for_robots
+from executive.language.several_robots import understand_for_robots
 from executive.language.understand import Status, understand
 
 ROBOTS = ("alice", "bob")

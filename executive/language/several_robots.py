@@ -12,15 +12,15 @@ from executive.language.addressees import Saying, Who, Whom, addressees
 from executive.language.clauses import Clause, Split, split
 from executive.language.cleaning import clean
 from executive.language.parser import DependencyParser
+from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.spelling import Corrected, correct_spelling
-from executive.language.steps import Steps, Trace
 from executive.language.understand import Part, Status, Understanding, meaning, understand
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
-from executive.words.robots import display_name, robot_called
+from executive.words.robot_config import display_name, robot_called
 from skills.files.errors import listing
 
 _IT: Final = r"\b(?:it|them)\b"
@@ -72,7 +72,7 @@ def understand_for_robots(
             called = listing((f'"Hey {name}"' for name in names), last="or")
             reason = f"no robot's name was said; begin with {called}"
             return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
-        found = _Reader(tuple(robots), Steps(parser, knowledge), knowledge).addressed(sentence, cut, memory)
+        found = _Reader(tuple(robots), Pipeline(parser, knowledge), knowledge).addressed(sentence, cut, memory)
     except RefusalError as refusal:
         found = Understanding(sentence, Status.REFUSED, reason=refusal.reason, unknown_words=refusal.unknown)
         return replace(found, addressed=addressed)
@@ -91,7 +91,7 @@ class _Read:
 @dataclass(frozen=True)
 class _Reader:
     robots: tuple[str, ...]
-    steps: Steps
+    pipeline: Pipeline
     knowledge: Knowledge
 
     def addressed(self, sentence: str, cut: Split, memory: Memory | None) -> Understanding:
@@ -130,14 +130,14 @@ class _Reader:
         if changes_hands and re.search(_IT, part.text):
             part = replace(part, text=re.sub(_FROM_THERE, "", part.text))
             clauses = [replace(clause, text=re.sub(_FROM_THERE, "", clause.text)) for clause in clauses]
-        meant = meaning(Trace(part.text, memory or Memory()), self.steps, clauses)
+        meant = meaning(Trace(part.text, memory or Memory()), self.pipeline, clauses)
         after = set(self._said_before(part, before))
         for number, other in enumerate(before):
             if other.part.who == part.who:
                 continue
             if (place := _moved(other.meaning, meant)) is not None and memory is not None:
                 known = replace(memory, told=(*memory.told, *((thing, place) for thing in memory.things)))
-                meant = meaning(Trace(part.text, known), self.steps, clauses)
+                meant = meaning(Trace(part.text, known), self.pipeline, clauses)
             put = {(str(command.item), command.goal) for command in other.meaning.commands if command.item is not None}
             if any((str(one.object), one.goal) in put for one in meant.commands if one.task is Task.GRASP):
                 after.add(number)

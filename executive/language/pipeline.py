@@ -69,7 +69,7 @@ class Trace:
 
 
 @dataclass(frozen=True)
-class Steps:
+class Pipeline:
     """The steps from words to commands in one world; with `knowledge` None all names stay as they were spoken."""
 
     parser: DependencyParser
@@ -165,15 +165,15 @@ def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError
     return RefusalError(question.text, (heard,), question=replace(question, heard=heard))
 
 
-_STEPS: Final[dict[str, Callable[[Steps, Trace], Trace]]] = {
-    "cleaning": Steps._open,
-    "parsing": Steps._parse,
-    "reading": Steps._read,
-    "clauses": Steps._split,
-    "actions": Steps._act,
-    "understanding": Steps._check,
-    "reference": Steps._refer,
-    "feasibility": Steps._check_feasible,
+_STEPS: Final[dict[str, Callable[[Pipeline, Trace], Trace]]] = {
+    "cleaning": Pipeline._open,
+    "parsing": Pipeline._parse,
+    "reading": Pipeline._read,
+    "clauses": Pipeline._split,
+    "actions": Pipeline._act,
+    "understanding": Pipeline._check,
+    "reference": Pipeline._refer,
+    "feasibility": Pipeline._check_feasible,
     "command frames": lambda _, trace: replace(trace, frames=command_frames(trace.resolved)),
-    "grounding": Steps._command,
+    "grounding": Pipeline._command,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.words.robots import RobotConfig, display_name, parse_robots, robot_called
+from executive.words.robot_config import RobotConfig, display_name, parse_robots, robot_called
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 

@@ -24,7 +24,7 @@ from executive.words.mission import Mission
 from plant.worlds.world import SeedRules
 from skills.api import Skill
 from skills.durations import DURATION_PATTERN
-from skills.faults.kinds import STANDARD_FAULTS
+from skills.faults.fault_kinds import STANDARD_FAULTS
 from skills.stack import SLOTS, components, skill_options, stack_schema
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))

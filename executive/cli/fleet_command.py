@@ -153,7 +153,7 @@ def resumable_lines(missions: MissionStore, queue: Path | None = None) -> Sequen
 
 def _faults(words: Sequence[str], robots: Sequence[str]) -> Mapping[str, Sequence[str]]:
     """The faults of each robot. Raises InputError: there is no such fault."""
-    from skills.faults.words import parse_fault
+    from skills.faults.fault_words import parse_fault
 
     faults: dict[str, list[str]] = {name: [] for name in robots}
     for each in words:

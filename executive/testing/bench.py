@@ -15,9 +15,9 @@ from executive.tree.board import Board, Constant
 from executive.tree.context import RunContext
 from executive.tree.nodes.skill import SkillLeaf
 from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
+from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
+from skills.faults.fault_words import Fault, parse_fault
 from skills.faults.faulty_robot import with_faults
-from skills.faults.kinds import STANDARD_FAULTS, FaultKind
-from skills.faults.words import Fault, parse_fault
 from skills.robot import Capabilities, Clock, Robot
 from skills.testing.blocks import ROOM, TABLE_CAN, Block
 from skills.testing.clock import VirtualClock

@@ -21,8 +21,8 @@ from executive.tree.port_values import PortValueError, gathered, port_value
 from executive.tree.registry import missing
 from executive.tree.types import describe_type, field_types, required
 from skills.api import Cause, Skill
-from skills.faults.kinds import STANDARD_FAULTS, FaultKind
-from skills.faults.words import parse_fault
+from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
+from skills.faults.fault_words import parse_fault
 from skills.files.schema import validate
 from skills.files.yaml_source import YamlSource, read_yaml
 from skills.quantities import Angle, Coordinate, Delay, Duration, Height, Length, Quantity, Share, Turn

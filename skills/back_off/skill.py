@@ -12,9 +12,9 @@ from skills.api import Cause, Running, Succeeded
 from skills.back_off.ports import BackOffInputs, BackOffPorts
 from skills.geometry import compose, relative
 from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.base import MovingSkill
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
-from skills.navigate.moving import MovingSkill
-from skills.navigate.scan_health import ScanHealth
+from skills.navigate.sensor_watch import ScanHealth
 from skills.patience import PATIENCE_S
 from skills.quantities import Delay, Length, Speed
 from skills.robot import BaseKind, Pose2D

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from skills.api import LocalisationEstimate
 from skills.estimate.compiled import distances
 from skills.estimate.grid_map import GridMap
-from skills.estimate.scan_points import outside_discs, placed_points, scan_points, sensor_pose
-from skills.estimate.seen_layer import clear_cells, mark_cells
-from skills.estimate.self_filter import SelfFilter, in_body_axes
+from skills.estimate.obstacle_layer import clear_cells, mark_cells
+from skills.estimate.scan_points import SelfFilter, in_body_axes, outside_discs, placed_points, scan_points, sensor_pose
 from skills.geometry import compose
 from skills.quantities import Count, Delay, Height, Length, Margin
 from skills.robot import FloatArray, Pose2D, Robot, Scan

@@ -13,8 +13,15 @@ from numpy.typing import NDArray
 from skills.api import LocalisationEstimate
 from skills.estimate.compiled import bilinear, compiled
 from skills.estimate.grid_map import GridMap
-from skills.estimate.scan_points import outside_discs, placed_points, scan_points, sensor_pose
-from skills.estimate.self_filter import ArmShape, SelfFilter, in_body_axes
+from skills.estimate.scan_points import (
+    ArmShape,
+    SelfFilter,
+    in_body_axes,
+    outside_discs,
+    placed_points,
+    scan_points,
+    sensor_pose,
+)
 from skills.geometry import compose
 from skills.quantities import Count, Factor, Height, Length, Margin
 from skills.robot import FloatArray, Pose2D, Robot, Scan

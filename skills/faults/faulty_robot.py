@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, cast
 
-from skills.faults.kinds import VERBS, Call
-from skills.faults.words import Fault, parse_fault
+from skills.faults.fault_kinds import VERBS, Call
+from skills.faults.fault_words import Fault, parse_fault
 from skills.robot import Clock, Robot
 
 

@@ -13,8 +13,8 @@ from skills.api import Cause, ObjectObservation, Running, Succeeded, Thing
 from skills.detect.words import counted
 from skills.find_people.ports import FindPeopleInputs, FindPeoplePorts
 from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.base import MovingSkill
 from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
-from skills.navigate.moving import MovingSkill
 from skills.patience import Patience
 from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
-from skills.estimate.scan_points import scan_points, sensor_pose
-from skills.estimate.self_filter import SelfFilter
+from skills.estimate.scan_points import SelfFilter, scan_points, sensor_pose
 from skills.robot import FloatArray, Joints, Pose2D, Scan, unit_rays
 
 BAND_M = (0.5, 1.6)

@@ -16,7 +16,7 @@ import numpy as np
 
 from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
-from skills.estimate.self_filter import SelfFilter
+from skills.estimate.scan_points import SelfFilter
 from skills.geometry import compose, inverse, relative
 from skills.mapping.closures import Window, find_pose
 from skills.mapping.distributions import Alignment, Distributions

@@ -16,10 +16,9 @@ from skills.navigate.base import Base
 from skills.navigate.follower import Drive
 from skills.navigate.footprint import Footprint, footprint_clearance_m
 from skills.navigate.giving_way import Avoided
-from skills.navigate.navigate_options import NavigateOptions
 from skills.navigate.path import Path
 from skills.navigate.ports import NavigateInputs, NavigatePorts
-from skills.navigate.surroundings import Surroundings
+from skills.navigate.surroundings import NavigateOptions, Surroundings
 from skills.navigate.trip_planning import TripPlanning, place_text
 from skills.patience import Patience
 from skills.robot import Pose2D

@@ -4,21 +4,55 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 from skills.api import ForgettingCostmap, FreeSpace, SkillContext
 from skills.navigate.arm_footprint import ArmFootprint
-from skills.navigate.collision_guard import CollisionGuard
-from skills.navigate.cut_off import DoorWatch
-from skills.navigate.giving_way import Avoided, GivingWay
-from skills.navigate.low_obstacles import LowObstacleWatch
-from skills.navigate.navigate_options import NavigateOptions
-from skills.navigate.people_space import Pace, PaceManager, spaced
-from skills.navigate.scan_health import ScanHealth
+from skills.navigate.collision_guard import CollisionGuard, GuardOptions
+from skills.navigate.cut_off import DoorOptions, DoorWatch
+from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
+from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
+from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, ScanHealthOptions, WatchOptions
+from skills.patience import PATIENCE_S
 from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
-from skills.perception.people_watch import PeopleWatch
+from skills.perception.people_watch import PeopleOptions, PeopleWatch
+from skills.quantities import Delay, Duration, Margin, Speed, Tries, TurnRate
 from skills.robot import FloatArray, Pose2D
 from skills.stack import LocalController
+
+
+@dataclass(frozen=True)
+class NavigateOptions:
+    """Patience and bounds of the skill, times in seconds of the robot's clock.
+
+    Every `review_s` the path is checked `review_m` ahead, and planned anew, while driving, where something blocks it.
+    While people are near, and for `after_person_s` (longer than a costmap remembers them), plans that fail are tried
+    again without being counted, up to person_patience_s.
+    """
+
+    planning_latency_s: Delay = 0.3
+    localising_patience_s: Delay = 3.0
+    blind_patience_s: Delay = PATIENCE_S
+    blocked_patience_s: Delay = 1.5
+    replan_pause_s: Delay = 2.0
+    replans: Tries = 6
+    stuck_s: Duration = 4.0
+    review_s: Duration = 0.2
+    review_m: Margin = 0.0
+    settle_s: Delay = 2.0
+    still_m_s: Speed = 0.03
+    still_rad_s: TurnRate = 0.05
+    after_person_s: Delay = 14.0
+    person_patience_s: Delay = 45.0
+    low_obstacles: WatchOptions = field(default_factory=WatchOptions)
+    people: PeopleOptions = field(default_factory=PeopleOptions)
+    space: SpaceOptions = field(default_factory=SpaceOptions)
+    guard: GuardOptions = field(default_factory=GuardOptions)
+    scans: ScanHealthOptions = field(default_factory=ScanHealthOptions)
+    giving_way: GivingWayOptions = field(default_factory=GivingWayOptions)
+    doors: DoorOptions = field(default_factory=DoorOptions)
+
 
 _OUTLINE_PERIOD_S = 0.5
 

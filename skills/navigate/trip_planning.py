@@ -10,10 +10,9 @@ from skills.api import Cause, ForgettingCostmap, Job, SkillContext
 from skills.geometry import compose
 from skills.navigate.cut_off import closed_sentence
 from skills.navigate.giving_way import Avoided
-from skills.navigate.navigate_options import NavigateOptions
 from skills.navigate.path import Path
 from skills.navigate.ports import NavigateInputs
-from skills.navigate.surroundings import Surroundings
+from skills.navigate.surroundings import NavigateOptions, Surroundings
 from skills.patience import Patience
 from skills.robot import Pose2D
 from skills.routine import SkillFailure

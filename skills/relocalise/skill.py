@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from skills.api import Cause, LocalisationEstimate, Localiser, Running, SearchingLocaliser, Succeeded
-from skills.navigate.low_obstacles import WatchOptions, low_points
-from skills.navigate.moving import MovingSkill
+from skills.navigate.base import MovingSkill
+from skills.navigate.sensor_watch import WatchOptions, low_points
 from skills.patience import PATIENCE_S
 from skills.quantities import Delay, Height, Length, Margin, Share, Speed, Turn, TurnRate
 from skills.relocalise.ports import RelocaliseInputs, RelocalisePorts

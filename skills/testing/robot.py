@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from skills.faults.pulling import pulled
+from skills.faults.fault_kinds import pulled
 from skills.geometry import compose
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.robot import (

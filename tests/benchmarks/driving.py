@@ -20,10 +20,10 @@ from skills.api import Failed, PlanningError, Running, SkillContext
 from skills.estimate.grid_map import GridMap
 from skills.geometry import relative
 from skills.navigate.footprint import Footprint
-from skills.navigate.low_obstacles import WatchOptions
-from skills.navigate.navigate_options import NavigateOptions
 from skills.navigate.planner import plan_path
+from skills.navigate.sensor_watch import WatchOptions
 from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.surroundings import NavigateOptions
 from skills.robot import Pose2D
 from skills.stack import RobotStack
 

@@ -10,7 +10,7 @@ from wheeled_toy import TOY
 from executive.testing.skill_suite import PARTS, SuiteCase
 from executive.testing.skill_test import bench_of_setup, carry_out, load_skill_tests, scripted_maker
 from executive.tree.registry import built_in_skills
-from skills.faults.kinds import STANDARD_FAULTS
+from skills.faults.fault_kinds import STANDARD_FAULTS
 from skills.robot import BaseKind
 
 SKILLS = built_in_skills()

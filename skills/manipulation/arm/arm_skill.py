@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, InputsT, Running, SkillContext
-from skills.estimate.self_filter import segment_distance
+from skills.estimate.scan_points import segment_distance
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.kinematics import ArmModel, arm_model

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from skills.api import PlanningError
-from skills.estimate.self_filter import segment_distance
+from skills.estimate.scan_points import segment_distance
 from skills.robot import CameraCapabilities, FloatArray, HeadCapabilities, Image
 
 _TURNS, _OFF_AXIS_RAD, _NEAREST_M = 6, 0.2, 0.25

@@ -14,7 +14,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
-from skills.estimate.self_filter import SelfFilter
+from skills.estimate.scan_points import SelfFilter
 from skills.geometry import inside_polygon, wrap
 from skills.manipulation.approach.standing import first_reachable_spot, free_places, go_to_one
 from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N, Goal

@@ -21,9 +21,9 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
 from plant.spot.kind import spot_capabilities
 from skills.api import Cause, Running, Skill, Succeeded
+from skills.faults.fault_kinds import VERBS, Effect
+from skills.faults.fault_words import Fault
 from skills.faults.faulty_robot import with_faults
-from skills.faults.kinds import VERBS, Effect
-from skills.faults.words import Fault
 from skills.robot import ArmTrajectory
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace

@@ -5,6 +5,7 @@ import pytest
 from planar_robot import TWO_ROOMS, Bench, Box
 
 from skills.api import LocalisationEstimate
+from skills.estimate.localiser import DeadReckoning
 from skills.geometry import compose, inverse
 from skills.robot import Pose2D
 
@@ -170,3 +171,36 @@ def test_a_scan_of_nothing_but_other_robots_takes_no_place_away() -> None:
     after = bench.localiser.estimate()
     assert before.localised and after.localised
     assert np.array_equal(before.X_WO.GetAsMatrix4(), after.X_WO.GetAsMatrix4())
+
+
+CORRIDOR = Pose2D(1.5, 5.4, 0.3)
+
+
+def test_the_start_is_where_it_was_told_and_the_rest_is_odometry():
+    bench = Bench(CORRIDOR, component=DeadReckoning(), cameras=False)
+    bench.tick()
+    assert bench.localiser.estimate().localised
+    assert bench.pose_error() == pytest.approx((0.0, 0.0), abs=1e-3)
+    bench.robot.push(3.0, 0.5, 0.4)
+    bench.tick()
+    assert bench.pose_error() == pytest.approx((0.0, 0.0), abs=1e-3)
+
+
+def test_it_is_less_sure_the_farther_it_has_gone():
+    bench = Bench(CORRIDOR, component=DeadReckoning(), cameras=False)
+    bench.tick()
+    before = bench.localiser.estimate().covariance
+    bench.robot.push(5.0, 0.0, 0.0)
+    bench.tick()
+    assert np.all(np.diag(bench.localiser.estimate().covariance) > np.diag(before))
+
+
+def test_a_start_that_is_not_known_is_the_origin():
+    bench = Bench(CORRIDOR, component=DeadReckoning(), told=False, cameras=False)
+    bench.tick()
+    pose = bench.context().pose()
+    assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+
+
+def test_it_is_not_localised_before_it_has_seen_odometry():
+    assert not DeadReckoning().build(Bench(CORRIDOR).costmap.keepout, None, surely=False).estimate().localised

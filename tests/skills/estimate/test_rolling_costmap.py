@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from planar_robot import TWO_ROOMS, Bench, Box
 
-from skills.estimate.dead_reckoning import DeadReckoning
+from skills.estimate.localiser import DeadReckoning
 from skills.estimate.rolling_costmap import RollingCostmap, RollingCostmapOptions
 from skills.robot import Pose2D
 

@@ -11,7 +11,7 @@ from scripted_robot import CAPABILITIES, GRIPPER, MODEL, ScriptedRobot, context_
 
 from skills.api import Running, Succeeded
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.self_filter import ArmShape, SelfFilter
+from skills.estimate.scan_points import ArmShape, SelfFilter
 from skills.manipulation.arm.collision import ArmScene, box_corners
 from skills.manipulation.arm.collision import Box as HeldBox
 from skills.manipulation.arm.poses import carry_configuration

@@ -6,10 +6,10 @@ import pytest
 from planar_robot import Bench, Box, NamingWorker
 
 from skills.api import Cause, Failed, Running, Step, Succeeded
-from skills.estimate.dead_reckoning import DeadReckoning
+from skills.estimate.localiser import DeadReckoning
 from skills.estimate.rolling_costmap import RollingCostmap
-from skills.navigate.navigate_options import NavigateOptions
 from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.surroundings import NavigateOptions
 from skills.robot import BaseKind, Pose2D
 
 PILLAR = Box(6.2, 5.3, 6.4, 5.6, 0.0, 1.7)

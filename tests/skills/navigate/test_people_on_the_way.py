@@ -10,8 +10,8 @@ from planar_robot import OUTLINE, TWO_ROOMS, Bench
 
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.navigate.footprint import Footprint, disc_centres, pose_array
-from skills.navigate.navigate_options import NavigateOptions
 from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.surroundings import NavigateOptions
 from skills.robot import Pose2D
 
 FOOTPRINT = Footprint.rectangle(OUTLINE)

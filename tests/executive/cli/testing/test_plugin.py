@@ -28,7 +28,7 @@ def output(tmp_path_factory):
     done = run_pytest(
         tmp_path_factory.mktemp("skill_tests"),
         conftest__py="""\
-        from skills.faults.kinds import Effect, FaultKind
+        from skills.faults.fault_kinds import Effect, FaultKind
 
         def pytest_errand_skill_tests(settings):
             def effect(match):

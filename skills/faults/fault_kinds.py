@@ -12,8 +12,9 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.faults.pulling import pulled
-from skills.robot import CommandState, CommandStatus, FrameTree, Image, NoImageError, Robot
+from skills.manipulation.arm.kinematics import arm_model
+from skills.manipulation.arm.pull import levers_m
+from skills.robot import Capabilities, CommandState, CommandStatus, FrameTree, Image, Joints, NoImageError, Robot
 
 THIEF: Final = "the tablet"
 """Who takes the lease in "lease taken"."""
@@ -382,3 +383,16 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
     FaultKind(r"lease taken", "lease taken at 4 s", "somebody else takes the lease, once", _lease),
 )
 """All faults that come with the project."""
+
+
+PULL_N = 15.0
+
+
+def pulled(joints: Joints, capabilities: Capabilities, force_n: float = PULL_N) -> Joints:
+    """The same readings with the efforts that hold against a force straight ahead."""
+    model, gripper = arm_model(capabilities), capabilities.gripper
+    p_HT = np.array([0.0 if gripper is None else gripper.grip_x_m, 0.0, 0.0])
+    q_rad = np.array([joints.position_rad[name] for name in model.names])
+    extra_nm = -force_n * levers_m(model, q_rad, p_HT)[0]
+    added = dict(zip(model.names, extra_nm.tolist(), strict=True))
+    return replace(joints, effort_nm={name: nm + added.get(name, 0.0) for name, nm in joints.effort_nm.items()})

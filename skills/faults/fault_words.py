@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from skills.durations import seconds_in
-from skills.faults.kinds import STANDARD_FAULTS, Effect, FaultKind
+from skills.faults.fault_kinds import STANDARD_FAULTS, Effect, FaultKind
 
 __all__ = ["Fault", "parse_fault", "random_faults"]
 

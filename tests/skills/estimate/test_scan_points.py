@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from skills.estimate.self_filter import ArmShape, SelfFilter, segment_distance
+from skills.estimate.scan_points import ArmShape, SelfFilter, segment_distance
 from skills.robot import ArmCapabilities, Capabilities, GripperCapabilities, Joints
 
 URDF = """<robot name="r">

@@ -35,7 +35,7 @@ from executive.run.visitor import Progress, RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.tree.context import RunContext
 from executive.tree.node_view import NodeView, node_view
-from executive.tree.nodes.skill import ERROR_TOPIC, SkillLeaf
+from executive.tree.nodes.skill_leaf import ERROR_TOPIC, SkillLeaf
 from executive.words.knowledge import Knowledge
 from plant.worlds.world import World
 from skills.api import PlanningError, Publish, Worker

@@ -24,7 +24,7 @@ from executive.mission.parameters import values_in_json
 from executive.mission.request import Request
 from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.store.standing import StandingMission, StandingMissions, TooManyError
+from executive.store.standing_missions import StandingMission, StandingMissions, TooManyError
 from executive.store.trigger_source import TriggerSource, trigger_source
 from executive.store.triggers import OnCall, OnTopic, Trigger
 from executive.store.wakeup import wake_server

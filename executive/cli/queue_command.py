@@ -20,7 +20,7 @@ from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
 from executive.store.missions import STORE as STORE_NAME
 from executive.store.missions import MissionState, MissionStore, StoredMission, utc_now
-from executive.store.standing import StandingMission, StandingMissions
+from executive.store.standing_missions import StandingMission, StandingMissions
 from executive.store.trigger_source import refuse_missing_source
 from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, local, schedule_of
 from executive.store.wakeup import WakeupPipe, wake_server

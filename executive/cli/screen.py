@@ -28,8 +28,8 @@ from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
 from executive.speech.voice import Silence, Voice, queued_voice
 from executive.store.missions import STORE
+from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, node_view
-from executive.tree.snapshot import NodeState
 from executive.view.styles import Styles, style_of
 from executive.view.text import printable, to_rich
 

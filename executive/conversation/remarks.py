@@ -14,7 +14,7 @@ from executive.language.grounding import known_line
 from executive.run.control import Control
 from executive.run.control_state import ControlState, Mode, RobotMode
 from executive.run.visitor import Progress
-from executive.tree.snapshot import NodeState, Snapshot
+from executive.tree.node import NodeState, Snapshot
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import distance_m
 from skills.robot import Pose2D

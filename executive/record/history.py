@@ -32,8 +32,8 @@ from executive.record.schemas import (
     TREE,
     WALL,
 )
+from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, logged_view
-from executive.tree.snapshot import NodeState
 from executive.words.robot_config import robot_called
 from skills.api import Cause, ObjectObservation, Thing
 from skills.detect.words import told_apart

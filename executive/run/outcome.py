@@ -10,8 +10,8 @@ from typing import Final
 
 from executive.run.watchdog import VerbHung
 from executive.tree.compiler import CompiledTree
-from executive.tree.nodes.skill import ERROR_TOPIC
-from executive.tree.snapshot import Snapshot
+from executive.tree.node import Snapshot
+from executive.tree.nodes.skill_leaf import ERROR_TOPIC
 from skills.api import Cause, Publish
 from skills.robot import LeaseError, Pose2D
 

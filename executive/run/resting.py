@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from executive.run.session import RunRobot
-from executive.run.traffic import TrafficTable
+from executive.run.traffic_table import TrafficTable
 from executive.run.watchdog import Watchdog
 from skills.api import Running, SkillContext
 from skills.navigate.giving_way import GivingWay

@@ -20,9 +20,9 @@ from executive.run.watchdog import VerbHung
 from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import RunContext
-from executive.tree.nodes.skill import ERROR_TOPIC
+from executive.tree.node import NodeState, Snapshot
+from executive.tree.nodes.skill_leaf import ERROR_TOPIC
 from executive.tree.plan import start_key
-from executive.tree.snapshot import NodeState, Snapshot
 from executive.words.slug import slug
 from skills.api import Cause, LayeredView, LocalisationEstimate, ParticleView
 from skills.files.errors import disk_is_full

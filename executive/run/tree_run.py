@@ -16,13 +16,13 @@ from executive.run.visitor import TickNote, Visitors
 from executive.tree.behaviour import Explained, message_of, suspend
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import Endings, RunContext
+from executive.tree.node import Change, NodeState, Observed, Snapshot
 from executive.tree.node_view import node_view
 from executive.tree.nodes.decisions import Decide, buttons_of
 from executive.tree.nodes.policies import Skip
 from executive.tree.nodes.search import Answer
-from executive.tree.nodes.skill import SkillLeaf
+from executive.tree.nodes.skill_leaf import SkillLeaf
 from executive.tree.nodes.wait import WaitFor
-from executive.tree.snapshot import Change, NodeState, Observed, Snapshot
 from executive.words.goal import GoalKind
 from skills.api import Cause
 

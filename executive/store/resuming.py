@@ -19,11 +19,10 @@ from py_trees.common import Status
 from executive.run.mission_history import history_keys
 from executive.store.recollection import Memory, Recollection, StepRecord
 from executive.tree.behaviour import Conditional, ExplainedDecorator, ExplainedNode, MemoryComposite
-from executive.tree.compiler import CompiledTree
+from executive.tree.compiler import KINDS, CompiledTree, build, writes
 from executive.tree.context import RunContext
-from executive.tree.kinds import KINDS, build, writes
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.skill import Remembered, SkillLeaf
+from executive.tree.nodes.skill_leaf import Remembered, SkillLeaf
 from skills.api import Cause, Failed, Running, Skill, SkillContext, Step
 
 BEFORE: Final = "before the restart"

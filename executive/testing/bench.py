@@ -13,7 +13,7 @@ from py_trees.common import Status
 from executive.run.worker import LockStepWorker
 from executive.tree.board import Board, Constant
 from executive.tree.context import RunContext
-from executive.tree.nodes.skill import SkillLeaf
+from executive.tree.nodes.skill_leaf import SkillLeaf
 from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.fault_words import Fault, parse_fault

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
 
-from executive.tree.assembly import Assembler
+from executive.tree import nodes
+from executive.tree.assembly import Assembler, StepPlans
+from executive.tree.behaviour import ExplainedNode
 from executive.tree.board import Binding, Constant, FromBoard, FromBoardOr
 from executive.tree.context import RunContext
-from executive.tree.kinds import PLANS, build, writes
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decisions import buttons_of
-from executive.tree.nodes.doors import doorway
+from executive.tree.nodes.door_check import doorway
 from executive.tree.nodes.group import mission_plan
 from executive.tree.nodes.interrupts import watched
 from executive.tree.nodes.policies import AskOperator, Skip, under_policy
@@ -173,3 +176,30 @@ def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) 
 
 def _error(node: NodeSpec, message: str, hint: str) -> InputError:
     return InputError.at(node.source, f"{node.path_id}: {message}", hint=hint)
+
+
+__all__ = ["KINDS", "PLANS", "build", "writes"]
+
+_PAGES: Final = tuple(import_module(f"{nodes.__name__}.{page.name}") for page in iter_modules(nodes.__path__))
+KINDS: Final[Mapping[str, type[ExplainedNode]]] = {
+    node.kind: node
+    for page in _PAGES
+    for node in vars(page).values()
+    if isinstance(node, type) and issubclass(node, ExplainedNode) and "kind" in vars(node)
+}
+PLANS: Final[StepPlans] = {model: plan for page in _PAGES for model, plan in getattr(page, "PLANS", {}).items()}
+
+
+def build(spec: NodeSpec, context: RunContext) -> Behaviour:
+    """The py_trees node of a spec for one run, with all nodes below it."""
+    children = [build(child, context) for child in spec.children]
+    lent = {**vars(context), "context": context, "children": children, "child": next(iter(children), None)}
+    make: Any = KINDS[spec.kind]
+    taken = {each.name: lent[each.name] for each in fields(make) if each.init and each.name in lent}
+    node: Behaviour = make(**{**taken, **spec.options, "path_id": spec.path_id, "name": spec.name})
+    return node
+
+
+def writes(spec: NodeSpec) -> Mapping[str, Any]:
+    """The blackboard keys that a node writes, and the type of each value."""
+    return KINDS[spec.kind].writes(spec.options)

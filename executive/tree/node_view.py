@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from executive.tree.board import Constant, FromBoard
-from executive.tree.node import NodeSpec
-from executive.tree.snapshot import NodeState
+from executive.tree.node import NodeSpec, NodeState
 from executive.tree.types import describe_type, field_types
 from skills.files.errors import SourceLine
 

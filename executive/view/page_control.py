@@ -14,7 +14,7 @@ from executive.conversation.parts import Waiting
 from executive.run.control import Control
 from executive.run.control_state import ControlState, Mode
 from executive.run.visitor import Progress, RunVisitor
-from executive.tree.snapshot import NodeState, Snapshot
+from executive.tree.node import NodeState, Snapshot
 from executive.view.feed import Feed
 from skills.files.errors import InputError
 from skills.files.texts import plain_text

@@ -13,7 +13,7 @@ from typing import Final
 
 from py_trees.common import Status
 
-from executive.tree.snapshot import NodeState
+from executive.tree.node import NodeState
 from skills.api import Cause
 
 

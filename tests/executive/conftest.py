@@ -17,7 +17,7 @@ from executive.run.worker import LockStepWorker
 from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.context import RunContext
-from executive.tree.snapshot import Change, Observed
+from executive.tree.node import Change, Observed
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands

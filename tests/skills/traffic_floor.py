@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from executive.run.resting import SteppingAside
-from executive.run.traffic import TrafficTable
+from executive.run.traffic_table import TrafficTable
 from executive.run.worker import LockStepWorker
 from skills.api import Failed, LocalisationEstimate, SkillContext, Step, Succeeded
 from skills.estimate.grid_map import GridMap

@@ -20,7 +20,7 @@ from executive.tree.context import RunContext
 from executive.tree.goals import command_goal, door_goal
 from executive.tree.node import NodeSpec
 from executive.tree.nodes import guard
-from executive.tree.nodes.doors import door_plan
+from executive.tree.nodes.door_check import door_plan
 from executive.tree.nodes.guard import Verdict, Waiting
 from executive.tree.nodes.search import ANSWER_TOPIC, find_plan, refuse_several
 from executive.tree.plan import Assembled, PlanBuilder, StepPart

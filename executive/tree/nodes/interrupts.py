@@ -22,7 +22,7 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.dock import dock_plan
 from executive.tree.nodes.guard import BatteryForWork, Condition, KnowsPlace, NoStopButton, OwnLease, Waiting
 from executive.tree.nodes.recovery import Recovery
-from executive.tree.nodes.skill import SkillLeaf
+from executive.tree.nodes.skill_leaf import SkillLeaf
 from executive.tree.plan import PlanBuilder, after, pose_2d
 from executive.words.knowledge import Pose
 from skills.api import Cause, Failed

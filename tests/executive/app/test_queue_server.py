@@ -12,7 +12,7 @@ from executive.app.prepare import prepare
 from executive.app.queue_server import CallAddress, CallToken, Listeners, TriggerCalls, call_token
 from executive.mission.request import Request
 from executive.store.missions import MissionState, MissionStore
-from executive.store.standing import MOST_WAITING, StandingMissions
+from executive.store.standing_missions import MOST_WAITING, StandingMissions
 from executive.store.triggers import OnCall, OnTopic, trigger_of
 from executive.view.serving import CallError
 from skills.files.errors import InputError

@@ -17,8 +17,8 @@ from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.run.outcome import Said
 from executive.run.visitor import RunEntry
+from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView
-from executive.tree.snapshot import NodeState
 from plant.spot.kind import spot_capabilities
 from skills.api import Cause
 from skills.robot import Pose2D

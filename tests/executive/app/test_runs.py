@@ -22,7 +22,7 @@ from executive.run.control import Control
 from executive.run.visitor import TickNote
 from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
-from executive.store.standing import StandingMissions
+from executive.store.standing_missions import StandingMissions
 from executive.store.triggers import Missed, OnCall, trigger_of
 from executive.tree.node_view import node_view
 from skills.files.errors import InputError

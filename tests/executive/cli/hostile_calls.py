@@ -21,7 +21,7 @@ import numpy as np
 from executive.cli import entry
 from executive.mission.request import Request
 from executive.store.missions import MissionStore
-from executive.store.standing import StandingMissions
+from executive.store.standing_missions import StandingMissions
 from executive.store.triggers import Missed, OnCall
 from tests.hostile_values import TEXTS
 

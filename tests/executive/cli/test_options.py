@@ -17,7 +17,7 @@ from executive.cli.options import StartCommand, request_arguments, takes_request
 from executive.mission.request import Request
 from executive.store.database import form
 from executive.store.missions import MissionStore
-from executive.store.standing import StandingMissions
+from executive.store.standing_missions import StandingMissions
 from executive.store.triggers import OnCall
 from skills.files.yaml_source import read_yaml
 

@@ -18,9 +18,9 @@ from executive.run.visitor import TickNote
 from executive.store.missions import MissionStore
 from executive.store.wakeup import WakeupPipe
 from executive.tree.compiler import compile_mission
+from executive.tree.node import Change, NodeState
 from executive.tree.node_view import node_view
 from executive.tree.registry import installed_skills
-from executive.tree.snapshot import Change, NodeState
 from executive.words.command import Command
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission

@@ -12,7 +12,7 @@ from executive.cli.screen import SILENCE, HeardSpeech, live_view, visible_rows, 
 from executive.run.control import Control
 from executive.run.visitor import Progress
 from executive.speech import voice as voices
-from executive.tree.snapshot import NodeState
+from executive.tree.node import NodeState
 from skills.api import Cause
 from skills.files.errors import InputError
 

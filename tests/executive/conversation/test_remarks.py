@@ -4,7 +4,7 @@ from py_trees.common import Status
 from executive.conversation.remarks import doing_in_words, place_in_words
 from executive.run.control import Control
 from executive.run.visitor import Progress
-from executive.tree.snapshot import NodeState
+from executive.tree.node import NodeState
 from skills.api import Cause
 from skills.robot import Pose2D
 

@@ -14,7 +14,7 @@ from executive.mission.scenario import Scenario
 from executive.run.visitor import TickNote
 from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
-from executive.tree.snapshot import Change, NodeState
+from executive.tree.node import Change, NodeState
 from executive.words.robot_config import RobotConfig
 from skills.api import Cause
 from skills.files.errors import InputError

@@ -11,7 +11,7 @@ import pytest
 
 from executive.store import wakeup as wakeup_module
 from executive.store.missions import MissionStore
-from executive.store.standing import LATE
+from executive.store.standing_missions import LATE
 from executive.store.wakeup import LONGEST_WAIT, WakeupPipe, wake_server
 from skills.files.errors import InputError
 

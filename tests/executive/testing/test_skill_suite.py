@@ -130,7 +130,7 @@ def test_a_skill_that_senses_must_declare_how_old_its_data_may_be():
 
 
 def test_a_success_on_frozen_sensors_is_found_when_the_leaf_does_not_catch_it(monkeypatch):
-    monkeypatch.setattr("executive.tree.nodes.skill.refuse_stale", lambda skill, success, context: success)
+    monkeypatch.setattr("executive.tree.nodes.skill_leaf.refuse_stale", lambda skill, success, context: success)
     found = list(stale_sensors(case_of(Creep)))
     assert any("it claims success" in each for each in found)
 

@@ -8,7 +8,7 @@ from py_trees.common import Status
 from executive.tree.behaviour import StoppableTime, suspend
 from executive.tree.nodes.composites import MemorySequence
 from executive.tree.nodes.policies import Retry, Timeout
-from executive.tree.nodes.skill import SkillLeaf
+from executive.tree.nodes.skill_leaf import SkillLeaf
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 
 

@@ -8,8 +8,8 @@ import pytest
 from py_trees.common import Status
 
 from executive.record.history import Event
+from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, Port, to_json
-from executive.tree.snapshot import NodeState
 from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.html import log_page
 from executive.view.text import printable, to_text

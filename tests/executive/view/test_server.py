@@ -14,7 +14,7 @@ from websockets.sync.client import connect
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.run.visitor import Progress
-from executive.tree.snapshot import NodeState
+from executive.tree.node import NodeState
 from executive.view.feed import Feed
 from executive.view.page_control import (
     ControlWatch,

@@ -5,8 +5,8 @@ import re
 import pytest
 from py_trees.common import Status
 
+from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, node_view
-from executive.tree.snapshot import NodeState
 from executive.view.formats import to_svg
 from executive.view.text import executed_tree, fold_below, fold_to, to_text
 from skills.api import Cause

@@ -6,8 +6,8 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 from py_trees.common import Status
 
+from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, node_view, to_json
-from executive.tree.snapshot import NodeState
 from executive.view.formats import to_svg
 from executive.view.styles import Styles, style_of
 from executive.view.text import to_rich, to_text

@@ -17,7 +17,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from errand_train.worlds.__main__ import build
 from errand_train.worlds.plan import PLANS, load_plan
-from executive.tree.nodes.doors import view_of
+from executive.tree.nodes.door_check import view_of
 from executive.words.knowledge import load_knowledge
 from plant.worlds.seeding import place_objects, place_people
 from plant.worlds.world import PACKAGE_NAME, World, add_package, known_worlds, load_world

@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from executive.run.traffic import TrafficTable
+from executive.run.traffic_table import TrafficTable
 from skills.api import LocalisationEstimate, SkillContext
 from skills.navigate.footprint import Footprint
 from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions, first_that_suits, reachable, with_bodies

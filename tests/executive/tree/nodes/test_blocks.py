@@ -7,7 +7,7 @@ from py_trees.common import Status
 
 from executive.tree.behaviour import suspend
 from executive.tree.context import Endings
-from executive.tree.nodes.branches import Choose, Try
+from executive.tree.nodes.alternatives import Choose, Try
 from executive.tree.nodes.composites import MemorySequence
 from executive.tree.nodes.group import Always
 from executive.tree.nodes.guard import Guard

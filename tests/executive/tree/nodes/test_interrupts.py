@@ -8,7 +8,7 @@ from executive.tree.behaviour import Explained
 from executive.tree.nodes.composites import MemorySequence
 from executive.tree.nodes.guard import Waiting
 from executive.tree.nodes.interrupts import Interrupt, Interrupts, Monitor
-from executive.tree.nodes.skill import SkillLeaf
+from executive.tree.nodes.skill_leaf import SkillLeaf
 from skills.api import Cause, Failed
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID

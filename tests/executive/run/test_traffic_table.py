@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.run.traffic import SILENT_S, TrafficTable
+from executive.run.traffic_table import SILENT_S, TrafficTable
 from skills.robot import Pose2D
 
 DISCS = np.array([[0.0, 0.0, 0.3]])

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from executive.tree.nodes.doors import door_plan, view_of
+from executive.tree.nodes.door_check import door_plan, view_of
 from executive.tree.plan import PlanBuilder
 from executive.words.command import Command
 from executive.words.knowledge import Door, Knowledge

@@ -7,9 +7,9 @@ import pytest
 
 from executive.mission.request import Request
 from executive.run.visitor import TickNote
-from executive.store import standing as standing_module
+from executive.store import standing_missions as standing_module
 from executive.store.missions import MissionState, MissionStore
-from executive.store.standing import MOST_WAITING, StandingMissions, TooManyError
+from executive.store.standing_missions import MOST_WAITING, StandingMissions, TooManyError
 from executive.store.triggers import Missed, trigger_of
 from skills.files.errors import InputError
 

@@ -3,8 +3,8 @@
 import pytest
 from py_trees.common import Status
 
+from executive.tree.node import Change, NodeState, Observed
 from executive.tree.nodes.composites import MemorySequence
-from executive.tree.snapshot import Change, NodeState, Observed
 from tests.executive.tree.scripted import Leaf
 
 GOING = NodeState(Status.RUNNING, None, "going, 2.5 m to go")

@@ -7,7 +7,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.tree.board import Constant, FromBoard
-from executive.tree.nodes.skill import SkillLeaf
+from executive.tree.nodes.skill_leaf import SkillLeaf
 from plant.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Part, Running, Skill, Succeeded
 

@@ -3,122 +3,33 @@
 from __future__ import annotations
 
 import math
-import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Final, TypeVar, cast
+from typing import Final, TypeVar
 
 import numpy as np
 
 from executive.record.schemas import NAVIGATION, OUTCOME, POSE, STATE, stamp
-from executive.record.work import CountedDetector
-from executive.run.guarded_robot import GuardedRobot
-from executive.run.outcome import Ending, Outcome, RobotResult, RobotStatus, ending_of
+from executive.run.outcome import Ending, Outcome, RobotResult, ending_of
+from executive.run.run_robot import RunRobot
 from executive.run.tree_run import TreeRun
 from executive.run.visitor import RunEntry, RunShared, TickNote
 from executive.run.watchdog import VerbHung
 from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree
-from executive.tree.context import RunContext
 from executive.tree.node import NodeState, Snapshot
-from executive.tree.nodes.skill_leaf import ERROR_TOPIC
 from executive.tree.plan import start_key
 from executive.words.slug import slug
 from skills.api import Cause, LayeredView, LocalisationEstimate, ParticleView
 from skills.files.errors import disk_is_full
-from skills.navigate.footprint import Footprint
-from skills.robot import Lease, Pose2D, Robot
+from skills.robot import Pose2D
 
-HOLDER: Final = "errand"
 POSE_PERIOD_S: Final = 0.5
 MOST_PARTICLES: Final = 30
 LEASE_PATIENCE_S: Final = 60.0
-_NO_LEASE: Final = Lease("", "", 0)
 _EPSILON_S: Final = 1e-9
 _NOTHING: Final = np.empty((0, 2))
 ResultT = TypeVar("ResultT")
-
-
-class RunRobot:
-    """One robot, with or without a mission. `context` is what may be done with it, under the lease that it has; `pose`
-    is where it believed to be when it last sensed (None: it did not know).
-    """
-
-    def __init__(self, entry: RunEntry, shared: RunShared) -> None:
-        """Raises what the robot's verbs raise."""
-        self.name: Final = entry.robot.name
-        limits, self._traffic = shared.settings, shared.traffic
-        self.pose: Pose2D | None = None
-        self._guarded = GuardedRobot(
-            entry.robot, shared.watchdog, limit_s=limits.verb_limit_s, image_limit_s=limits.image_limit_s
-        )
-        self._traffic.join(self.name, Footprint.of(self._guarded.capabilities()).discs)
-        self.context = self._context(entry, shared)
-
-    def _context(self, entry: RunEntry, shared: RunShared) -> RunContext:
-        """What the tree of a robot may use, without a lease."""
-        name, control, publish = self.name, shared.control, shared.visitors.publish
-        return RunContext(
-            robot=cast(Robot, self._guarded),
-            lease=_NO_LEASE,
-            clock=shared.clock,
-            worker=shared.worker,
-            localiser=entry.localiser,
-            costmap=entry.costmap,
-            publish=lambda topic, message: publish(topic, {"robot": name, **message}),
-            seed=shared.settings.seed,
-            board=Board(slug(entry.tree.robot_name)),
-            ask=lambda question: control.ask(question, shared.clock, name),
-            stop_pressed=lambda: control.stop_pressed(name),
-            presses=lambda: control.presses,
-            day_began_s=shared.day_began_s,
-            detector=CountedDetector(entry.detector, shared.work),
-            work=shared.work,
-            stack=entry.stack,
-            doors=entry.tree.doors,
-            traffic=shared.traffic.view_of(name),
-        )
-
-    def status(self, *, now: bool = False) -> RobotStatus:
-        """Where the robot is (as it last sensed, or `now`), whether it holds something, and its battery's charge.
-
-        Raises what its verbs raise.
-        """
-        robot, pose = self.context.robot, self.context.known_pose() if now else self.pose
-        return RobotStatus(pose, robot.gripper().holding, robot.battery().charge)
-
-    def sense(self) -> None:
-        """Brings the estimators up to date, and tells the others where the robot believes to be."""
-        context = self.context
-        if estimators := context.leave_others_out:
-            covered_W = self._traffic.covered_W(self.name)
-            for estimator in estimators:
-                estimator.leave_out(covered_W)
-        context.localiser.update(context.robot)
-        estimate = context.localiser.estimate()
-        context.costmap.update(context.robot, estimate)
-        self.pose = context.known_pose()
-        self._traffic.heard(self.name, self.pose)
-
-    def claim(self) -> RunContext:
-        """Claims the lease, which nobody holds; what may be used under it. Raises LeaseError."""
-        self.context = replace(self.context, lease=self._guarded.claim(HOLDER))
-        return self.context
-
-    def stop_and_leave(self) -> None:
-        """Stops the robot and gives its lease back. Raises nothing."""
-        context = self.context
-        self.attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
-        self.attempt("return the lease", self._guarded.give_lease_back)
-
-    def attempt(self, what: str, call: Callable[[], object]) -> bool:
-        """Does it, and says whether that went well; a defect goes to the log, since the rest must still happen."""
-        try:
-            call()
-        except (Exception, VerbHung):
-            self.context.publish(ERROR_TOPIC, {"node": self.name, "what": what, "traceback": traceback.format_exc()})
-            return False
-        return True
 
 
 class Session(RunRobot):

@@ -16,7 +16,7 @@ from executive.run.visitor import TickNote, Visitors
 from executive.tree.behaviour import Explained, message_of, suspend
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import Endings, RunContext
-from executive.tree.node import Change, NodeState, Observed, Snapshot
+from executive.tree.node import Change, NodeState, Snapshot, TreeObserver
 from executive.tree.node_view import node_view
 from executive.tree.nodes.decisions import Decide, buttons_of
 from executive.tree.nodes.policies import Skip
@@ -46,7 +46,7 @@ class TreeRun:
         self.root = tree.build(context)
         self._ended_early = self._suspended = False
         self._endings: list[str] = []
-        self._observed = Observed(self.root)
+        self._observed = TreeObserver(self.root)
         self._leaves = tuple(node for node in self._observed.nodes if isinstance(node, SkillLeaf))
         buttons = {node.path_id for node in tree.root.walk() if any(buttons_of(node))}
         waits = (node for node in self._observed.nodes if isinstance(node, WaitFor))

@@ -1,12 +1,12 @@
-"""The tree as plain data: one spec for every node, whatever its kind.
+"""Nodes as plain data: the spec of each, and its state while it runs.
 
-Specs are compared, shown and checked without a robot; `executive.tree.compiler.build` makes the py_trees nodes of one run.
+Specs are compared, shown and checked without a robot; `executive.tree.compiler.build` makes their py_trees nodes.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -17,12 +17,12 @@ from executive.tree.behaviour import Explained
 from skills.api import Cause
 from skills.files.errors import SourceLine
 
-__all__ = ["NodeSpec"]
+__all__ = ["Change", "NodeSpec", "NodeState", "Snapshot", "TreeObserver"]
 
 
 @dataclass(frozen=True)
 class NodeSpec:
-    """One node: its kind, its path id, the name shown, the options of its kind, the nodes below, the line behind it."""
+    """A node's kind, path id, displayed name, options, children, and the line of the mission file behind it."""
 
     kind: str
     path_id: str
@@ -32,18 +32,18 @@ class NodeSpec:
     source: SourceLine | None = None
 
     def walk(self) -> Iterator[NodeSpec]:
-        """Itself and all nodes below, parents first."""
+        """Iterates over the node and all its descendants, parents first."""
         yield self
         for child in self.children:
             yield from child.walk()
 
     def with_options(self, **options: Any) -> NodeSpec:
-        """The same with some options changed."""
+        """Returns a copy of the node with some options changed."""
         return replace(self, options={**self.options, **options})
 
 
 class NodeState(NamedTuple):
-    """Status, cause, sentence and, for a skill, progress from 0 to 1 where known."""
+    """Status, cause, message and, for a skill, progress from 0 to 1 where known."""
 
     status: Status = Status.INVALID
     cause: Cause | None = None
@@ -52,7 +52,7 @@ class NodeState(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A node that says something else than before."""
+    """Change of one node's state."""
 
     path_id: str
     before: NodeState
@@ -60,12 +60,12 @@ class Change(NamedTuple):
 
     @property
     def is_transition(self) -> bool:
-        """Returns whether its status or cause changed."""
+        """Returns whether the status or the cause changed."""
         return self.before.status is not self.after.status or self.before.cause is not self.after.cause
 
     @property
     def is_activity(self) -> bool:
-        """Returns whether it goes on and does something new; mere new numbers do not count."""
+        """Returns whether a running node reports a new action; a message with new numbers alone does not count."""
         if self.is_transition or self.after.status is not Status.RUNNING:
             return False
         return _NUMBER.sub("", self.before.message) != _NUMBER.sub("", self.after.message)
@@ -73,15 +73,15 @@ class Change(NamedTuple):
 
 Snapshot = Mapping[str, NodeState]
 Visited = Callable[[Behaviour, bool], None]
-"""Is told of a node that a tick has visited, and whether it was stopped from outside since its last visit."""
+"""Receives each node that a tick has visited, and whether it was stopped from outside since its last visit."""
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
-class Observed:
-    """A built tree that is read after every tick. `states` gives what every explained node said last, parents first.
+class TreeObserver:
+    """Reads the states of a built tree after every tick. `states` holds the last state of each node, parents first.
 
-    A node says something else only when it is ticked, here by `tick`, or stopped: only those are looked at. So a tick
-    costs nothing for the nodes that it leaves alone.
+    A node's state changes only when it is ticked, here by `tick`, or stopped: only those nodes are read, so that a tick
+    costs nothing for the others.
     """
 
     def __init__(self, root: Behaviour) -> None:
@@ -94,52 +94,48 @@ class Observed:
         self._touched: set[Behaviour] = set()
         self._stopped: set[Behaviour] = set()
         for node in self._index:
-            vars(node)["stop"] = _noted(node, self._touched, self._stopped)
+            vars(node)["stop"] = self._noting_stop(node)
 
     def tick(self, node: Behaviour, visited: Visited = lambda node, stopped: None) -> None:
-        """Ticks the tree, or a part of it; `visited` is told of each node, after those below it."""
+        """Ticks the tree, or a part of it, and calls `visited` for each node, after those below it."""
         for each in node.tick():
             self._touched.add(each)
             visited(each, each in self._stopped)
             self._stopped.discard(each)
 
     def changes(self, *, of_all: bool = False) -> Sequence[Change]:
-        """What changed since the last time, in the order of the tree; brings `states` up to date.
+        """Returns the changes since the last call, in the order of the tree, and updates `states`.
 
-        After an exception in a tick, or where a node was changed by hand, it has to look at all nodes (`of_all`).
+        After an exception in a tick, and where a node was changed by hand, all nodes must be read (`of_all`).
         """
         touched = sorted(self._index[node] for node in self._touched if node in self._index)
         self._touched.clear()
-        found = list(self._changed(range(len(self._explained)) if of_all else touched))
+        found = list[Change]()
+        for index in range(len(self._explained)) if of_all else touched:
+            node, last, state = self._explained[index], self._last[index], _state(self._explained[index])
+            if state != last:
+                self._last[index] = state
+                found.append(Change(node.path_id, last, state))
         if found:
             self.states = {**self.states, **{change.path_id: change.after for change in found}}
         return found
 
-    def _changed(self, indices: Iterable[int]) -> Iterator[Change]:
-        for index in indices:
-            node, last = self._explained[index], self._last[index]
-            state = _state(node)
-            if state != last:
-                self._last[index] = state
-                yield Change(node.path_id, last, state)
+    def _noting_stop(self, node: Behaviour) -> Callable[[Status], None]:
+        """Wraps the node's `stop` so that the observer notes each call, and whether it came from outside."""
+        stop = node.stop
 
+        def noted_stop(new_status: Status = Status.INVALID) -> None:
+            """Stops the node."""
+            self._touched.add(node)
+            if new_status == Status.INVALID:
+                self._stopped.add(node)
+            stop(new_status)
 
-def _noted(node: Behaviour, touched: set[Behaviour], stopped: set[Behaviour]) -> Callable[[Status], None]:
-    """The node's `stop`, which adds it to `touched`, and to `stopped` where it is stopped from outside."""
-    stop = node.stop
-
-    def noted_stop(new_status: Status = Status.INVALID) -> None:
-        """As the node's own."""
-        touched.add(node)
-        if new_status == Status.INVALID:
-            stopped.add(node)
-        stop(new_status)
-
-    return noted_stop
+        return noted_stop
 
 
 def _walk(root: Behaviour) -> Iterator[Behaviour]:
-    """The node and all below, parents first."""
+    """Iterates over the node and all its descendants, parents first."""
     yield root
     for child in root.children:
         yield from _walk(child)

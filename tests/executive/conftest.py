@@ -17,7 +17,7 @@ from executive.run.worker import LockStepWorker
 from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.context import RunContext
-from executive.tree.node import Change, Observed
+from executive.tree.node import Change, TreeObserver
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands
@@ -374,14 +374,14 @@ FETCH = (
 @pytest.fixture(autouse=True)
 def no_change_is_missed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """In every run of every test: the nodes that are not looked at after a tick say what they said before."""
-    looked, missed = Observed.changes, list[Change]()
+    looked, missed = TreeObserver.changes, list[Change]()
 
-    def checked(self: Observed, *, of_all: bool = False) -> Sequence[Change]:
+    def checked(self: TreeObserver, *, of_all: bool = False) -> Sequence[Change]:
         found = looked(self, of_all=of_all)
         missed.extend(looked(self, of_all=True))
         return found
 
-    monkeypatch.setattr(Observed, "changes", checked)
+    monkeypatch.setattr(TreeObserver, "changes", checked)
     yield
     assert missed == []
 

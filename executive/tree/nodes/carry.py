@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from dataclasses import field
+from typing import Any, Final
 
-from executive.tree.board import FromBoard
+import numpy as np
+from py_trees.common import Status
+
+from executive.tree.behaviour import ExplainedLeaf
+from executive.tree.board import BesideBoard, FromBoard
+from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.fallen import unless_fallen
+from executive.tree.nodes.aside import floor_square
 from executive.tree.nodes.guard import Holds
-from executive.tree.nodes.pick_up import go_near_plan
-from executive.tree.nodes.search import where
-from executive.tree.plan import PlanBuilder, pose_2d
+from executive.tree.nodes.pick_up import LOOK_AGAIN_S, go_near_plan, held_plan, pick_up_plan
+from executive.tree.nodes.recovery import Recovery
+from executive.tree.nodes.search import detect_plan, where
+from executive.tree.plan import PlanBuilder, after, pose_2d
 from executive.words.command import START
-from executive.words.outlines import inside
-from skills.api import Thing
+from executive.words.outlines import Point, distance_m, inside
+from skills.api import FLOOR, Cause, Failed, Surface, Thing
+from skills.geometry import compose
+from skills.quantities import Coordinate, Height
 from skills.robot import Pose2D
 
 
@@ -122,3 +133,239 @@ def _person_at_start(builder: PlanBuilder) -> str:
     rooms = [name for name, place in knowledge.places.items() if inside(place.polygon, start)]
     there = [name for name, facts in knowledge.people.items() if knowledge.room(builder.place(facts.at)) in rooms]
     return there[0] if len(there) == 1 else "person"
+
+
+_TURNS_RAD: Final = tuple(math.radians(turn) for turn in (0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180))
+LOST_WITHIN_M: Final = 2.0
+BACK_M: Final = 0.5
+"""What fell before the feet is then about as far ahead as it is grasped from; farther off it is hard to tell."""
+AHEAD_M: Final = 0.6
+"""So far before the middle of the body an object falls that is carried."""
+HALF_M: Final = 1.2
+ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
+"""Where else the floor is looked at from: forward and left of where the object was lost (m)."""
+
+
+class Fallen(ExplainedLeaf):
+    """Notes where the robot has lost what it carried, and says what happened. SUCCESS after `settle_s`.
+
+    Writes to the blackboard: the robot's pose (`pose_key`); the point of the floor `ahead_m` before the body, where it
+    fell (`spot_key`); the square of floor about it, `half_m` to each side (`floor_key`); that square with those of
+    `surfaces` that lie within `within_m` of the robot, onto which it may have fallen as well (`around_key`). What the
+    gripper still holds by then has slipped, and is not yet lost: a smaller square of free floor says where to
+    set it down (`set_down_key`), and all else is written anew for there: it is picked up from where it is set down.
+    """
+
+    kind = "fallen"
+    thing: str
+    to: str
+    pose_key: str
+    spot_key: str
+    floor_key: str
+    around_key: str
+    set_down_key: str
+    surfaces: Sequence[Surface]
+    context: RunContext
+    within_m: float = 2.0
+    ahead_m: float = 0.6
+    half_m: float = 1.2
+    set_down_ahead_m: float = 1.15
+    set_down_half_m: float = 0.3
+    settle_s: float = 0.3
+
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The keys of the pose, of the point and of the pieces of floor."""
+        surfaces = {options[key]: tuple[Surface, ...] for key in ("floor_key", "around_key")}
+        spot = tuple[Coordinate, Coordinate, Height]
+        return {options["pose_key"]: Pose2D, options["spot_key"]: spot, options["set_down_key"]: Surface, **surfaces}
+
+    def initialise(self) -> None:
+        """Writes where it is looked for: where the robot stands just now."""
+        self.clear_explanation()
+        self._end_s = self.context.clock.now() + self.settle_s
+        pose = self.context.pose()
+        here = (pose.x_m, pose.y_m)
+        self._near = [surface for surface in self.surfaces if distance_m(surface.polygon_W, here) <= self.within_m]
+        self._write(pose, self.ahead_m)
+
+    def update(self) -> Status:
+        """Feels for a moment whether the gripper still holds something."""
+        if self.context.clock.now() < self._end_s:
+            return self.say(f"feels whether the {self.thing} is still held", Status.RUNNING)
+        towards = self._towards_free_floor()
+        self.context.board.put(self.set_down_key, floor_square(towards, self.set_down_ahead_m, self.set_down_half_m))
+        slipped = self.context.robot.gripper().holding
+        if slipped:
+            self._write(towards, self.set_down_ahead_m)
+        happened = "slips in the gripper" if slipped else "fell"
+        then = "is set down and gripped anew" if slipped else "is picked up again"
+        return self.say(f"the {self.thing} {happened} on the way {self.to}; it {then}")
+
+    def _write(self, pose: Pose2D, ahead_m: float) -> None:
+        """Writes where the object lies: so far (m) before the body at a pose."""
+        board, spot = self.context.board, compose(pose, Pose2D(ahead_m, 0.0, 0.0))
+        floor = floor_square(pose, ahead_m, self.half_m)
+        board.put(self.pose_key, pose)
+        board.put(self.spot_key, (spot.x_m, spot.y_m, 0.0))
+        board.put(self.floor_key, (floor,))
+        board.put(self.around_key, (floor, *self._near))
+
+    def _towards_free_floor(self) -> Pose2D:
+        """The robot's pose, turned to floor on which nothing stands, as little as may be.
+
+        A robot at a table has the table ahead.
+        """
+        pose, costmap = self.context.pose(), self.context.costmap
+        turned = [compose(pose, Pose2D(0.0, 0.0, turn)) for turn in _TURNS_RAD]
+        middles = [compose(each, Pose2D(self.set_down_ahead_m, 0.0, 0.0)) for each in turned]
+        clear_m = costmap.clearance_m(np.array([[middle.x_m, middle.y_m] for middle in middles]))
+        return turned[int(np.argmax(clear_m >= self.set_down_half_m))]
+
+
+class SurfacesNear(ExplainedLeaf):
+    """Writes those of some surfaces to the blackboard that lie within `within_m` of the robot, the nearest first.
+
+    `rooms` has the outline of each surface's room by the surface's name. Where surfaces of the robot's own room are
+    near, others do not count: a wall hides them.
+    SUCCESS when there are some. FAILURE with POSTCONDITION when there are none: `otherwise` says what that means.
+    """
+
+    kind = "surfaces near"
+    surfaces: Sequence[Surface]
+    within_m: float
+    key: str
+    otherwise: str
+    context: RunContext
+    rooms: Mapping[str, Sequence[Point]] = field(default_factory=dict)
+
+    @staticmethod
+    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The key of the surfaces."""
+        return {options["key"]: tuple[Surface, ...]}
+
+    def update(self) -> Status:
+        """Looks which surfaces are near."""
+        pose = self.context.pose()
+        here = (pose.x_m, pose.y_m)
+        near = sorted((distance_m(surface.polygon_W, here), k) for k, surface in enumerate(self.surfaces))
+        close = tuple(self.surfaces[k] for distance, k in near if distance <= self.within_m)
+        found = tuple(surface for surface in close if inside(self.rooms.get(surface.name, ()), here)) or close
+        if found:
+            self.context.board.put(self.key, found)
+            return self.say(f"near here: {', '.join(surface.name for surface in found)}")
+        spot = f"({pose.x_m:.2f}, {pose.y_m:.2f}) m"
+        what = f"there is no surface within {self.within_m:g} m of {spot}; {self.otherwise}"
+        return self.fail(Failed(Cause.POSTCONDITION, what))
+
+
+def unless_fallen(
+    builder: PlanBuilder,
+    item: Thing,
+    to: str,
+    carry: NodeSpec,
+    guards: tuple[NodeSpec, ...],
+    hands_on: tuple[NodeSpec, ...] = (),
+) -> NodeSpec:
+    """Carrying `to` somewhere; what is lost on the way (one of the guards breaks) is picked up again where it fell.
+
+    The same is done when a skill in `hands_on` has let go of the object and finds that it is not where it is to be. It
+    is done as often as the builder's `pick_ups` says; then the carrying begins anew.
+    """
+    if not builder.pick_ups:
+        return carry
+    broken = (after(Cause.EXECUTION, of=guard, own=True) for guard in guards)
+    missed = (after(Cause.POSTCONDITION, of=skill) for skill in hands_on)
+    lost = Recovery((*broken, *missed), uses=builder.pick_ups)
+    recovery = _pick_up_again_plan(builder.at("again"), item, to)
+    return builder.recover(f"carry {item}", carry, (recovery, lost), attempts=builder.pick_ups + 1)
+
+
+def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
+    keys = {name: builder.key(name) for name in ("pose", "spot", "floor", "around", "set-down", "detection")}
+    fell = builder.node(
+        "fallen",
+        f"where is the {item}?",
+        part="fell",
+        thing=str(item),
+        to=to,
+        pose_key=keys["pose"],
+        spot_key=keys["spot"],
+        floor_key=keys["floor"],
+        around_key=keys["around"],
+        set_down_key=keys["set-down"],
+        surfaces=tuple(map(builder.surface, builder.knowledge.surfaces)),
+        within_m=LOST_WITHIN_M,
+        ahead_m=AHEAD_M,
+        half_m=HALF_M,
+    )
+    look = _look_plan(builder, item, keys)
+    take = builder.at("take").sequence(
+        f"take {item} from where it lies",
+        _stand_back_plan(builder.at("back")),
+        pick_up_plan(builder, item, look, keys["detection"], FromBoard(keys["around"])),
+    )
+    return builder.sequence(
+        f"pick {item} up again",
+        fell,
+        _free_gripper_plan(builder.at("first"), item, keys["set-down"]),
+        builder.node("selector", f"have {item} again", held_plan(builder, item), take, part="have"),
+    )
+
+
+def _free_gripper_plan(builder: PlanBuilder, item: Thing, set_down_key: str) -> NodeSpec:
+    """Sets down what is still held; where that fails, draws it in. An empty arm is stowed."""
+    below = builder.at("set-down")
+    set_down = below.skill("place", {"surface": FromBoard(set_down_key)})
+    held = below.node("only if holding", f"set the {item} down", set_down)
+    return builder.node("selector", "free the gripper", held, builder.skill("stow"))
+
+
+def _stand_back_plan(builder: PlanBuilder) -> NodeSpec:
+    """Back off, to see the floor before the feet; where there is no room, look from here."""
+    ports = {"distance_m": BACK_M} if builder.has_ports("back_off", ("distance_m",)) else {}
+    stay = builder.pause("stay", "look from here", LOOK_AGAIN_S)
+    return builder.node("selector", "stand back", builder.skill("back_off", ports), stay)
+
+
+def _look_plan(builder: PlanBuilder, item: Thing, keys: dict[str, str]) -> NodeSpec:
+    """Looks from here where it fell and about there, then at the surfaces near, then at the floor from either side."""
+    floor, detection = FromBoard(keys["floor"]), keys["detection"]
+    aside = [
+        below.sequence(
+            f"look at the {FLOOR} from aside",
+            below.navigate(BesideBoard(keys["pose"], *offset), f"the side of where the {item} fell"),
+            detect_plan(below, item, floor, detection),
+        )
+        for below, offset in zip((builder.at("left"), builder.at("right")), ASIDE_M, strict=True)
+    ]
+    knows_spot = builder.has_ports("detect", ("expected_W",))
+    spot = [detect_plan(builder.at("spot"), item, floor, detection, {"expected_W": FromBoard(keys["spot"])})]
+    return builder.node(
+        "selector",
+        f"find {item} where it fell",
+        *(spot if knows_spot else []),
+        detect_plan(builder, item, floor, detection),
+        _near_plan(builder.at("near"), item, detection),
+        *aside,
+        part="find",
+        exhausted_cause=Cause.POSTCONDITION,
+        exhausted_message=f"the {item} is not found again where it fell",
+    )
+
+
+def _near_plan(builder: PlanBuilder, item: Thing, detection: str) -> NodeSpec:
+    """Looks at the surfaces near where it was lost."""
+    facts, near = builder.knowledge, builder.key("surfaces")
+    surfaces = builder.node(
+        "surfaces near",
+        "which surfaces are near?",
+        part="surfaces-near",
+        surfaces=tuple(map(builder.surface, facts.surfaces)),
+        rooms={name: facts.places[surface.place].polygon for name, surface in facts.surfaces.items()},
+        within_m=LOST_WITHIN_M,
+        key=near,
+        otherwise="there is only the floor",
+    )
+    look = detect_plan(builder, item, FromBoard(near), detection)
+    return builder.sequence(f"look for {item} on the surfaces near", surfaces, look)

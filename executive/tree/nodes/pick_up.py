@@ -1,7 +1,7 @@
 """Taking hold of an object: stand before it, grasp it, draw the arm in, and what is done when one of these fails.
 
 Going there has its own recoveries (`PlanBuilder.navigate`), so has looking for it (`executive.tree.nodes.search`), and
-what falls on the way is picked up again (`executive.tree.nodes.fallen`).
+what falls on the way is picked up again (`executive.tree.nodes.carry`).
 """
 
 from __future__ import annotations

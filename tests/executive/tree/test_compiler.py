@@ -4,10 +4,10 @@ import pytest
 from py_trees.common import Status
 
 from executive.run.outcome import Outcome
-from executive.tree import kinds
+from executive.tree import nodes
 from executive.tree.behaviour import ExplainedNode
 from executive.tree.board import FromBoard
-from executive.tree.compiler import compile_mission
+from executive.tree.compiler import KINDS, build, compile_mission, writes
 from executive.tree.estimate import expected
 from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
@@ -374,14 +374,12 @@ def below(node):
 
 
 def test_each_kind_of_node_has_exactly_one_class():
-    named = [
-        node.kind for node in below(ExplainedNode) if node.__module__.startswith(kinds.nodes.__name__) and node.kind
-    ]
-    assert sorted(named) == sorted(kinds.KINDS)
+    named = [node.kind for node in below(ExplainedNode) if node.__module__.startswith(nodes.__name__) and node.kind]
+    assert sorted(named) == sorted(KINDS)
 
 
 def test_a_spec_becomes_its_node_on_the_runs_clock(context, clock):
-    root = kinds.build(LIMIT, context)
+    root = build(LIMIT, context)
     assert isinstance(root, Timeout)
     assert [node.path_id for node in root.iterate()] == ["alice/limit/wait", "alice/limit"]
     root.tick_once()
@@ -392,5 +390,5 @@ def test_a_spec_becomes_its_node_on_the_runs_clock(context, clock):
 
 
 def test_what_a_node_writes_follows_from_its_options():
-    assert kinds.writes(NodeSpec("remember", "alice/r", "r", {"key": "alice/pose"})) == {"alice/pose": Pose2D}
-    assert kinds.writes(LIMIT) == {}
+    assert writes(NodeSpec("remember", "alice/r", "r", {"key": "alice/pose"})) == {"alice/pose": Pose2D}
+    assert writes(LIMIT) == {}

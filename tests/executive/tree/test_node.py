@@ -3,7 +3,7 @@
 import pytest
 from py_trees.common import Status
 
-from executive.tree.node import Change, NodeState, Observed
+from executive.tree.node import Change, NodeState, TreeObserver
 from executive.tree.nodes.composites import MemorySequence
 from tests.executive.tree.scripted import Leaf
 
@@ -42,7 +42,7 @@ def changed(observed, **how):
 
 
 def test_only_nodes_that_were_ticked_or_stopped_are_looked_at(walk):
-    observed = Observed(walk)
+    observed = TreeObserver(walk)
     observed.tick(walk)
     assert changed(observed) == {"alice/walk": Status.RUNNING, "alice/one": Status.RUNNING}
     idle = walk.children[1]
@@ -54,7 +54,7 @@ def test_only_nodes_that_were_ticked_or_stopped_are_looked_at(walk):
 
 
 def test_nodes_that_are_stopped_from_outside_are_looked_at(walk):
-    observed = Observed(walk)
+    observed = TreeObserver(walk)
     for _ in range(2):
         observed.tick(walk)
     assert changed(observed)["alice/two"] is Status.RUNNING
@@ -64,13 +64,13 @@ def test_nodes_that_are_stopped_from_outside_are_looked_at(walk):
 
 
 def test_changes_come_in_the_order_of_the_tree(walk):
-    observed = Observed(walk)
+    observed = TreeObserver(walk)
     observed.tick(walk)
     assert [change.path_id for change in observed.changes()] == ["alice/walk", "alice/one"]
 
 
 def test_a_node_that_an_exception_kept_from_its_end_is_found_among_all(walk):
-    observed = Observed(walk)
+    observed = TreeObserver(walk)
     walk.children[0].update = lambda: 1 / 0
     with pytest.raises(ZeroDivisionError):
         observed.tick(walk)

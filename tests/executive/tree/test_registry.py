@@ -69,9 +69,9 @@ def test_every_skill_in_the_skills_folder_is_registered_in_pyproject_and_install
     """After a new entry in pyproject.toml, `make env` registers it."""
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][GROUP]
     written = {}
-    for folder in pkgutil.iter_modules(skills.__path__):
-        if folder.ispkg and importlib.util.find_spec(f"skills.{folder.name}.skill"):
-            module = importlib.import_module(f"skills.{folder.name}.skill")
+    for folder in pkgutil.walk_packages(skills.__path__, "skills."):
+        if folder.ispkg and importlib.util.find_spec(f"{folder.name}.skill"):
+            module = importlib.import_module(f"{folder.name}.skill")
             for kind in vars(module).values():
                 ours = inspect.isclass(kind) and issubclass(kind, Skill) and kind.__module__ == module.__name__
                 if ours and not inspect.isabstract(kind):
@@ -211,5 +211,5 @@ def test_a_class_that_only_declares_gives_the_skill_when_it_is_called(declared, 
 def test_ports_that_name_a_class_of_another_skill_are_refused(declared):
     (found,) = skills_of([declared]).values()
     found.done_by = "skills.manipulation.stow.skill:Stow"
-    with pytest.raises(TypeError, match=r"skills\.stow\.skill:Stow does not derive from WavePorts"):
+    with pytest.raises(TypeError, match=r"skills\.manipulation\.stow\.skill:Stow does not derive from WavePorts"):
         found.loaded()

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 import threading
 import time
+import traceback
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Final, TypeVar
+from dataclasses import fields, replace
+from typing import Any, Final, TypeVar, cast
 
 import numpy as np
 
-from executive.run.watchdog import IMAGE_LIMIT_S, VERB_LIMIT_S, Watchdog, done_aside, hung
+from executive.record.work import CountedDetector
+from executive.run.outcome import RobotStatus
+from executive.run.visitor import RunEntry, RunShared
+from executive.run.watchdog import IMAGE_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog, done_aside, hung
 from executive.run.worker import in_lock_step_job
+from executive.tree.board import Board
+from executive.tree.context import RunContext
+from executive.tree.nodes.skill_leaf import ERROR_TOPIC
+from executive.words.slug import slug
+from skills.navigate.footprint import Footprint
 from skills.robot import (
     Battery,
     Capabilities,
@@ -26,6 +35,7 @@ from skills.robot import (
     Lease,
     LeaseError,
     Odometry,
+    Pose2D,
     Robot,
     Scan,
 )
@@ -33,6 +43,8 @@ from skills.robot import (
 Check = Callable[[Any], str | None]
 AnswerT = TypeVar("AnswerT")
 _EMPTY: Final = (0, 0)
+HOLDER: Final = "errand"
+_NO_LEASE: Final = Lease("", "", 0)
 
 
 class GarbageError(RuntimeError):
@@ -141,6 +153,88 @@ class GuardedRobot:
         return call() if verb == "image" else done_aside(call, verb, limit_s)
 
 
+class RunRobot:
+    """One robot, with or without a mission. `context` is what may be done with it, under the lease that it has; `pose`
+    is where it believed to be when it last sensed (None: it did not know).
+    """
+
+    def __init__(self, entry: RunEntry, shared: RunShared) -> None:
+        """Raises what the robot's verbs raise."""
+        self.name: Final = entry.robot.name
+        limits, self._traffic = shared.settings, shared.traffic
+        self.pose: Pose2D | None = None
+        self._guarded = GuardedRobot(
+            entry.robot, shared.watchdog, limit_s=limits.verb_limit_s, image_limit_s=limits.image_limit_s
+        )
+        self._traffic.join(self.name, Footprint.of(self._guarded.capabilities()).discs)
+        self.context = self._context(entry, shared)
+
+    def _context(self, entry: RunEntry, shared: RunShared) -> RunContext:
+        """What the tree of a robot may use, without a lease."""
+        name, control, publish = self.name, shared.control, shared.visitors.publish
+        return RunContext(
+            robot=cast(Robot, self._guarded),
+            lease=_NO_LEASE,
+            clock=shared.clock,
+            worker=shared.worker,
+            localiser=entry.localiser,
+            costmap=entry.costmap,
+            publish=lambda topic, message: publish(topic, {"robot": name, **message}),
+            seed=shared.settings.seed,
+            board=Board(slug(entry.tree.robot_name)),
+            ask=lambda question: control.ask(question, shared.clock, name),
+            stop_pressed=lambda: control.stop_pressed(name),
+            presses=lambda: control.presses,
+            day_began_s=shared.day_began_s,
+            detector=CountedDetector(entry.detector, shared.work),
+            work=shared.work,
+            stack=entry.stack,
+            doors=entry.tree.doors,
+            traffic=shared.traffic.view_of(name),
+        )
+
+    def status(self, *, now: bool = False) -> RobotStatus:
+        """Where the robot is (as it last sensed, or `now`), whether it holds something, and its battery's charge.
+
+        Raises what its verbs raise.
+        """
+        robot, pose = self.context.robot, self.context.known_pose() if now else self.pose
+        return RobotStatus(pose, robot.gripper().holding, robot.battery().charge)
+
+    def sense(self) -> None:
+        """Brings the estimators up to date, and tells the others where the robot believes to be."""
+        context = self.context
+        if estimators := context.leave_others_out:
+            covered_W = self._traffic.covered_W(self.name)
+            for estimator in estimators:
+                estimator.leave_out(covered_W)
+        context.localiser.update(context.robot)
+        estimate = context.localiser.estimate()
+        context.costmap.update(context.robot, estimate)
+        self.pose = context.known_pose()
+        self._traffic.heard(self.name, self.pose)
+
+    def claim(self) -> RunContext:
+        """Claims the lease, which nobody holds; what may be used under it. Raises LeaseError."""
+        self.context = replace(self.context, lease=self._guarded.claim(HOLDER))
+        return self.context
+
+    def stop_and_leave(self) -> None:
+        """Stops the robot and gives its lease back. Raises nothing."""
+        context = self.context
+        self.attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
+        self.attempt("return the lease", self._guarded.give_lease_back)
+
+    def attempt(self, what: str, call: Callable[[], object]) -> bool:
+        """Does it, and says whether that went well; a defect goes to the log, since the rest must still happen."""
+        try:
+            call()
+        except (Exception, VerbHung):
+            self.context.publish(ERROR_TOPIC, {"node": self.name, "what": what, "traceback": traceback.format_exc()})
+            return False
+        return True
+
+
 def garbage_check(verb: str) -> Check | None:
     """Says what is wrong with a verb's answer, None when nothing is seen to be; None for verbs unknown here."""
     return _CHECKS.get(verb)
@@ -166,13 +260,13 @@ def _or_none(check: Check) -> Check:
 
 def _reading(kind: type[Any], more: Check = lambda reading: None) -> Check:
     """The type, a stamp, finite numbers in all fields that are annotated as numbers, and what `more` looks at."""
-    fields = [(each.name, _GOOD[str(each.type)]) for each in dataclasses.fields(kind) if str(each.type) in _GOOD]
+    numbers = [(each.name, _GOOD[str(each.type)]) for each in fields(kind) if str(each.type) in _GOOD]
 
     def check(reading: Any) -> str | None:
         """What is wrong with a reading."""
         if not reading.stamp_s >= 0.0:
             return f"a stamp of {reading.stamp_s} s"
-        bad = next((name for name, good in fields if not good(getattr(reading, name))), None)
+        bad = next((name for name, good in numbers if not good(getattr(reading, name))), None)
         return more(reading) if bad is None else f"{bad} is not finite: {getattr(reading, bad)!r:.60}"
 
     return _of(kind, check)

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import pytest
 from py_trees.common import Status
 
-from executive.tree.nodes.fallen import Fallen, SurfacesNear
+from executive.tree.nodes.carry import Fallen, SurfacesNear
 from skills.api import Cause, Surface
 from skills.robot import Pose2D
 from skills.testing.blocks import Block

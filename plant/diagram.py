@@ -30,9 +30,9 @@ from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, Multibod
 from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, ModelInstanceIndex, PlanarJoint, RigidBody
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from plant.happenings.doors import add_panel
-from plant.kinds import BodyOptions, LocomotionLimits, RobotBody, robot_kind
-from plant.scene import Scene
+from plant.events import add_panel
+from plant.rendering import Scene
+from plant.robots.robot_kind import BodyOptions, LocomotionLimits, RobotBody, robot_kind
 from plant.scenery import add_model, add_scenery
 from plant.worlds.world import DoorRule, add_package
 

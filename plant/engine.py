@@ -10,15 +10,13 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from plant.carried import Carried
 from plant.diagram import TIME_STEP_S, WorldDiagram
-from plant.happenings.doors import Doors
-from plant.happenings.moves import Moves
-from plant.kept import Kept, State
-from plant.kinds import RobotBody, SensorOptions
+from plant.events import Doors, Moves
+from plant.loose_objects import Carried, Sleepers
 from plant.people.receivers import Receivers
 from plant.people.walkers import Walkers
-from plant.sleeping import Sleepers
+from plant.robots.robot_kind import RobotBody, SensorOptions
+from plant.saved_state import Kept, State
 from plant.worlds.seeding import PointRoute, Receiving
 from plant.worlds.world import DoorRule
 from skills.robot import FloatArray, Pose2D, Robot

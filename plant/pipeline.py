@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from plant.control.command_table import CommandStatuses
-from plant.control.servos import arm_set_point
 from plant.engine import Engine
+from plant.robots.command_table import CommandStatuses
+from plant.robots.servos import arm_set_point
 from skills.robot import ArmTrajectory, CommandId, CommandState, CommandStatus, Lease, Robot
 
 Background = Callable[[Callable[[], None]], "Future[None]"]

@@ -14,13 +14,13 @@ from pydrake.math import RigidTransform
 from executive.words.variation import NO_VARIATION, Variation, light_called
 from plant.diagram import LooseModel, build_diagram
 from plant.engine import Engine
-from plant.happenings.moves import Moves
-from plant.kept import State
-from plant.kinds import LocomotionLimits
+from plant.events import Moves
 from plant.recording import LiveScene, Recorder, View, save_html
 from plant.referee.referee import Referee
-from plant.snapshot import SnapshotWriter, read_snapshot, restore
-from plant.worlds.lights import render_parameters
+from plant.rendering import render_parameters
+from plant.robots.robot_kind import LocomotionLimits
+from plant.saved_state import State
+from plant.snapshot_file import SnapshotWriter, read_snapshot, restore
 from plant.worlds.seeding import Placement, place_clutter, place_objects, place_people
 from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot

@@ -18,8 +18,8 @@ from executive.app.robots import DEFAULT_KIND, PlacedRobot, shared_detector
 from executive.app.worlds import refuse_unusable
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
 from executive.tree.estimate import Route, RoutePlanner, load_estimates
-from plant.kinds import robot_kind
 from plant.models.catalogue import load_catalogue
+from plant.robots.robot_kind import robot_kind
 from plant.worlds.world import World
 from skills.files.errors import Problems
 from skills.manipulation.arm.kinematics import arm_model

@@ -33,7 +33,7 @@ from executive.words.knowledge import BatteryFacts, Knowledge, SurfaceFacts
 from executive.words.leaf_steps import Do, Say, steps_of_commands
 from executive.words.mission import Mission
 from executive.words.step import Step
-from plant.kinds import robot_kind
+from plant.robots.robot_kind import robot_kind
 from plant.worlds.world import World
 from skills.api import Surface
 from skills.files.errors import InputError

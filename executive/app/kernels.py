@@ -79,7 +79,7 @@ def _bend_arm() -> None:
     """Solves for the joints of an arm that has seven, and checks it against a box."""
     from pydrake.math import RigidTransform
 
-    from plant.kinds import robot_kind
+    from plant.robots.robot_kind import robot_kind
     from skills.manipulation.arm.collision import ArmScene, Box, gaps_m
     from skills.manipulation.arm.kinematics import arm_model
 

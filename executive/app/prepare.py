@@ -191,7 +191,7 @@ def _named_robots(loaded: Mission | None, world: World, knowledge: Knowledge) ->
     named = knowledge.robots if loaded is None or loaded.robots is None else loaded.robots
     if named is None:
         return ()
-    from plant.kinds import robot_kinds
+    from plant.robots.robot_kind import robot_kinds
 
     own = read_yaml(world.knowledge_path) if loaded is None or loaded.robots is None else loaded.document
     return robots_in(named, robot_kinds(), own)

@@ -15,7 +15,7 @@ from executive.mission.request import Start
 from executive.mission.stack_file import load_stack
 from executive.words.knowledge import Knowledge, Pose, RobotFacts
 from executive.words.robot_config import RobotConfig
-from plant.kinds import robot_kind
+from plant.robots.robot_kind import robot_kind
 from plant.worlds.world import World
 from skills.files.errors import InputError
 from skills.navigate.footprint import Footprint

@@ -16,7 +16,7 @@ from executive.mission.request import Request
 from executive.mission.scenario import RandomFaults, Scenario
 from executive.words.knowledge import Corner, Knowledge
 from executive.words.mission import Route, Stop
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.world import DoorRule, MoveRule, World, WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.faults.fault_words import parse_fault, random_faults

@@ -24,7 +24,7 @@ from executive.words.variation import NO_VARIATION, Variation
 from plant.pipeline import Pipeline
 from plant.referee import Referee
 from plant.simulation import Simulation
-from plant.snapshot import SnapshotError
+from plant.snapshot_file import SnapshotError
 from plant.worlds.world import World, WorldError
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError

@@ -156,7 +156,7 @@ class _Building:
 
     def result(self) -> dict[str, Any]:
         """Saves the grids; returns the result as JSON values. Raises InputError."""
-        from plant.referee.trajectory import trajectory_error_m
+        from plant.referee.truth import trajectory_error_m
         from skills.mapping.map_folder import save_grids, surveyed
 
         mapper = self._mapper

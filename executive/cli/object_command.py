@@ -113,8 +113,7 @@ def _draw(folder: Path, found: ImportedObject, picture: Path) -> None:
     """Raises InputError."""
     import numpy as np
 
-    from plant.models.portrait import Ball, portrait
-    from plant.scene_pictures import save_png
+    from plant.scene_pictures import Ball, portrait, save_png
 
     if picture.suffix.lower() != ".png":
         raise InputError("the picture is written as PNG", hint="name a file that ends in .png", file=picture)

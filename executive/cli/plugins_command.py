@@ -17,7 +17,7 @@ from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, finish, show_table
 from executive.store import trigger_source
 from executive.tree import registry
-from plant import kinds
+from plant.robots import robot_kind as kinds
 from skills.files.errors import InputError
 from skills.files.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
 from skills.quantities import Duration

@@ -87,8 +87,7 @@ def show(
     out: Annotated[Path, typer.Option("--out", help="The picture, PNG.")] = Path("world.png"),
 ) -> None:
     """Draws a world's plan: rooms, doors, walls, surfaces and the start."""
-    from plant.scene_pictures import save_png
-    from plant.worlds.drawing import draw_world
+    from plant.scene_pictures import draw_world, save_png
 
     drawn = open_world(folder)
     facts = knowledge_of(drawn)

@@ -1,12 +1,16 @@
-"""The classes of objects in `plant/models`, and the folders of models that `errand object import` has written."""
+"""Classes of objects in `plant/models`, imported objects and their errors, and cached folders of models."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -101,3 +105,46 @@ def write_imported(folder: Path, made: ImportedObject) -> None:
     """Writes what `read_imported` reads."""
     text = yaml_of(made.model_dump(mode="json", by_alias=True))
     (folder / FACTS_FILE).write_text(f"# Made by `errand object import`, don't edit.\n{text}", encoding="utf-8")
+
+
+def user_cache() -> Path:
+    """The project's folder in the user's cache."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "errand"
+
+
+def kept_folder(folder: Path, fill: Callable[[Path], None]) -> Path:
+    """The folder, filled once by `fill`; it appears only when complete, whoever else makes the same meanwhile."""
+    if folder.is_dir():
+        return folder
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    fresh = Path(tempfile.mkdtemp(prefix=".making-", dir=folder.parent))
+    try:
+        fill(fresh)
+        fresh.chmod(0o755)
+        fresh.rename(folder)
+    except OSError:
+        if not folder.is_dir():
+            raise
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+    return folder
+
+
+class ObjectImportError(Exception):
+    """The file or what is wanted of it cannot be used; the message says why, `hint` what to do."""
+
+    def __init__(self, message: str, hint: str) -> None:
+        self.message, self.hint = message, hint
+        super().__init__(f"{message}; {hint}")
+
+
+class ObjectsExtraMissingError(ImportError):
+    """A library of the extra `objects` is not installed."""
+
+
+def objects_module(name: str) -> Any:
+    """The module of that name, imported when it is needed. Raises ObjectsExtraMissingError."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise ObjectsExtraMissingError(f"importing objects needs {name}, which is not installed") from error

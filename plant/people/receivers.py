@@ -23,7 +23,7 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context
 
 from plant.diagram import X_PT_HOME, WorldDiagram
-from plant.kept import Kept
+from plant.saved_state import Kept
 from plant.sensors.ray_shapes import ShapeKind, shape_row
 from plant.worlds.seeding import Receiving
 from skills.robot import FloatArray

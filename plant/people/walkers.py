@@ -24,8 +24,8 @@ from pydrake.multibody.tree import BodyIndex, SpatialInertia
 from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram
-from plant.happenings.doors import slide
-from plant.kept import Kept
+from plant.events import slide
+from plant.saved_state import Kept
 from plant.sensors.ray_shapes import ShapeKind, shape_row
 from plant.worlds.seeding import PointRoute
 from plant.worlds.world import Point, WorldError

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from pydrake.geometry import GeometryId, PenetrationAsPointPair
 
-from plant.kept import Kept
 from plant.referee.entities import ROBOT_KINDS, Entity, Kind
+from plant.saved_state import Kept
 
 Pair = tuple[int, int]
 

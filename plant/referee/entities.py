@@ -12,7 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, RigidBody
 
 if TYPE_CHECKING:
-    from plant.kinds import RobotKind
+    from plant.robots.robot_kind import RobotKind
     from plant.worlds.seeding import Placement
 
 

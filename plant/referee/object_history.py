@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from plant.kept import Kept
+from plant.saved_state import Kept
 from skills.robot import FloatArray
 
 LIFT_M = 0.03

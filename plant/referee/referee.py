@@ -14,16 +14,16 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from executive.words.goal import GoalCondition
-from plant.kept import Kept, State
 from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
 from plant.referee.entities import Entities, Kind
 from plant.referee.judge import Verdict, judge
 from plant.referee.object_history import Lift, ObjectHistory, ObjectSample
 from plant.referee.truth import TimedPath, Truth, extend, note_stay
+from plant.saved_state import Kept, State
 from skills.robot import FloatArray
 
 if TYPE_CHECKING:
-    from plant.kinds import RobotKind
+    from plant.robots.robot_kind import RobotKind
     from plant.worlds.seeding import Placement
 
 PATH_VALUES = 4

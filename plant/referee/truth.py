@@ -1,14 +1,15 @@
-"""The record that the referee judges by: what happened to the objects, and where robots and people went."""
+"""The record that the referee judges by: object histories and paths of robots and people; the error of a trajectory."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from plant.referee.object_history import ObjectHistory
-from skills.robot import FloatArray
+from skills.robot import FloatArray, Pose2D
 
 PATH_STEP_M = 0.02
 Point = tuple[float, float]
@@ -62,3 +63,23 @@ def note_stay(stays: list[tuple[float, float]], time_s: float) -> None:
     goes_on = bool(stays) and time_s - stays[-1][1] <= ON_TRAY_GAP_S
     first_s = stays.pop()[0] if goes_on else time_s
     stays.append((first_s, time_s))
+
+
+def trajectory_error_m(estimated: Sequence[Pose2D], true: Sequence[Pose2D]) -> float:
+    """Root mean square (m) of what separates the positions after alignment (Umeyama, 1991, without scale)."""
+    moved = aligned(_positions(estimated), estimated, true)
+    return float(np.sqrt(np.mean(np.sum((moved - _positions(true)) ** 2, axis=1))))
+
+
+def aligned(points: FloatArray, estimated: Sequence[Pose2D], true: Sequence[Pose2D]) -> FloatArray:
+    """Points (N, 2) of the estimate's frame in that of the truth, by what aligns the two trajectories best."""
+    ours, theirs = _positions(estimated), _positions(true)
+    middle_ours, middle_theirs = ours.mean(axis=0), theirs.mean(axis=0)
+    a, b = ours - middle_ours, theirs - middle_theirs
+    yaw = math.atan2(float(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])), float(np.sum(a * b)))
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.asarray((points - middle_ours) @ np.array([[c, s], [-s, c]]) + middle_theirs)
+
+
+def _positions(poses: Sequence[Pose2D]) -> FloatArray:
+    return np.array([(pose.x_m, pose.y_m) for pose in poses], dtype=np.float64).reshape(-1, 2)

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import ColorRenderCamera, FrameId, QueryObject
 
-from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from plant.sensors.camera_spec import CameraSpec, colour_render_camera, depth_render_camera
-from plant.sensors.noisy import NoisySensor
+from plant.sensors.noise import DepthDegrader, DepthNoise, NoisySensor, PictureDegrader, PictureNoise
 from skills.robot import FrameTree, Image
 
 _FAINT = 4

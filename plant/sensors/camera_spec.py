@@ -82,7 +82,9 @@ def load_cameras(path: Path) -> dict[str, CameraSpec]:
     """Camera specs by name, in the file's order. Raises InputError with file, line, camera and field."""
     source = read_yaml(path)
     if not isinstance(source.data, dict):
-        raise source.error((), "it holds no mapping from camera names to their data", "see plant/models/spot")
+        raise source.error(
+            (), "it holds no mapping from camera names to their data", "see plant/robots/spot/cameras.yaml"
+        )
     return {name: _spec(source, name, entry) for name, entry in source.data.items()}
 
 

@@ -22,8 +22,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
 from pydrake.systems.framework import Context
 
-from plant.sensors.camera_noise import NoiseTile
-from plant.sensors.noisy import NoisySensor
+from plant.sensors.noise import NoiseTile, NoisySensor
 from plant.sensors.ray_shapes import RayScene, ShapeArrays
 from skills.robot import FloatArray, Scan
 

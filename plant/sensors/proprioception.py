@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.sensors.noisy import NoisySensor
+from plant.sensors.noise import NoisySensor
 from skills.robot import Battery, FloatArray, Gripper, Imu, Joints, Odometry, Pose2D
 
 

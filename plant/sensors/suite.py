@@ -13,10 +13,10 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
 
-from plant.control.servos import ActuatedJoints
-from plant.kept import Kept
-from plant.kinds import RobotBody, SensorOptions
-from plant.scene import RENDERER
+from plant.rendering import RENDERER
+from plant.robots.robot_kind import RobotBody, SensorOptions
+from plant.robots.servos import ActuatedJoints
+from plant.saved_state import Kept
 from plant.sensors.camera import Camera
 from plant.sensors.camera_spec import CameraSpec
 from plant.sensors.lidar import Lidar, LidarSpec

@@ -35,9 +35,9 @@ from executive.app.worlds import knowledge_of, open_world
 from executive.testing.bench import SkillBench
 from plant.diagram import LooseModel, build_diagram
 from plant.engine import Engine
-from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
-from plant.spot.kind import spot_capabilities
-from plant.worlds.lights import render_parameters
+from plant.rendering import render_parameters
+from plant.robots.spot.kind import spot_capabilities
+from plant.sensors.noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from skills.api import Detection, Detector, Surface
 from skills.detect.skill import Detect, DetectInputs
 from skills.estimate.costmap import LayeredCostmap

@@ -43,11 +43,10 @@ from errand_train.dataset.views import (
 )
 from executive.app.worlds import knowledge_of, open_world
 from plant.diagram import LooseModel, WorldDiagram, build_diagram
-from plant.scene import RENDERER
+from plant.rendering import RENDERER, render_parameters
 from plant.scene_pictures import look_at
-from plant.sensors.camera_noise import PictureDegrader, PictureNoise
 from plant.sensors.camera_spec import colour_render_camera
-from plant.worlds.lights import render_parameters
+from plant.sensors.noise import PictureDegrader, PictureNoise
 from plant.worlds.world import World
 from skills.api import Surface
 from skills.estimate.grid_map import GridMap, load_grid_map

@@ -76,7 +76,7 @@ def poses(world: World, grid: GridMap, seed: int, *, other_room: bool) -> Iterat
 
 def footprint_of() -> Footprint:
     """Spot's."""
-    from plant.spot.kind import spot_capabilities
+    from plant.robots.spot.kind import spot_capabilities
 
     return Footprint.of(spot_capabilities())
 

@@ -23,7 +23,7 @@ import numpy as np
 from executive.record.history import read_events
 from executive.store.resuming import told_before
 from plant.diagram import TIME_STEP_S
-from plant.snapshot import SnapshotError, read_snapshot
+from plant.snapshot_file import SnapshotError, read_snapshot
 
 FETCH = ("Hey Alice, can you fetch me a drink from the kitchen", 50.0)
 TIDY = ("Hey Alice, take a drink from the kitchen to the sideboard", 60.0)

@@ -29,10 +29,10 @@ from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
+from plant.robots.spot.model import spot_facts
 from plant.sensors.lidar import Lidar
 from plant.sensors.proprioception import OdometryModel
 from plant.simulation import Simulation
-from plant.spot.model import spot_facts
 from plant.worlds.world import World, load_world
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.estimate.monte_carlo import MonteCarloLocaliser, MonteCarloOptions

@@ -22,11 +22,11 @@ import cv2
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.referee.trajectory import aligned, trajectory_error_m
+from plant.referee.truth import aligned, trajectory_error_m
+from plant.robots.spot.model import spot_facts
 from plant.sensors.lidar import Lidar
 from plant.sensors.proprioception import OdometryModel
 from plant.simulation import Simulation
-from plant.spot.model import spot_facts
 from plant.worlds.world import load_world
 from skills.estimate.grid_map import load_grid_map
 from skills.geometry import compose, relative

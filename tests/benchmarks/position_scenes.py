@@ -30,8 +30,8 @@ from errand_train.dataset.render import Stage, is_validation
 from errand_train.dataset.silhouette import silhouette
 from errand_train.dataset.views import View, camera_specs, view_of
 from plant.models.catalogue import load_catalogue
-from plant.sensors.camera_noise import DepthDegrader, DepthNoise
 from plant.sensors.camera_spec import depth_render_camera
+from plant.sensors.noise import DepthDegrader, DepthNoise
 from skills.api import Detection
 from skills.robot import FrameTree, Image, Intrinsics
 

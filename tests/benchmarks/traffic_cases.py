@@ -11,7 +11,7 @@ import numpy as np
 from executive.app.worlds import knowledge_of, open_world
 from executive.words.knowledge import Door, Knowledge
 from executive.words.robot_config import RobotConfig
-from plant.kinds import robot_kind
+from plant.robots.robot_kind import robot_kind
 from plant.worlds.world import World
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.navigate.footprint import Footprint, footprint_clearance_m

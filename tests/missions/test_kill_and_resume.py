@@ -12,7 +12,7 @@ import pytest
 from executive.record.history import read_events
 from executive.store.resuming import told_before
 from plant.diagram import TIME_STEP_S
-from plant.snapshot import SnapshotError, read_snapshot
+from plant.snapshot_file import SnapshotError, read_snapshot
 
 ERRAND = (sys.executable, "-m", "executive.cli")
 FETCH = "Hey Alice, can you fetch me a drink from the kitchen"

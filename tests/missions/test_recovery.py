@@ -23,7 +23,7 @@ from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from plant.diagram import LooseModel
-from plant.models.spot.description import HAND_LINK
+from plant.robots.spot.description import HAND_LINK
 from plant.simulation import Simulation
 from skills.faults.faulty_robot import with_faults
 from tests.visitors import OnMessage, OnTick

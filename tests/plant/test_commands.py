@@ -2,7 +2,7 @@
 
 import pytest
 
-from plant.control.command_table import MOST_KEPT, CommandTable, Part
+from plant.robots.command_table import MOST_KEPT, CommandTable, Part
 from skills.robot import CommandId, CommandState
 
 

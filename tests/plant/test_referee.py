@@ -17,7 +17,7 @@ from plant.referee import Referee
 from plant.referee.entities import Kind
 from plant.referee.judge import judge
 from plant.referee.truth import TimedPath, Truth
-from plant.spot.kind import SPOT
+from plant.robots.spot.kind import SPOT
 
 FRICTION = CoulombFriction(0.8, 0.8)
 HALF = 0.03  # half a side of the objects, which are cubes

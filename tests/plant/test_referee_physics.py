@@ -13,7 +13,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from executive.words.goal import GoalCondition, GoalKind, Region, When
 from plant.referee import Referee
-from plant.spot.kind import SPOT
+from plant.robots.spot.kind import SPOT
 
 FRICTION = CoulombFriction(0.9, 0.9)
 TABLE = Region("the table", ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)), 0.7, 1.0)

@@ -11,7 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 from plant.diagram import build_diagram, parser_of
 from plant.engine import Engine
 from plant.referee import Referee
-from plant.spot.kind import SPOT
+from plant.robots.spot.kind import SPOT
 from plant.worlds.world import load_world
 from skills.robot import Pose2D
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plant.simulation import Simulation
-from plant.snapshot import SnapshotError, SnapshotWriter, read_snapshot
+from plant.snapshot_file import SnapshotError, SnapshotWriter, read_snapshot
 from plant.worlds.world import load_world
 from skills.robot import LeaseError
 

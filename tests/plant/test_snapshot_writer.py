@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plant.snapshot import SnapshotWriter, read_snapshot, restore
+from plant.snapshot_file import SnapshotWriter, read_snapshot, restore
 
 FACTS = {"world": "flat"}
 MOST_BYTES_PER_MINUTE = 500_000

@@ -10,8 +10,8 @@ from pydrake.math import RigidTransform
 from scripted_robot import ScriptedRobot
 from table_scene import LENS, taken
 
-from plant.fetch.kind import fetch_capabilities
-from plant.models.fetch.description import HEAD_CAMERA
+from plant.robots.fetch.description import HEAD_CAMERA
+from plant.robots.fetch.kind import fetch_capabilities
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import CommandState, CommandStatus, FrameTree, Image, Joints
 

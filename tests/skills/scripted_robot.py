@@ -11,7 +11,7 @@ from table_scene import BLUE, RED, taken
 from table_scene import LENS as TABLE_LENS
 
 from executive.run.worker import LockStepWorker
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import Failed, LocalisationEstimate, Running, SkillContext
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import (

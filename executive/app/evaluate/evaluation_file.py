@@ -26,7 +26,7 @@ from executive.words.variation import (
     Variation,
     light_called,
 )
-from plant.kinds import robot_kinds
+from plant.robots.robot_kind import robot_kinds
 from skills.files.errors import InputError
 from skills.files.outside import is_file, read_text
 from skills.files.schema import Name, Text, validate

@@ -118,7 +118,7 @@ def _plant_bench(_robot: Any, world: Any) -> SkillBench:
 
 def _spot() -> Capabilities:
     logging.getLogger("drake").setLevel("WARNING")
-    from plant.spot.kind import spot_capabilities
+    from plant.robots.spot.kind import spot_capabilities
 
     return spot_capabilities()
 

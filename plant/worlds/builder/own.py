@@ -9,8 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from plant.models.builder.mesh import Material, Mesh, mtl_text, obj_text, palette_picture, write_text
-from plant.models.builder.sdf import Model, model_sdf
-from plant.models.builder.shapes import Box, Cylinder, Shape
+from plant.models.builder.shapes import Box, Cylinder, Model, Shape, model_sdf
 from plant.scene_pictures import save_png
 from plant.worlds.builder.rooms import (
     BANDS_M,

@@ -16,8 +16,8 @@ from errand_train.dataset.room import Room
 from errand_train.dataset.silhouette import silhouette
 from errand_train.dataset.views import View, roll_deg
 from plant.models.builder.mesh import Material, Mesh
+from plant.rendering import render_parameters
 from plant.scene_pictures import look_at
-from plant.worlds.lights import render_parameters
 from skills.robot import Intrinsics
 
 CAMERA = Intrinsics(320, 240, 276.0, 276.0, 160.0, 120.0)

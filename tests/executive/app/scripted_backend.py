@@ -1,7 +1,7 @@
 """A backend without plant, referee and recorder, for tests of what runs on it."""
 
 from executive.run.visitor import RunEntry
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot

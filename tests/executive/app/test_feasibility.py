@@ -16,7 +16,7 @@ from executive.app.feasibility import (
 from executive.app.robots import only_robot
 from executive.app.worlds import open_world
 from executive.tree.estimate import Route
-from plant.kinds import robot_kind
+from plant.robots.robot_kind import robot_kind
 from plant.worlds.world import load_world
 from skills.robot import Pose2D
 from skills.testing.robot import BASE_ONLY

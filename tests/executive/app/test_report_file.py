@@ -19,7 +19,7 @@ from executive.run.outcome import Said
 from executive.run.visitor import RunEntry
 from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause
 from skills.robot import Pose2D
 from skills.testing.clock import VirtualClock

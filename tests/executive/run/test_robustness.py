@@ -19,7 +19,7 @@ from executive.run.watchdog import Watchdog
 from executive.run.worker import LockStepWorker, ThreadWorker
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Running, Skill, Succeeded
 from skills.faults.fault_kinds import VERBS, Effect
 from skills.faults.fault_words import Fault

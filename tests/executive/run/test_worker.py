@@ -9,7 +9,7 @@ import pytest
 from executive.run.run_robot import GuardedRobot
 from executive.run.watchdog import Watchdog
 from executive.run.worker import LockStepWorker, ThreadWorker
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
 

@@ -12,7 +12,7 @@ from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
 from plant.people.receivers import Phase
 from plant.referee import Referee
-from plant.spot.kind import SPOT
+from plant.robots.spot.kind import SPOT
 from plant.worlds.seeding import Placement, PointRoute, PointStop, Receiving
 from skills.files.kept_values import packed, unpacked
 from skills.robot import ArmTrajectory, Pose2D

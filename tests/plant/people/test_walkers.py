@@ -11,7 +11,7 @@ from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
 from plant.people.walkers import Leg, Walk
 from plant.referee import Referee
-from plant.spot.kind import SPOT
+from plant.robots.spot.kind import SPOT
 from plant.worlds.seeding import PointRoute, PointStop
 from plant.worlds.world import WorldError
 from skills.robot import Pose2D

@@ -8,7 +8,7 @@ import pytest
 
 from errand_train.worlds.plan import PLANS
 from executive.app.worlds import knowledge_of
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.seeding import place_people
 from plant.worlds.world import World, load_world
 from skills.estimate.costmap import LayeredCostmap

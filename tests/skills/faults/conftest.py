@@ -2,7 +2,7 @@
 
 import pytest
 
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 
 
 @pytest.fixture(scope="session")

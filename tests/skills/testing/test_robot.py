@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from plant.fetch.kind import fetch_capabilities
-from plant.models.fetch.description import HEAD_CAMERA
+from plant.robots.fetch.description import HEAD_CAMERA
+from plant.robots.fetch.kind import fetch_capabilities
 from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
 from skills.testing.blocks import ROOM, TABLE_CAN, Block, can_at
 from skills.testing.clock import VirtualClock

@@ -10,7 +10,7 @@ from pydrake.math import RollPitchYaw
 
 from errand_train.models.surfaces import add_rounded_box
 from plant.models.builder.mesh import Material, Mesh
-from plant.models.spot.description import spot_facts
+from plant.robots.spot.description import spot_facts
 
 _PALM, _FINGER = "arm_wr1", "arm_f1x"
 

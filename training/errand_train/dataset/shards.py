@@ -28,7 +28,7 @@ from errand_train.dataset.objects import sources_digest
 from errand_train.dataset.objects.model import MODEL_FACTS, read_model
 from errand_train.dataset.overview import contact_sheet
 from errand_train.dataset.render import Shot, render_scene, views_in
-from plant.models.cache import kept_folder
+from plant.models.catalogue import kept_folder
 
 FORMAT: Final = 1
 MANIFEST: Final = "dataset.json"

@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from errand_train.dataset.compose import Placed
 from errand_train.dataset.room import Obstacle, Room
 from errand_train.dataset.silhouette import project
-from plant.models.spot.description import CAMERAS
+from plant.robots.spot.description import CAMERAS
 from plant.scene_pictures import look_at
 from plant.sensors.camera_spec import CameraSpec, load_cameras
 from skills.robot import FloatArray, Intrinsics

@@ -15,7 +15,7 @@ from errand_train.models.appearance import (
 from errand_train.models.person import person, person_appearance
 from errand_train.models.tray import tray, tray_appearance
 from plant.models.builder.mesh import mtl_text, obj_text, palette_picture, plain_colours, write_text
-from plant.models.builder.sdf import Model, model_sdf
+from plant.models.builder.shapes import Model, model_sdf
 from plant.models.catalogue import MODELS_FOLDER
 from plant.scene_pictures import save_png
 

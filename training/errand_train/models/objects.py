@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.models.builder.sdf import Model
-from plant.models.builder.shapes import Box, Cylinder, Shape, Sphere, together
+from plant.models.builder.shapes import Box, Cylinder, Model, Shape, Sphere, together
 
 PROUD_M = 0.0003
 RIM_POINTS = 8

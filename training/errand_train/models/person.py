@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 from errand_train.models.appearance import Appearance
 from errand_train.models.pictures import cloth, to_picture
 from plant.models.builder.mesh import Material, Mesh
-from plant.models.builder.sdf import Model
-from plant.models.builder.shapes import Box, Cylinder, Shape
+from plant.models.builder.shapes import Box, Cylinder, Model, Shape
 
 MATERIALS = {
     "skin": Material((0.80, 0.62, 0.50)),

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from errand_train.models.appearance import Appearance
 from plant.models.builder.mesh import Material, Mesh
-from plant.models.builder.sdf import Model
-from plant.models.builder.shapes import Box, Shape, together
+from plant.models.builder.shapes import Box, Model, Shape, together
 
 SIZE_M, PLATE_M, DEEP_M = (0.36, 0.31), 0.008, 0.04
 RIM_M, RIM_HEIGHT_M = 0.006, 0.010

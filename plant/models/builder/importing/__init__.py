@@ -1,6 +1,6 @@
 """Meshes of any program as models: `import_object` writes a folder that worlds and missions name under `imports`."""
 
 from plant.models.builder.importing.import_object import Wanted, import_object
-from plant.models.builder.importing.libraries import ObjectImportError, ObjectsExtraMissingError
+from plant.models.catalogue import ObjectImportError, ObjectsExtraMissingError
 
 __all__ = ["ObjectImportError", "ObjectsExtraMissingError", "Wanted", "import_object"]

@@ -11,8 +11,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from plant.models.builder.importing.libraries import ObjectImportError
 from plant.models.builder.mesh import Colour
+from plant.models.catalogue import ObjectImportError
 from skills.files.outside import read_text
 from skills.robot import FloatArray
 

@@ -12,7 +12,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.models.builder.importing.libraries import ObjectImportError
 from plant.models.builder.importing.mesh_files import Patch, read_patches
 from plant.models.builder.importing.resting_pose import feet, resting_rotation
 from plant.models.builder.importing.solid import Solid, convex_parts, hull_of, same_points, solid_of
@@ -27,9 +26,8 @@ from plant.models.builder.mesh import (
     plain_colours,
     write_text,
 )
-from plant.models.builder.sdf import Model, model_sdf
-from plant.models.builder.shapes import ConvexMesh, MassProperties, scaled_to, solid_mass
-from plant.models.catalogue import NAME, ImportedObject, load_catalogue, write_imported
+from plant.models.builder.shapes import ConvexMesh, MassProperties, Model, model_sdf, scaled_to, solid_mass
+from plant.models.catalogue import NAME, ImportedObject, ObjectImportError, load_catalogue, write_imported
 from plant.scene_pictures import save_png
 from skills.robot import FloatArray, Picture
 

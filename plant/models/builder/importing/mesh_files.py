@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from plant.models.builder.importing.collada import read_collada
-from plant.models.builder.importing.libraries import ObjectImportError, objects_module
 from plant.models.builder.mesh import Colour
+from plant.models.catalogue import ObjectImportError, objects_module
 from plant.worlds.geometry_files import check_model
 from skills.files.errors import InputError
 from skills.files.outside import plain_file

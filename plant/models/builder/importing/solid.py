@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from plant.models.builder.importing.libraries import ObjectImportError, objects_module
+from plant.models.catalogue import ObjectImportError, objects_module
 from skills.robot import FloatArray
 
 MOST_PIECES: Final = 1_000

@@ -8,7 +8,7 @@ from py_trees.common import Status
 
 from executive.tree.board import Constant, FromBoard
 from executive.tree.nodes.skill_leaf import SkillLeaf
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Part, Running, Skill, Succeeded
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from plant.fetch.kind import fetch_capabilities
-from plant.spot.kind import spot_capabilities
+from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.manipulation.arm.collision import AROUND, ArmScene, Box, gaps_m
 from skills.manipulation.arm.kinematics import arm_model
 

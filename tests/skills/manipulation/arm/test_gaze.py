@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from plant.fetch.kind import fetch_capabilities
+from plant.robots.fetch.kind import fetch_capabilities
 from skills.api import PlanningError
 from skills.manipulation.arm.gaze import head_angles, without_arm
 from skills.robot import FrameTree, Image, Intrinsics

@@ -2,7 +2,7 @@
 
 import pytest
 
-from plant.fetch.kind import fetch_capabilities
+from plant.robots.fetch.kind import fetch_capabilities
 from skills.manipulation.arm.hold import Grip, HoldWatch, firmer_n, grip_again, hold_watch
 from skills.robot import Gripper
 from skills.testing.clock import VirtualClock

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.manipulation.arm.kinematics import arm_model
 
 CAPABILITIES = spot_capabilities()

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from plant.fetch.kind import fetch_capabilities
-from plant.spot.kind import spot_capabilities
+from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import PlanningError
 from skills.manipulation.arm.arm_skill import retreats_B
 from skills.manipulation.arm.collision import ArmScene, Box

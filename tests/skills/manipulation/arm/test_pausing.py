@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from executive.testing.bench import SkillBench
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.patience import PATIENCE_S
 from skills.robot import ArmTrajectory

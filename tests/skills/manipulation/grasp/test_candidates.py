@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from plant.fetch.kind import fetch_capabilities
-from plant.spot.kind import spot_capabilities
+from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.manipulation.grasp.planning import within_reach

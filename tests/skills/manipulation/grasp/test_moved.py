@@ -6,7 +6,7 @@ from functools import partial
 import pytest
 
 from executive.testing.bench import SkillBench
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, ObjectObservation, Thing
 from skills.manipulation.grasp.skill import Grasp
 from skills.manipulation.grasp.skill import GraspInputs as Inputs

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scripted_robot import MODEL, ScriptedRobot, context_of, failed
 
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, ObjectObservation, Thing
 from skills.manipulation.grasp.candidates import Target, grasp_candidates
 from skills.manipulation.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp

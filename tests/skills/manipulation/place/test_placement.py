@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import Surface
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import arm_model

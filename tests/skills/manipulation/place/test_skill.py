@@ -9,7 +9,7 @@ from scripted_robot import ScriptedRobot, context_of, failed
 from table_scene import RED, Can
 from table_scene import TABLE as TOP
 
-from plant.spot.kind import spot_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Running, Succeeded, Surface
 from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.place.placement import HeldObject

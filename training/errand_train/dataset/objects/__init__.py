@@ -17,8 +17,7 @@ from errand_train.dataset.objects.draft import Draft, Finished
 from errand_train.dataset.objects.model import ObjectModel, Surface, held_out, read_model, write_model
 from errand_train.dataset.objects.recipes import build, load_recipes
 from errand_train.dataset.objects.repainting import in_one_colour, plainly_painted
-from plant.models.cache import kept_folder, user_cache
-from plant.models.catalogue import MODELS_FOLDER, load_catalogue
+from plant.models.catalogue import MODELS_FOLDER, kept_folder, load_catalogue, user_cache
 
 __all__ = [
     "CLASSES",

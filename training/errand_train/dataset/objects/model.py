@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from errand_train.dataset.objects.draft import Finished
 from errand_train.models.gltf import gltf_text
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, plain_colours, write_text
-from plant.models.builder.sdf import Model, model_sdf
+from plant.models.builder.shapes import Model, model_sdf
 from plant.scene_pictures import save_png
 from skills.robot import FloatArray
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from errand_train.dataset.objects import CLASSES, DISTRACTORS, instance
 from errand_train.dataset.objects.model import ObjectModel
-from plant.models.portrait import Ball, portrait
-from plant.scene_pictures import save_png
+from plant.scene_pictures import Ball, portrait, save_png
 from skills.robot import Picture
 
 

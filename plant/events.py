@@ -1,0 +1,263 @@
+"""Events of a run that need no robot: sliding doors that close and open, and objects that a person moves elsewhere.
+
+The panel of a door slides on a planar joint, as walking people do: its pose and velocity are set before each step. It
+touches robots and loose objects, passes through the scenery, and waits while a robot or a person is in the doorway. A
+moved object jumps from one step to the next, because no hand is simulated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import shapely
+from pydrake.geometry import Box
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.math import SpatialVelocity
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, ModelInstanceIndex, PlanarJoint, SpatialInertia, UnitInertia
+from pydrake.systems.framework import Context
+
+from plant.saved_state import Kept
+from plant.worlds.seeding import ATTEMPTS, Placement, candidates, outline_W, polygon_distance
+from plant.worlds.world import DoorRule, MoveRule, Point, SurfaceTop, World
+from skills.robot import FloatArray
+
+HEIGHT_M, THICKNESS_M, ABOVE_FLOOR_M = 2.0, 0.04, 0.02
+SPEED_M_S = 0.6
+CLEAR_M = 0.12
+"""A panel waits while something is nearer than this to the doorway's middle line."""
+_KG = 40.0
+_COLOUR = np.array([0.55, 0.42, 0.30, 1.0])
+_FRICTION = CoulombFriction(0.6, 0.5)
+_MOVED = 1e-9
+
+Outlines = Callable[[], Iterator[FloatArray]]
+"""The outlines (K, 2) of robots and people."""
+
+
+def add_panel(plant: MultibodyPlant, door: DoorRule) -> ModelInstanceIndex:
+    """Adds a door's panel to a plant (before Finalize), as a model instance of the door's name."""
+    instance = plant.AddModelInstance(door.name)
+    size_m = (door.width, THICKNESS_M, HEIGHT_M)
+    inertia = UnitInertia.SolidBox(*size_m)
+    body = plant.AddRigidBody("panel", instance, SpatialInertia(_KG, np.zeros(3), inertia))
+    plant.RegisterCollisionGeometry(body, RigidTransform(), Box(*size_m), "panel", _FRICTION)
+    plant.RegisterVisualGeometry(body, RigidTransform(), Box(*size_m), "panel", _COLOUR)
+    level = RigidTransform(np.array([0.0, 0.0, ABOVE_FLOOR_M + HEIGHT_M / 2]))
+    floor = plant.AddFrame(FixedOffsetFrame(f"{door.name}_floor", plant.world_frame(), level))
+    joint = plant.AddJoint(PlanarJoint(f"{door.name}_slides", floor, body.body_frame()))
+    x, y, yaw = _pose(door, _share_closed(door, 0.0))
+    joint.set_default_translation(np.array([x, y]))
+    joint.set_default_rotation(yaw)
+    return instance
+
+
+def _closed_at(door: DoorRule, now_s: float) -> bool:
+    """Returns whether a door should be closed at a time."""
+    closes_s = math.inf if door.closes is None else door.closes
+    opens_s = math.inf if door.opens is None else door.opens
+    if closes_s <= opens_s:
+        return closes_s <= now_s < opens_s
+    return now_s < opens_s or now_s >= closes_s
+
+
+def _share_closed(door: DoorRule, now_s: float) -> float:
+    return 1.0 if _closed_at(door, now_s) else 0.0
+
+
+def _pose(door: DoorRule, share: float) -> FloatArray:
+    """x, y and yaw of the panel's middle when the door is closed to a share (0 to 1)."""
+    way_m = (1.0 - share) * door.width
+    x, y = door.at
+    return np.array([x + way_m * math.cos(door.yaw), y + way_m * math.sin(door.yaw), door.yaw])
+
+
+def slide(
+    plant: MultibodyPlant, context: Context, instance: ModelInstanceIndex, pose: FloatArray, velocity: FloatArray
+) -> None:
+    """Sets (x, y, yaw) and their rates, where they are others, of a model that slides on a planar joint."""
+    if np.abs(plant.GetPositions(context, instance) - pose).max() > _MOVED:
+        plant.SetPositions(context, instance, pose)
+    if np.abs(plant.GetVelocities(context, instance) - velocity).max() > _MOVED:
+        plant.SetVelocities(context, instance, velocity)
+
+
+@dataclass
+class _Panel(Kept):
+    """The panel of a door: to which share it closes it, whether it `closes` now, and each share with its time (s).
+
+    The history only tells 0 (open), 1 (closed) and 0.5 (moving).
+    """
+
+    share: float
+    closes: bool
+    history: list[tuple[float, float]]
+
+    def move_to(self, share: float, now_s: float) -> None:
+        """Opens the door by `share` (0 to 1), and records when it becomes open, closed or moving."""
+        self.share = share
+        told = share if share in (0.0, 1.0) else 0.5
+        if told != self.history[-1][1]:
+            self.history.append((now_s, told))
+
+
+class Doors(Kept, keeps=("_panels",)):
+    """The doors of one plant; `before_step` is to be called before each step. `outlines` may stand in a doorway."""
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        context: Context,
+        doors: Sequence[DoorRule],
+        outlines: Outlines,
+        tell: Callable[[str], None],
+    ) -> None:
+        """`tell` takes one sentence for each door that begins to move."""
+        self._plant, self._context, self._outlines, self._tell = plant, context, outlines, tell
+        self._doors = {door.name: door for door in doors}
+        self._instances = {name: plant.GetModelInstanceByName(name) for name in self._doors}
+        shares = {name: _share_closed(door, 0.0) for name, door in self._doors.items()}
+        self._panels = {name: _Panel(share, share == 1.0, [(0.0, share)]) for name, share in shares.items()}
+
+    @property
+    def still(self) -> bool:
+        """Returns whether there is no door that moves."""
+        return not self._doors
+
+    def history(self) -> Mapping[tuple[float, float], Sequence[tuple[float, float]]]:
+        """Changes of each door by its position (x, y): time (s) and closed share, 0 open, 1 closed, 0.5 moving."""
+        return {door.at: tuple(self._panels[name].history) for name, door in self._doors.items()}
+
+    def before_step(self, now_s: float, dt_s: float) -> None:
+        """Puts each panel where it is, with the velocity that leads to where it will be after dt_s."""
+        for name, door in self._doors.items():
+            panel, closes = self._panels[name], _closed_at(door, now_s)
+            if closes != panel.closes:
+                panel.closes = closes
+                self._tell(f"the {name} {'closes' if closes else 'opens'}")
+            before, after = panel.share, self._next(door, panel, dt_s)
+            panel.move_to(after, now_s)
+            pose = _pose(door, before)
+            slide(self._plant, self._context, self._instances[name], pose, (_pose(door, after) - pose) / dt_s)
+
+    def _next(self, door: DoorRule, panel: _Panel, dt_s: float) -> float:
+        """To which share a door is closed after dt_s."""
+        share, step = panel.share, SPEED_M_S * dt_s / door.width
+        if not panel.closes:
+            return max(0.0, share - step)
+        return share if share < 1.0 and self._occupied(door) else min(1.0, share + step)
+
+    def _occupied(self, door: DoorRule) -> bool:
+        """Returns whether somebody is in the doorway."""
+        half = 0.5 * door.width * np.array([math.cos(door.yaw), math.sin(door.yaw)])
+        line = shapely.LineString([np.array(door.at) - half, np.array(door.at) + half])
+        return any(shapely.distance(line, shapely.Polygon(each)) < CLEAR_M for each in self._outlines())
+
+
+FROM_HAND_M: Final = 0.25
+"""Nothing is put nearer than this to a robot's hand, or taken from where it holds something."""
+_STREAM: Final = 5
+
+Hands = Mapping[str, FloatArray]
+"""Where the hand of each robot is, (3,) in the world."""
+
+
+class Moves(Kept, keeps=("_done",)):
+    """The moves of one plant; `before_step` is to be called before each step."""
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        context: Context,
+        world: World,
+        placed: Sequence[Placement],
+        *,
+        seed: int,
+        tell: Callable[[str], None],
+    ) -> None:
+        """`placed` are the loose objects; `tell` takes one sentence for each move, or for one that cannot be."""
+        self._plant, self._context, self._world, self._seed, self._tell = plant, context, world, seed, tell
+        self._forms = {each.name: each.form for each in placed}
+        self._bodies = {
+            name: plant.get_body(plant.GetBodyIndices(plant.GetModelInstanceByName(name))[0]) for name in self._forms
+        }
+        self._done: frozenset[int] = frozenset()
+        self._listeners: list[Callable[[str], None]] = []
+
+    def listen(self, listener: Callable[[str], None]) -> None:
+        """Calls `listener` with the name of each object that was moved."""
+        self._listeners.append(listener)
+
+    def before_step(self, now_s: float, hands_W: Callable[[], Hands], holding: Sequence[str]) -> None:
+        """Moves what is due. `hands_W` gives where the robots' hands are; `holding` are those that hold something."""
+        for number, move in enumerate(self._world.moves):
+            if number not in self._done and now_s >= move.at:
+                self._done |= {number}
+                self._do(number, move, hands_W(), holding)
+
+    def _do(self, number: int, move: MoveRule, hands_W: Hands, holding: Sequence[str]) -> None:
+        here_W = self._place_W(move.name)
+        holder = next((name for name in holding if float(np.linalg.norm(hands_W[name] - here_W)) < FROM_HAND_M), None)
+        if holder is not None:
+            self._tell(f"nobody moves the {move.name}, which {holder} holds")
+            return
+        X_WO = self._goal(number, move, hands_W)
+        if X_WO is None:
+            self._tell(f"nobody moves the {move.name}, since nothing is free on the {move.to}")
+            return
+        body = self._bodies[move.name]
+        self._plant.SetFreeBodyPose(self._context, body, X_WO)
+        self._plant.SetFreeBodySpatialVelocity(
+            context=self._context, body=body, V_JpJc=SpatialVelocity(np.zeros(3), np.zeros(3))
+        )
+        self._tell(f"somebody moves the {move.name} to {_told(move)}")
+        for listener in self._listeners:
+            listener(move.name)
+
+    def _goal(self, number: int, move: MoveRule, hands_W: Hands) -> RigidTransform | None:
+        """Where the object is put; None where the surface has no free spot."""
+        form, rules = self._forms[move.name], self._world.seed_rules.rules
+        if not isinstance(move.to, str):
+            x, y, z = move.to
+            return RigidTransform(np.array([x, y, z + form.rest_height_m + rules.drop_m]))
+        surface = self._world.surfaces[move.to]
+        rng = np.random.default_rng([self._seed, _STREAM, number])
+        taken = [*self._outlines_W(move.name), *(np.array(polygon) for polygon in self._world.seed_rules.keep_clear)]
+        inner = shapely.Polygon(surface.polygon_W).buffer(-rules.rim_m)
+        for centre, yaw in self._candidates(surface, rng):
+            outline = outline_W(form, centre, yaw)
+            far = all(float(np.hypot(*(p_W[:2] - centre))) > FROM_HAND_M for p_W in hands_W.values())
+            clear = far and all(polygon_distance(outline, other) >= max(rules.clear_m, 0.02) for other in taken)
+            if clear and inner.covers(shapely.Polygon(outline)):
+                z = surface.height_m + form.rest_height_m + rules.drop_m
+                return RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([*centre, z]))
+        return None
+
+    def _candidates(self, surface: SurfaceTop, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
+        """Random centres and yaws: along the fronts of a surface that has some, else anywhere on it."""
+        if self._world.seed_rules.fronts.get(surface.name):
+            yield from candidates(self._world, surface, rng)
+            return
+        low, high = np.min(surface.polygon_W, axis=0), np.max(surface.polygon_W, axis=0)
+        for _ in range(ATTEMPTS):
+            x, y = rng.uniform(low, high)
+            yield (float(x), float(y)), float(rng.uniform(-np.pi, np.pi))
+
+    def _outlines_W(self, without: str) -> Iterator[FloatArray]:
+        """The outlines of the other objects from above, as they stand now."""
+        for name, body in self._bodies.items():
+            if name != without:
+                X_WO = self._plant.EvalBodyPoseInWorld(self._context, body)
+                x, y, _ = X_WO.translation()
+                yield outline_W(self._forms[name], (float(x), float(y)), RollPitchYaw(X_WO.rotation()).yaw_angle())
+
+    def _place_W(self, name: str) -> FloatArray:
+        return np.array(self._plant.EvalBodyPoseInWorld(self._context, self._bodies[name]).translation())
+
+
+def _told(move: MoveRule) -> str:
+    return f"the {move.to}" if isinstance(move.to, str) else "({:g}, {:g}, {:g})".format(*move.to)

@@ -1,0 +1,288 @@
+"""Loose objects between two steps of the plant: objects at rest sleep, and a carried object follows the hand.
+
+**Sleep.** A sleeping object floats in place without weight and contacts, so that neither the solver nor the search for
+contacts spends time on it: its shapes have no proximity role. It wakes when a link or a moving object is about to reach
+it, when it is put elsewhere, and when an object beside it wakes, since it may lie on that one. A person's tray wakes
+nothing. Sleep depends on positions alone, so the same run sleeps and wakes at the same times. Joints are not locked
+for this: beside a locked joint, Drake's SAP crashes on the contact of any other body with the world body.
+
+**Carrying.** The plant steps a free body along its velocity, but the joints of a robot along their arcs. A body at a
+distance r from an axis about which the robot turns at w would creep outwards by w^2 r dt^2 / 2 in each step: 3 mm/s at
+0.75 rad/s, out of the gripper within a minute of walking. So after each step an object that moves with a hand is
+shifted by a dt^2 / 2, where a is the acceleration of the hand's point there at the present rates of all joints. The
+approximation w x v of the hand was off by 6 mm/s in an arm's motion, pressed the object into one finger, and made the
+other lose contact. Forces, velocities and contacts stay those of the plant.
+
+**Spin.** The plant's steps cannot follow a fast spin: the gyroscopic torque at the beginning of a step makes a flat
+wrench spin ever faster, and a can that turns by radians in a step penetrates a table and leaves it at 90 m/s. So free
+bodies spin no faster, after any step, than the next step can follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import GeometryId, ProximityProperties, Role, SceneGraphInspector
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import BodyIndex, JacobianWrtVariable, ModelInstanceIndex, RigidBody
+from pydrake.systems.framework import Context
+
+from plant.diagram import WorldDiagram
+from plant.sensors.ray_shapes import shape_row
+from skills.robot import FloatArray
+
+_EXACT = 1e-9
+_REACH_M = 2.0
+"""Farther from its body than any part of a robot or a person gets, with an object's own size and the margin."""
+
+
+@dataclass(frozen=True)
+class SleepLimits:
+    """When an object falls asleep and when it wakes.
+
+    It is still while its pose (metres, quaternion) changes by less than `still` per second, and falls asleep after
+    `still_s`. It wakes when bounding spheres come closer than `margin_m`, which nothing crosses between two updates.
+    Objects whose spheres are closer than `beside_m` sleep and wake together.
+    """
+
+    still: float = 0.004
+    still_s: float = 0.5
+    margin_m: float = 0.12
+    beside_m: float = 0.01
+
+
+@dataclass(frozen=True)
+class _Object:
+    """A loose object of one body, its collision shapes with what they are like, and its place in the velocities."""
+
+    name: str
+    body: RigidBody
+    shapes: Mapping[GeometryId, ProximityProperties]
+    velocities: slice
+
+
+class _Spheres:
+    """One bounding sphere of the collision shapes of each of some bodies; bodies without shapes have none."""
+
+    def __init__(self, plant: MultibodyPlant, inspector: SceneGraphInspector, bodies: Sequence[RigidBody]) -> None:
+        self._plant = plant
+        found = [(body, _bound(inspector, plant.GetCollisionGeometriesForBody(body))) for body in bodies]
+        bounds = [(body, bound) for body, bound in found if bound is not None]
+        self._bodies = [body for body, _ in bounds]
+        self._centres_B = np.array([[*centre, 1.0] for _, (centre, _) in bounds]).reshape(-1, 4)
+        self.radii_m = np.array([radius for _, (_, radius) in bounds])
+
+    def centres_W(self, context: Context) -> FloatArray:
+        """The spheres' centres (N, 3) in the world."""
+        X_WB = [self._plant.EvalBodyPoseInWorld(context, body).GetAsMatrix34() for body in self._bodies]
+        centres: FloatArray = np.einsum("nij,nj->ni", np.array(X_WB).reshape(-1, 3, 4), self._centres_B)
+        return centres
+
+
+class Sleepers:
+    """Puts the loose objects of one plant to sleep and wakes them; call `update` regularly, before the plant steps."""
+
+    def __init__(self, world: WorldDiagram, root_context: Context, limits: SleepLimits | None = None) -> None:
+        """All objects are awake at first; `all_asleep` says whether no loose body can move now."""
+        plant, inspector = world.plant, world.scene_graph.model_inspector()
+        self._plant, self._limits = plant, limits or SleepLimits()
+        self._context = plant.GetMyMutableContextFromRoot(root_context)
+        self._scene_graph = world.scene_graph
+        self._geometry_context = world.scene_graph.GetMyMutableContextFromRoot(root_context)
+        self._objects = tuple(_objects(plant, inspector, world.models))
+        passed_over = {int(body.index()) for body in (*(each.body for each in self._objects), *world.trays.values())}
+        others = [body for body in _moving_bodies(plant) if int(body.index()) not in passed_over]
+        self._links = _Spheres(plant, inspector, others)
+        of_robots = {int(instance) for robot in world.robots.values() for instance in robot.instances()}
+        sliding = [body for body in others if _slides(body, world.models)]
+        known = of_robots | {int(body.model_instance()) for body in sliding}
+        self._only_known_move = all(int(body.model_instance()) in known for body in others)
+        self._known = [*(robot.body for robot in world.robots.values()), *sliding]
+        self._bounds = _Spheres(plant, inspector, [each.body for each in self._objects])
+        starts = [each.body.floating_positions_start() for each in self._objects]
+        self._places = np.array([range(start, start + 7) for start in starts], dtype=np.int64).reshape(-1, 7)
+        self._asleep = np.zeros(len(self._objects), dtype=bool)
+        loose = (
+            body for body in _moving_bodies(plant) if int(body.model_instance()) in map(int, world.models.values())
+        )
+        self._restless = sum(body.is_floating_base_body() for body in loose) - len(self._objects)
+        self.all_asleep = False
+        self._lift = np.zeros(plant.num_velocities())
+        self._still_s = np.zeros(len(self._objects))
+        self._last: tuple[float, FloatArray, FloatArray] | None = None
+
+    @property
+    def asleep(self) -> frozenset[str]:
+        """Names of the objects that sleep."""
+        return frozenset(each.name for each, asleep in zip(self._objects, self._asleep, strict=True) if asleep)
+
+    def update(self, now_s: float) -> None:
+        """Wakes whom something is about to reach, and puts to sleep who has been still for long enough."""
+        if not self._objects:
+            return
+        poses = self._plant.GetPositions(self._context)[self._places]
+        last_s, last_poses, last_centres_W = self._last or (now_s, poses, self._bounds.centres_W(self._context))
+        elapsed_s, change = now_s - last_s, np.abs(poses - last_poses).max(axis=1)
+        moved = change > self._limits.still * elapsed_s
+        centres_W = self._bounds.centres_W(self._context) if change.max() > _EXACT else last_centres_W
+        self._last = (now_s, poses, centres_W)
+        radii_m, margin_m = self._bounds.radii_m, self._limits.margin_m
+        disturbed = moved | self._reached(centres_W)
+        for places_W in (last_centres_W, centres_W) if moved.any() else ():
+            disturbed |= self._near(centres_W, places_W[moved], radii_m[moved], margin_m)
+        for _ in range(len(self._objects) - 1) if disturbed.any() else ():
+            disturbed |= self._near(centres_W, centres_W[disturbed], radii_m[disturbed], self._limits.beside_m)
+        self._still_s = np.where(disturbed, 0.0, self._still_s + elapsed_s)
+        tired = self._still_s > self._limits.still_s
+        for number in np.flatnonzero((self._asleep & disturbed) | (~self._asleep & tired)):
+            self._turn(int(number))
+
+    def wake_all(self) -> None:
+        """Wakes all objects, as when the plant's state is replaced."""
+        for number in np.flatnonzero(self._asleep):
+            self._turn(int(number))
+        self._still_s = np.zeros(len(self._objects))
+        self._last = None
+
+    def _reached(self, centres_W: FloatArray) -> NDArray[np.bool_]:
+        """For each object, whether a link is about to reach it."""
+        bases = [self._plant.EvalBodyPoseInWorld(self._context, body).translation() for body in self._known]
+        if self._only_known_move and all(np.abs(centres_W - p_WB).max(axis=1).min() > _REACH_M for p_WB in bases):
+            return np.zeros(len(centres_W), dtype=bool)
+        links_W = self._links.centres_W(self._context)
+        return self._near(centres_W, links_W, self._links.radii_m, self._limits.margin_m)
+
+    def _near(
+        self, centres_W: FloatArray, others_W: FloatArray, radii_m: FloatArray, margin_m: float
+    ) -> NDArray[np.bool_]:
+        """For each object, whether any of some spheres (M, 3) comes within a margin of its own."""
+        apart_m = np.linalg.norm(centres_W[:, None] - others_W[None], axis=-1)
+        near: NDArray[np.bool_] = (apart_m < self._bounds.radii_m[:, None] + radii_m + margin_m).any(axis=1)
+        return near
+
+    def _turn(self, number: int) -> None:
+        """Wakes a sleeper, or puts to sleep who is awake."""
+        each, graph, plant = self._objects[number], self._scene_graph, self._plant
+        source = plant.get_source_id()
+        if self._asleep[number]:
+            for shape, properties in each.shapes.items():
+                graph.AssignRole(self._geometry_context, source, shape, properties)
+            self._lift[each.velocities] = 0.0
+        else:
+            for shape in each.shapes:
+                graph.RemoveRole(self._geometry_context, source, shape, Role.kProximity)
+            self._lift[each.velocities] = -plant.CalcGravityGeneralizedForces(self._context)[each.velocities]
+            velocities = plant.GetVelocities(self._context)
+            velocities[each.velocities] = 0.0
+            plant.SetVelocities(self._context, velocities)
+        plant.get_applied_generalized_force_input_port().FixValue(self._context, self._lift)
+        self._asleep[number] = not self._asleep[number]
+        self.all_asleep = self._restless == 0 and bool(self._asleep.all())
+
+
+def _objects(
+    plant: MultibodyPlant, inspector: SceneGraphInspector, models: Mapping[str, ModelInstanceIndex]
+) -> Iterator[_Object]:
+    """The loose objects of one body each; models with parts that move against each other stay awake."""
+    for name, instance in models.items():
+        bodies = [plant.get_body(index) for index in plant.GetBodyIndices(instance)]
+        if len(bodies) == 1 and bodies[0].is_floating_base_body():
+            found = plant.GetCollisionGeometriesForBody(bodies[0])
+            shapes = {shape: inspector.GetProximityProperties(shape) for shape in found}
+            start = bodies[0].floating_velocities_start_in_v()
+            yield _Object(name, bodies[0], shapes, slice(start, start + 6))
+
+
+def _slides(body: RigidBody, models: Mapping[str, ModelInstanceIndex]) -> bool:
+    """Returns whether a moving body is a model of its own that is not loose: a person who walks."""
+    return body.model_instance() in models.values() and not body.is_floating_base_body()
+
+
+def _moving_bodies(plant: MultibodyPlant) -> Iterator[RigidBody]:
+    bodies = (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies()))
+    return (body for body in bodies if not plant.IsAnchored(body))
+
+
+def _bound(inspector: SceneGraphInspector, shapes: Sequence[GeometryId]) -> tuple[FloatArray, float] | None:
+    """Centre and radius of a sphere around shapes, in their body's frame."""
+    rows = [shape_row(inspector, shape) for shape in shapes]
+    if not rows:
+        return None
+    centre = np.mean([X_BG.translation() for _, _, X_BG in rows], axis=0)
+    reach = [np.linalg.norm(X_BG.translation() - centre) + np.linalg.norm(half) for _, half, X_BG in rows]
+    return centre, float(max(reach))
+
+
+WITH_HAND_M_S: Final = 0.02
+"""What moves against the hand by less than this moves with it."""
+FASTEST_SPIN_RAD_S: Final = 25.0
+"""A third of a radian in a step of 12.5 ms."""
+_FASTEST_ALONG_RAD_S: Final = FASTEST_SPIN_RAD_S / 3.0**0.5
+"""What spins no faster about any axis cannot be too fast."""
+_AT_HAND_M: Final = 0.5
+
+
+class Carried:
+    """Corrects the free bodies among `loose` that a hand carries; call `after_step` after each step of the plant."""
+
+    def __init__(self, plant: MultibodyPlant, context: Context, loose: Sequence[RigidBody]) -> None:
+        self._plant, self._context = plant, context
+        self._loose = [body for body in loose if body.is_floating_base_body()]
+        starts = [body.floating_velocities_start_in_v() for body in self._loose]
+        places = [body.floating_positions_start() + 4 for body in self._loose]
+        self._places = np.array([range(start, start + 3) for start in places], dtype=np.int64).reshape(-1, 3)
+        self._spins = np.array([range(start, start + 3) for start in starts], dtype=np.int64).reshape(-1, 3)
+
+    def after_step(self, hand: RigidBody, dt_s: float) -> None:
+        """Moves what the hand carries along its arc; dt_s is the length of the step."""
+        plant, context = self._plant, self._context
+        p_WH = plant.EvalBodyPoseInWorld(context, hand).translation()
+        places_W = plant.GetPositions(context)[self._places]
+        near = np.flatnonzero(np.abs(places_W - p_WH).max(axis=1) <= _AT_HAND_M)
+        if len(near) == 0:
+            return
+        V_WH = plant.EvalBodySpatialVelocityInWorld(context, hand)
+        for number in near:
+            body, p_WO = self._loose[number], places_W[number]
+            v_WO = plant.EvalBodySpatialVelocityInWorld(context, body).translational()
+            with_hand = V_WH.translational() + _cross(V_WH.rotational(), p_WO - p_WH)
+            if np.linalg.norm(v_WO - with_hand) < WITH_HAND_M_S:
+                self._shift(body, arc_m(self._bias_m_s2(hand, p_WO), dt_s))
+
+    def _bias_m_s2(self, hand: RigidBody, p_WO: FloatArray) -> FloatArray:
+        """How the hand's point at p_WO accelerates while no joint's rate changes (m/s^2)."""
+        plant, context, world = self._plant, self._context, self._plant.world_frame()
+        p_HO = plant.EvalBodyPoseInWorld(context, hand).inverse() @ p_WO
+        rates = JacobianWrtVariable.kV
+        bias = plant.CalcBiasSpatialAcceleration(context, rates, hand.body_frame(), p_HO, world, world)
+        return np.asarray(bias.translational())
+
+    def limit_spin(self) -> None:
+        """Slows down the free bodies that spin faster than `FASTEST_SPIN_RAD_S`."""
+        velocities = self._plant.GetVelocities(self._context)
+        spins = velocities[self._spins]
+        if spins.size and np.abs(spins).max() > _FASTEST_ALONG_RAD_S:
+            rates = np.linalg.norm(spins, axis=1, keepdims=True)
+            velocities[self._spins] = spins * np.minimum(1.0, FASTEST_SPIN_RAD_S / np.maximum(rates, 1e-9))
+            self._plant.SetVelocities(self._context, velocities)
+
+    def _shift(self, body: RigidBody, offset_W: FloatArray) -> None:
+        q = self._plant.GetPositions(self._context)
+        start = body.floating_positions_start() + 4
+        q[start : start + 3] += offset_W
+        self._plant.SetPositions(self._context, q)
+
+
+def arc_m(acceleration_W: FloatArray, dt_s: float) -> FloatArray:
+    """How far (m) a point that accelerates (m/s^2) is off its tangent after dt_s."""
+    return np.asarray(0.5 * dt_s**2 * acceleration_W)
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """The product a x b of two vectors (3,)."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

@@ -1,1 +1,0 @@
-"""The Fetch mobile manipulator: facts, and the model that is made of them."""

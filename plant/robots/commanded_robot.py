@@ -1,0 +1,302 @@
+"""What all simulated robots share behind the Robot protocol: sensing, arm and gripper, commands and the lease."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from plant.robots.command_table import CommandTable, Part
+from plant.robots.robot_kind import RobotBody
+from plant.robots.servos import ActuatedJoints, ArmServos, Closing, GripperGoal, GripperServo, GripperTolerances
+from plant.saved_state import Kept, State
+from plant.sensors.suite import SensorSuite
+from skills.robot import (
+    ArmTrajectory,
+    Battery,
+    Capabilities,
+    CommandId,
+    CommandState,
+    CommandStatus,
+    FloatArray,
+    Gripper,
+    GripperKind,
+    Image,
+    Imu,
+    Joints,
+    Lease,
+    LeaseError,
+    Odometry,
+    Scan,
+)
+
+
+class LeaseManager:
+    """Hands out one robot's lease; the lease with the highest number counts."""
+
+    def __init__(self, robot_name: str) -> None:
+        self._robot_name = robot_name
+        self._number = 0
+        self._current: Lease | None = None
+
+    @property
+    def current(self) -> Lease | None:
+        """The lease that counts, None while it is free."""
+        return self._current
+
+    def acquire(self, holder: str) -> Lease:
+        """A lease for `holder`. Raises LeaseError while another's is out."""
+        if self._current is not None:
+            raise LeaseError(
+                f"{self._robot_name}: the lease is held by {self._current.holder!r}; ask for its return, or take it"
+            )
+        return self.take(holder)
+
+    def take(self, holder: str) -> Lease:
+        """A lease for `holder`, from whoever has it."""
+        self._number += 1
+        self._current = Lease(self._robot_name, holder, self._number)
+        return self._current
+
+    def give_back(self, lease: Lease) -> bool:
+        """True when `lease` was the one that counted."""
+        if lease != self._current:
+            return False
+        self._current = None
+        return True
+
+    def refusal(self, lease: Lease) -> str | None:
+        """Why `lease` gives no right to move, or None when it does."""
+        if lease == self._current:
+            return None
+        holder = self._current.holder if self._current else "nobody"
+        return f"lease {lease.number} of {lease.holder!r} no longer counts; the lease is held by {holder!r}"
+
+
+class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
+    """A robot that senses, keeps the book of its commands, and obeys who holds its lease.
+
+    What it keeps are its servos and sensors; commands and leases do not outlive its computer.
+    """
+
+    def __init__(
+        self, body: RobotBody, index: ActuatedJoints, sensors: SensorSuite, context: Context, gripper: GripperTolerances
+    ) -> None:
+        """Takes over the robot as it stands in the plant's `context` at time 0."""
+        self._name, self._capabilities, self._sensors = body.name, body.kind.capabilities(), sensors
+        self._plant, self._instance, self._index, self._context = body.plant, body.instance, index, context
+        joints = self._joints()
+        self._arm = ArmServos(index, joints)
+        self._gripper = GripperServo(max(0.0, self._fingers_at(joints, joints)[0]), gripper)
+        self._commands, self._leases = CommandTable(), LeaseManager(body.name)
+        self._now_s = 0.0
+
+    # -- know and sense -------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self._name
+
+    def capabilities(self) -> Capabilities:
+        """What this robot is and can do."""
+        return self._capabilities
+
+    def odometry(self) -> Odometry:
+        """Latest dead reckoning."""
+        return self._sensors.odometry
+
+    def imu(self) -> Imu:
+        """Latest inertial measurement."""
+        return self._sensors.imu
+
+    def scan(self) -> Scan | None:
+        """Latest LiDAR revolution, None before the first."""
+        return self._sensors.scan
+
+    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
+        """Takes a picture with depth now, or only one of the two. Raises ValueError for an unknown source."""
+        return self._sensors.image(source, visual=visual, depth=depth)
+
+    def joints(self) -> Joints:
+        """Latest joint state."""
+        return self._sensors.joints
+
+    def gripper(self) -> Gripper:
+        """Latest gripper state."""
+        return self._sensors.gripper
+
+    def battery(self) -> Battery:
+        """Latest battery state."""
+        return self._sensors.battery
+
+    def faults(self) -> tuple[str, ...]:
+        """Present faults, empty when well."""
+        return ()
+
+    # -- act ------------------------------------------------------------------------------------------------------
+
+    def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
+        """Follows a joint trajectory; done when its end is reached and the arm is still."""
+        reason = self._arm.refusal(trajectory)
+        return self._commands.refuse(reason) if reason else self._begin(Part.ARM, trajectory, until_s, lease)
+
+    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Moves the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
+        gripper = self._capabilities.gripper
+        if gripper is None:
+            return self._commands.refuse("set_gripper: the robot has no gripper")
+        if not (0.0 <= opening <= gripper.widest and 0.0 < force_n <= gripper.max_force_n):
+            unit = "rad" if gripper.kind is GripperKind.HINGED else "m"
+            return self._commands.refuse(
+                f"set_gripper: opening {opening:.3f} {unit} must lie in [0, {gripper.widest}] "
+                f"and force {force_n:.0f} N in (0, {gripper.max_force_n}]"
+            )
+        command = self._begin(Part.GRIPPER, GripperGoal(opening, force_n), until_s, lease)
+        if self._runs(command):
+            self._gripper.begin(GripperGoal(opening, force_n))
+        return command
+
+    def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
+        """Stops all motion, or only the given command if it still runs."""
+        refusal = self._leases.refusal(lease)
+        if refusal:
+            return self._commands.refuse(f"stop: {refusal}")
+        part = self._commands.part_of(only) if only is not None else None
+        for candidate in Part if only is None else ([part] if part else []):
+            self._halt(candidate, "stopped by command")
+        return self._commands.note(CommandState.DONE)
+
+    def command_status(self, command: CommandId) -> CommandStatus:
+        """What became of a command. Raises KeyError for an id never given."""
+        return self._commands.status(command)
+
+    # -- own ------------------------------------------------------------------------------------------------------
+
+    def lease_holder(self) -> Lease | None:
+        """The lease that counts now; None while it is free."""
+        return self._leases.current
+
+    def acquire_lease(self, holder: str) -> Lease:
+        """Takes a free lease. Raises LeaseError when another holds it."""
+        return self._leases.acquire(holder)
+
+    def take_lease(self, holder: str) -> Lease:
+        """Takes the lease from whoever holds it; the robot stops."""
+        self._halt_all("the lease was taken by " + repr(holder))
+        return self._leases.take(holder)
+
+    def return_lease(self, lease: Lease) -> None:
+        """Gives the lease back; the robot stops. A lease that was taken away is ignored."""
+        if self._leases.give_back(lease):
+            self._halt_all("the lease was returned")
+
+    # -- called by the simulation ---------------------------------------------------------------------------------
+
+    def sense(self, now_s: float) -> None:
+        """Takes new sensor readings."""
+        self._now_s = now_s
+        self._sensors.update(now_s)
+
+    def control(self, now_s: float, dt_s: float) -> None:
+        """Command all servos for the next dt_s of simulated time, which bear the robot's weight besides."""
+        self._now_s = now_s
+        self._expire()
+        joints, rates = self._joints(), self._rates()
+        self._follow_arm(joints, rates)
+        self._follow_gripper(joints, rates, dt_s)
+        desired = self._desired(joints, rates, dt_s)
+        plant, context, index = self._plant, self._context, self._index
+        desired[index.arm], desired[index.rates_of(index.arm)] = self._arm.goal_rad, self._arm.rate_rad_s
+        gravity = plant.CalcGravityGeneralizedForces(context)[index.velocities]
+        plant.get_desired_state_input_port(self._instance).FixValue(context, desired)
+        feed_forward = np.minimum(np.maximum(-gravity, -index.efforts), index.efforts)
+        plant.get_actuation_input_port(self._instance).FixValue(context, feed_forward)
+
+    def state(self) -> State:
+        """What the robot itself keeps, and whether its arm moves."""
+        return {**super().state(), "arm_moves": self._commands.running(Part.ARM) is not None}
+
+    def restore(self, state: State) -> None:
+        """Has such a state: an arm that was moving holds where it is; the gripper keeps its clamp."""
+        super().restore(state)
+        if state["arm_moves"]:
+            self._arm.hold(self._joints())
+
+    def power_up(self, now_s: float) -> None:
+        """Begins again where it stands: nobody has the lease, no command runs; take readings."""
+        self._now_s = now_s
+        self._commands, self._leases = CommandTable(), LeaseManager(self._name)
+        self._sensors.power_up(now_s)
+
+    # -- for the kinds of robots ----------------------------------------------------------------------------------
+
+    @abstractmethod
+    def _fingers_at(self, joints: FloatArray, rates: FloatArray) -> tuple[float, float]:
+        """How far the gripper is open, and how fast its fingers move, in the unit of its kind and s."""
+
+    @abstractmethod
+    def _desired(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> FloatArray:
+        """Positions and velocities that all joints but the arm's are to have after dt_s."""
+
+    def _hold_still(self, part: Part) -> None:
+        """Makes where a part is the place where it stays; a gripper that clamps something goes on clamping."""
+        if part is Part.ARM:
+            self._arm.hold(self._joints())
+        if part is Part.GRIPPER:
+            opening, rate = self._fingers_at(self._joints(), self._rates())
+            self._gripper.halt(max(0.0, opening), rate)
+
+    def _joints(self) -> FloatArray:
+        """Positions of all joints."""
+        return np.asarray(self._plant.GetPositions(self._context)[self._index.positions])
+
+    def _rates(self) -> FloatArray:
+        """Velocities of all joints."""
+        return np.asarray(self._plant.GetVelocities(self._context)[self._index.velocities])
+
+    def _follow_arm(self, joints: FloatArray, rates: FloatArray) -> None:
+        active = self._commands.running(Part.ARM)
+        trajectory = active.payload if active is not None and isinstance(active.payload, ArmTrajectory) else None
+        elapsed_s = 0.0 if active is None else self._now_s - active.since_s
+        if self._arm.follow(trajectory, elapsed_s, joints, rates):
+            self._commands.finish(Part.ARM, CommandState.DONE)
+
+    def _follow_gripper(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> None:
+        closing = self._gripper.follow(*self._fingers_at(joints, rates), dt_s)
+        if closing is not Closing.MOVING:
+            reason = "" if closing is Closing.ARRIVED else "stopped by an object in the gripper"
+            self._commands.finish(Part.GRIPPER, CommandState.DONE, reason)
+
+    def _begin(self, part: Part, payload: object, until_s: float, lease: Lease) -> CommandId:
+        refusal = self._leases.refusal(lease)
+        if refusal:
+            return self._commands.refuse(f"{part.value}: {refusal}")
+        if until_s <= self._now_s:
+            return self._commands.refuse(
+                f"{part.value}: expires at {until_s:.2f} s, and it is {self._now_s:.2f} s already"
+            )
+        return self._commands.begin(part, payload, self._now_s, until_s)
+
+    def _runs(self, command: CommandId) -> bool:
+        return self._commands.status(command).state is CommandState.RUNNING
+
+    def _halt_all(self, reason: str) -> None:
+        for part in Part:
+            self._halt(part, reason)
+
+    def _halt(self, part: Part, reason: str) -> None:
+        if self._commands.running(part) is not None:
+            self._hold_still(part)
+        self._commands.finish(part, CommandState.STOPPED, reason)
+
+    def _expire(self) -> None:
+        for part in Part:
+            active = self._commands.running(part)
+            if active is None or self._now_s < active.until_s - 1e-9:
+                continue
+            if part is Part.VELOCITY:
+                self._commands.finish(part, CommandState.DONE)
+            else:
+                self._halt(part, "expired before it was done")

@@ -1,0 +1,84 @@
+"""One Fetch inside a MultibodyPlant: the model on its own wheels, its servos' gains, and where its joints stand."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.systems.framework import Context
+
+from plant.robots.fetch.description import (
+    BASE_LINK,
+    FINGERS,
+    HEAD_JOINTS,
+    LIFT_JOINT,
+    WHEELS,
+    arm_joint_names,
+    fetch_facts,
+    fetch_urdf,
+)
+from plant.robots.fetch.wheels import WheelLimits
+from plant.robots.robot_kind import RobotBody, RobotKind
+from plant.robots.servos import ActuatedJoints
+from skills.robot import Pose2D
+
+FINGER_GAIN_N_M = 2e4
+_GAINS = {
+    **dict.fromkeys(WHEELS, (20.0, 15.0)),
+    LIFT_JOINT: (4e4, 3e3),
+    **dict.fromkeys(HEAD_JOINTS, (20.0, 1.5)),
+    "shoulder_pan": (900.0, 45.0),
+    "shoulder_lift": (1500.0, 75.0),
+    "upperarm_roll": (900.0, 45.0),
+    "elbow_flex": (900.0, 45.0),
+    "forearm_roll": (300.0, 12.0),
+    "wrist_flex": (300.0, 12.0),
+    "wrist_roll": (100.0, 4.0),
+    **dict.fromkeys(FINGERS, (FINGER_GAIN_N_M, 200.0)),
+}
+
+
+class FetchModel(RobotBody):
+    """Fetch's bodies and joints in a plant. It stands on its wheels and casters; its fingers are geared together."""
+
+    def __init__(self, plant: MultibodyPlant, name: str, *, kind: RobotKind, limits: WheelLimits) -> None:
+        """Adds the robot to `plant` (before Finalize)."""
+        super().__init__(plant, name, kind, fetch_urdf(), _GAINS)
+        self.limits, self.base = limits, plant.GetBodyByName(BASE_LINK, self.instance)
+        left, right = (plant.GetJointByName(finger, self.instance) for finger in FINGERS)
+        plant.AddCouplerConstraint(left, right, 1.0)
+
+    def opening(self, context: Context) -> float:
+        """How far the fingers are apart (m)."""
+        positions = self.plant.GetPositions(context)
+        return sum(float(positions[self._place(finger)]) for finger in FINGERS)
+
+    def index(self) -> JointIndex:
+        """Where the joints stand in the plant's state and in the instance's actuation; after Finalize."""
+        return JointIndex(self.plant, self.instance)
+
+    def place(self, context: Context, pose: Pose2D) -> None:
+        """Sets the robot on its wheels at a pose, the torso as for travelling and the arm stowed."""
+        facts = fetch_facts()
+        angles = {**facts["stowed"], LIFT_JOINT: facts["capabilities"]["travelling_lift"]}
+        positions = self.plant.GetPositions(context)
+        for name, position in angles.items():
+            positions[self._place(name)] = position
+        self.plant.SetPositions(context, positions)
+        self.plant.SetFreeBodyPose(context, self.base, pose.transform())
+
+    def _place(self, joint: str) -> int:
+        """Where a joint stands in the plant's positions; after Finalize."""
+        return int(self.plant.GetJointByName(joint, self.instance).position_start())
+
+
+class JointIndex(ActuatedJoints):
+    """Fetch's joints: the numbers of wheels, lift, head, arm and fingers."""
+
+    def __init__(self, plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
+        super().__init__(plant, instance)
+        self.wheels, self.head = self.numbers(WHEELS), self.numbers(HEAD_JOINTS)
+        self.arm, self.fingers = self.numbers(arm_joint_names()), self.numbers(FINGERS)
+        self.lift = self.names.index(LIFT_JOINT)
+        speeds = {part["link"]: part["velocity"] for part in fetch_facts()["arm"]}
+        self.fastest_arm_rad_s = np.array([speeds[name] for name in arm_joint_names()])

@@ -1,0 +1,96 @@
+"""Two driven wheels: set points that follow a velocity within limits, and the way that the encoders count."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from plant.robots.robot_kind import LocomotionLimits
+from plant.saved_state import Kept
+from skills.robot import FloatArray, Pose2D, quantities
+
+_MEAN_AHEAD = 0.75
+"""Of the way of a control period: where the two steps of the plant in it end, in the mean."""
+
+
+@dataclass(frozen=True)
+class WheelLimits(LocomotionLimits):
+    """Two driven wheels that bear a base: what they make of a velocity; the motors alone could push at 2.6 m/s^2.
+
+    `lead_rad` is how far a wheel's set point runs ahead of it where it cannot follow.
+    """
+
+    speed_m_s: quantities.Speed = 1.0
+    turn_rate_rad_s: quantities.TurnRate = 1.8
+    acceleration_m_s2: quantities.Acceleration = 1.0
+    turn_acceleration_rad_s2: quantities.TurnAcceleration = 2.5
+    stop_deceleration_m_s2: quantities.Acceleration = 2.0
+    stop_turn_deceleration_rad_s2: quantities.TurnAcceleration = 6.0
+    lead_rad: quantities.Angle = 0.15
+
+
+@dataclass(frozen=True)
+class Axle:
+    """Wheels of a radius at y = +- `half_track_m`, the left one first."""
+
+    radius_m: float
+    half_track_m: float
+
+    def rates(self, speed_m_s: float, turn_rate_rad_s: float) -> FloatArray:
+        """Wheel rates (2,), rad/s, for a speed ahead and a turn rate of the base."""
+        across = self.half_track_m * turn_rate_rad_s
+        return np.array([speed_m_s - across, speed_m_s + across]) / self.radius_m
+
+    def travel(self, turned_rad: FloatArray) -> tuple[float, float]:
+        """Way ahead (m) and turn (rad) of the base for what the wheels (2,) have turned without slip."""
+        left_m, right_m = (self.radius_m * turned_rad).tolist()
+        return (left_m + right_m) / 2.0, (right_m - left_m) / (2.0 * self.half_track_m)
+
+
+class WheelServos(Kept, keeps=("_speed", "_turn_rate", "_due_rad")):
+    """Set points of the wheels for a wanted velocity; at rest they hold the wheels where they are."""
+
+    def __init__(self, axle: Axle, now_rad: FloatArray, limits: WheelLimits) -> None:
+        """The wheels (2,) stand at `now_rad`."""
+        self._axle, self._limits = axle, limits
+        self._speed = self._turn_rate = 0.0
+        self.goal_rad, self.rate_rad_s, self._due_rad = now_rad.copy(), np.zeros(2), now_rad.copy()
+
+    def follow(self, wanted: tuple[float, float], now_rad: FloatArray, dt_s: float, *, stopping: bool) -> None:
+        """Sets the wheels for the next dt_s: ramp to a speed (m/s) and a turn rate (rad/s), faster when stopping."""
+        limits = self._limits
+        most = limits.stop_deceleration_m_s2 if stopping else limits.acceleration_m_s2
+        turn = limits.stop_turn_deceleration_rad_s2 if stopping else limits.turn_acceleration_rad_s2
+        self._speed += _cut(_cut(wanted[0], limits.speed_m_s) - self._speed, most * dt_s)
+        self._turn_rate += _cut(_cut(wanted[1], limits.turn_rate_rad_s) - self._turn_rate, turn * dt_s)
+        self.rate_rad_s = self._axle.rates(self._speed, self._turn_rate)
+        self._due_rad = now_rad + np.clip(self._due_rad - now_rad, -limits.lead_rad, limits.lead_rad)
+        self.goal_rad = self._due_rad + _MEAN_AHEAD * self.rate_rad_s * dt_s
+        self._due_rad = self._due_rad + self.rate_rad_s * dt_s
+
+
+class WheelOdometer(Kept, keeps=("pose", "_last_rad")):
+    """The base's pose since the beginning, as its wheels' encoders count it: slip goes unnoticed."""
+
+    def __init__(self, axle: Axle, now_rad: FloatArray) -> None:
+        """The wheels (2,) stand at `now_rad`, the base at the origin."""
+        self._axle, self._last_rad = axle, now_rad.copy()
+        self.pose = Pose2D(0.0, 0.0, 0.0)
+
+    def count(self, now_rad: FloatArray) -> None:
+        """Takes in where the wheels are; the base went along an arc since the last time."""
+        way_m, turn_rad = self._axle.travel(now_rad - self._last_rad)
+        self._last_rad = now_rad.copy()
+        middle = self.pose.yaw_rad + turn_rad / 2.0
+        self.pose = Pose2D(
+            self.pose.x_m + way_m * math.cos(middle),
+            self.pose.y_m + way_m * math.sin(middle),
+            math.remainder(self.pose.yaw_rad + turn_rad, math.tau),
+        )
+
+
+def _cut(value: float, most: float) -> float:
+    """The value, cut to [-most, most]."""
+    return min(max(value, -most), most)

@@ -1,0 +1,191 @@
+"""The planar floating base that bears the body until the legs do: five joints with effort limits.
+
+World -> prismatic x -> prismatic y -> revolute yaw -> prismatic height -> revolute pitch -> weld -> body.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    Frame,
+    Joint,
+    JointActuator,
+    ModelInstanceIndex,
+    PdControllerGains,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+    SpatialInertia,
+)
+from pydrake.systems.framework import Context
+
+from plant.robots.robot_kind import LocomotionLimits
+from plant.saved_state import Kept
+from skills.robot import FloatArray, Pose2D, quantities
+
+
+@dataclass(frozen=True)
+class FloatingBaseLimits(LocomotionLimits):
+    """A planar floating base that bears the body: what it can do; forces in N, torques in N m."""
+
+    speed_m_s: quantities.Speed = 1.6
+    turn_rate_rad_s: quantities.TurnRate = 2.0
+    acceleration_m_s2: quantities.Acceleration = 2.0
+    turn_acceleration_rad_s2: quantities.TurnAcceleration = 4.0
+    stop_deceleration_m_s2: quantities.Acceleration = 5.0
+    stop_turn_deceleration_rad_s2: quantities.TurnAcceleration = 12.0
+    posture_speed_m_s: quantities.Speed = 0.25
+    pitch_rate_rad_s: quantities.TurnRate = 0.6
+    force_n: quantities.Force = 250.0
+    torque_nm: quantities.Torque = 120.0
+    lift_n: quantities.Force = 900.0
+    pitch_torque_nm: quantities.Torque = 250.0
+    lead_m: quantities.Length = 0.02
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """A planar velocity in the body frame: m/s, m/s, rad/s."""
+
+    vx: float = 0.0
+    vy: float = 0.0
+    wz: float = 0.0
+
+
+_AXES = ("x", "y", "yaw", "height", "pitch")
+_GAINS = {"x": (8e3, 2e3), "y": (8e3, 2e3), "yaw": (2e3, 4e2), "height": (6e4, 3e3), "pitch": (8e3, 4e2)}
+
+
+class FloatingBase(Kept, keeps=("_velocity", "_target", "_posture")):
+    """Bears one robot's body and drives it to a velocity and a posture with limited force and acceleration."""
+
+    def __init__(
+        self, plant: MultibodyPlant, name: str, body: RigidBody, limits: FloatingBaseLimits | None = None
+    ) -> None:
+        """Adds the joints to `plant` (before Finalize) and weld `body` to the last of them."""
+        self._plant = plant
+        self._limits = limits or FloatingBaseLimits()
+        self.instance: ModelInstanceIndex = plant.AddModelInstance(f"{name}_floating_base")
+        self._joints = self._add_joints(name, body)
+        self._velocity = Velocity()
+        self._target = [0.0] * 5
+        self._posture = (0.0, 0.0)
+
+    def _add_joints(self, name: str, body: RigidBody) -> Sequence[Joint]:
+        directions = {"x": (1, 0, 0), "y": (0, 1, 0), "yaw": (0, 0, 1), "height": (0, 0, 1), "pitch": (0, 1, 0)}
+        efforts = self._efforts()
+        parent: RigidBody = self._plant.world_body()
+        joints: list[Joint] = []
+        for axis in _AXES:
+            child = body if axis == _AXES[-1] else self._add_link(f"{name}_floating_base_{axis}")
+            frames = (
+                self._add_frame(f"{name}_floating_base_{axis}_F", parent),
+                self._add_frame(f"{name}_floating_base_{axis}_M", child),
+            )
+            kind = RevoluteJoint if axis in ("yaw", "pitch") else PrismaticJoint
+            direction = np.array(directions[axis], dtype=np.float64)
+            joint = self._plant.AddJoint(kind(f"{name}_floating_base_{axis}", *frames, direction))
+            actuator: JointActuator = self._plant.AddJointActuator(f"{name}_floating_base_{axis}", joint, efforts[axis])
+            actuator.set_controller_gains(PdControllerGains(p=_GAINS[axis][0], d=_GAINS[axis][1]))
+            joints.append(joint)
+            parent = child
+        return joints
+
+    def _add_link(self, name: str) -> RigidBody:
+        inertia = SpatialInertia.SolidSphereWithMass(0.05, 0.05)
+        return self._plant.AddRigidBody(name, self.instance, inertia)
+
+    def _add_frame(self, name: str, body: RigidBody) -> Frame:
+        return self._plant.AddFrame(FixedOffsetFrame(name, body.body_frame(), RigidTransform(), self.instance))
+
+    def _efforts(self) -> dict[str, float]:
+        limits = self._limits
+        return {
+            "x": limits.force_n,
+            "y": limits.force_n,
+            "yaw": limits.torque_nm,
+            "height": limits.lift_n,
+            "pitch": limits.pitch_torque_nm,
+        }
+
+    @property
+    def velocity(self) -> Velocity:
+        """The velocity that is being commanded now, after the acceleration limit."""
+        return self._velocity
+
+    @property
+    def posture(self) -> tuple[float, float]:
+        """The height and pitch that are being commanded now, on the way to those wanted."""
+        return self._posture
+
+    def pose(self, positions: FloatArray) -> list[float]:
+        """(x, y, yaw, height, pitch) out of the plant's positions."""
+        values: list[float] = positions[self._places].tolist()
+        return values
+
+    @cached_property
+    def _places(self) -> list[int]:
+        """Where the joints stand in the plant's positions; after Finalize."""
+        return [joint.position_start() for joint in self._joints]
+
+    def place(self, context: Context, pose: Pose2D, height_m: float) -> None:
+        """Sets the body's pose at the beginning of a run."""
+        values = (pose.x_m, pose.y_m, pose.yaw_rad, height_m, 0.0)
+        positions = self._plant.GetPositions(context)
+        positions[self._places] = values
+        self._plant.SetPositions(context, positions)
+        self._plant.get_actuation_input_port(self.instance).FixValue(context, np.zeros(len(_AXES)))
+        self._target = [*values]
+        self._posture = (height_m, 0.0)
+
+    def control(
+        self,
+        context: Context,
+        state: Sequence[float],
+        wanted: Velocity,
+        posture: Sequence[float],
+        dt_s: float,
+        *,
+        stopping: bool,
+    ) -> None:
+        """Command the joints for the next dt_s: ramp to `wanted` (body frame) and to the posture (height, pitch).
+
+        `state` is (x, y, yaw, height, pitch). A robot that is `stopping` brakes harder than it otherwise changes speed.
+        """
+        limits = self._limits
+        v = self._velocity = self._ramp(wanted, dt_s, stopping=stopping)
+        c, s = math.cos(state[2]), math.sin(state[2])
+        rates = (c * v.vx - s * v.vy, s * v.vx + c * v.vy, v.wz)
+        planar = zip(self._target[:3], rates, state[:3], strict=True)
+        ahead = [now + _clip(target + rate * dt_s - now, limits.lead_m) for target, rate, now in planar]
+        most = (limits.posture_speed_m_s * dt_s, limits.pitch_rate_rad_s * dt_s)
+        move = [_clip(goal - now, step) for goal, now, step in zip(posture, self._posture, most, strict=True)]
+        self._posture = (self._posture[0] + move[0], self._posture[1] + move[1])
+        self._target = [*ahead, *self._posture]
+        desired = np.array([*self._target, *rates, move[0] / dt_s, move[1] / dt_s])
+        self._plant.get_desired_state_input_port(self.instance).FixValue(context, desired)
+
+    def _ramp(self, wanted: Velocity, dt_s: float, *, stopping: bool) -> Velocity:
+        limits, now = self._limits, self._velocity
+        speed = math.hypot(wanted.vx, wanted.vy)
+        scale = min(1.0, limits.speed_m_s / speed) if speed else 1.0
+        change_x, change_y = scale * wanted.vx - now.vx, scale * wanted.vy - now.vy
+        size = math.hypot(change_x, change_y)
+        most = (limits.stop_deceleration_m_s2 if stopping else limits.acceleration_m_s2) * dt_s
+        share = min(1.0, most / size) if size else 0.0
+        turn_rate = limits.stop_turn_deceleration_rad_s2 if stopping else limits.turn_acceleration_rad_s2
+        turn = _clip(_clip(wanted.wz, limits.turn_rate_rad_s) - now.wz, turn_rate * dt_s)
+        return Velocity(now.vx + share * change_x, now.vy + share * change_y, now.wz + turn)
+
+
+def _clip(value: float, most: float) -> float:
+    """The value, cut to [-most, most]."""
+    return min(max(value, -most), most)

@@ -1,0 +1,312 @@
+"""The Robot protocol as the simulated Fetch keeps it."""
+
+import math
+
+import numpy as np
+import pytest
+from pydrake.multibody.math import SpatialVelocity
+
+from plant.diagram import LooseModel, build_diagram
+from plant.engine import Engine
+from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.fetch.robot import lidar_spec
+from plant.robots.fetch.wheels import Axle, WheelOdometer
+from skills.robot import ArmTrajectory, BaseKind, CommandState, LeaseError, Mount, Pose2D
+
+WALL = """<sdf version="1.7"><model name="wall"><link name="wall">
+<collision name="wall"><geometry><box><size>0.2 6 1</size></box></geometry></collision></link></model></sdf>"""
+
+
+def test_the_lidar_sees_220_degrees_in_662_points():
+    azimuths = lidar_spec().azimuths_rad()[lidar_spec().seen()]
+    assert len(azimuths) == 662
+    assert math.degrees(azimuths[-1] - azimuths[0]) == pytest.approx(220.0, abs=0.1)
+    assert math.degrees(azimuths[0] + azimuths[-1]) == pytest.approx(0.0, abs=0.5)
+
+
+def test_a_wall_ahead_is_where_the_scan_says(floor, tmp_path):
+    """A wall's face at x = 2.9 m, the robot at 0: the scan's middle lies there in the body frame."""
+    path = tmp_path / "wall.sdf"
+    path.write_text(WALL)
+    wall = LooseModel("wall", path, Pose2D(3.0, 0.0, 0.0).transform(0.5), fixed=True)
+    world = build_diagram(directives=None, models=[floor, wall], robots={"Bob": "fetch"}, render=False)
+    scan = Engine(world, {"Bob": Pose2D(0.0, 0.0, 0.0)}).robots["Bob"].scan()
+    points_B = scan.points_B()
+    ahead = points_B[np.abs(points_B[:, 1]) < 0.3]
+    assert float(np.median(ahead[:, 0])) == pytest.approx(2.9, abs=0.02)
+    assert scan.ranges_m.shape == (1, 662)
+
+
+def test_wheels_that_turn_alike_count_a_straight_way_and_against_each_other_a_turn():
+    """Radius 0.05 m, half track 0.2 m: 10 rad each are 0.5 m; -4 and 4 rad are 1 rad."""
+    odometer = WheelOdometer(Axle(0.05, 0.2), np.zeros(2))
+    odometer.count(np.array([10.0, 10.0]))
+    odometer.count(np.array([6.0, 14.0]))
+    assert (odometer.pose.x_m, odometer.pose.y_m, odometer.pose.yaw_rad) == pytest.approx((0.5, 0.0, 1.0))
+
+
+def test_odometry_follows_a_driven_arc(engine, fetch, lease):
+    """2 s at 0.4 m/s and 0.5 rad/s; encoders err by 1 or 2 percent."""
+    fetch.drive(0.4, 0.0, 0.5, until_s=2.0, lease=lease)
+    engine.advance(3.0)
+    plant, body = engine.world.plant, engine.world.robots["Bob"].body
+    true = Pose2D.from_transform(plant.EvalBodyPoseInWorld(engine.context, body))
+    read = fetch.odometry().pose
+    assert (read.x_m + 0.5, read.y_m + 0.2) == pytest.approx((true.x_m, true.y_m), abs=0.04)
+    assert read.yaw_rad == pytest.approx(true.yaw_rad, abs=0.03)
+
+
+def test_its_capabilities_say_what_differs_from_a_walking_robot():
+    known = fetch_capabilities()
+    assert known.base_kind is BaseKind.DIFFERENTIAL
+    assert [camera.mount for camera in known.cameras] == [Mount.HEAD]
+    assert known.lidar_height_m == pytest.approx(0.288, abs=0.001)
+    assert known.pitch_range_rad == (0.0, 0.0)
+    assert len(known.arm.joint_names) == 7
+
+
+def test_the_head_of_the_capabilities_is_where_the_plant_has_it(engine, fetch, lease):
+    """The frame `head` of the capabilities at the encoders' angles is the plant's link, to the encoders' error."""
+    fetch.point_head(0.5, 0.3, until_s=5.0, lease=lease)
+    engine.advance(2.0)
+    plant, bob = engine.world.plant, engine.world.robots["Bob"]
+    link = plant.GetBodyByName("head_tilt", bob.instance)
+    X_BF = plant.EvalBodyPoseInWorld(engine.context, bob.body).inverse() @ plant.EvalBodyPoseInWorld(
+        engine.context, link
+    )
+    angles = fetch.joints().position_rad
+    told = fetch.capabilities().head.X_BF(angles["head_pan"], angles["head_tilt"])
+    np.testing.assert_allclose(told.GetAsMatrix34(), X_BF.GetAsMatrix34(), atol=0.01)
+
+
+TRAVELLING_M = 0.37743 + 0.02
+BOX = """<sdf version="1.7"><model name="box"><link name="box">
+<inertial><mass>0.3</mass><inertia><ixx>0.0003</ixx><iyy>0.0003</iyy><izz>0.0003</izz></inertia></inertial>
+<collision name="box"><geometry><box><size>0.05 0.05 0.12</size></box></geometry></collision></link></model></sdf>"""
+
+
+def pose(engine):
+    """(x, y, yaw, height) of the body frame."""
+    X_WB = engine.world.plant.EvalBodyPoseInWorld(engine.context, engine.world.robots["Bob"].body)
+    at = Pose2D.from_transform(X_WB)
+    return np.array([at.x_m, at.y_m, at.yaw_rad, X_WB.translation()[2]])
+
+
+def test_it_stands_still_without_creeping(engine):
+    engine.advance(1.0)
+    before = pose(engine)
+    engine.advance(20.0)
+    np.testing.assert_allclose(pose(engine), before, atol=2e-4)
+
+
+def test_it_drives_a_metre_ahead_within_two_centimetres(engine, fetch, lease):
+    """1.0 m: half a metre a second for two seconds, and what it rolls while it stops makes up for the start."""
+    x0, y0 = pose(engine)[:2]
+    while fetch.odometry().pose.x_m < 1.0 - 0.5**2 / (2 * 2.0):
+        fetch.drive(0.5, 0.0, 0.0, until_s=engine.now() + 0.1, lease=lease)
+        engine.advance(0.025)
+    fetch.stop(lease=lease)
+    engine.advance(2.0)
+    x, y, yaw, _ = pose(engine)
+    assert (x - x0, y - y0) == pytest.approx((1.0, 0.0), abs=0.02)
+    assert yaw == pytest.approx(0.0, abs=math.radians(1.0))
+
+
+def test_it_turns_a_quarter_on_the_spot_within_two_degrees(engine, fetch, lease):
+    """The command lasts for 90 degrees at 0.5 rad/s; ramps at both ends differ by 0.03 rad."""
+    x0, y0 = pose(engine)[:2]
+    fetch.drive(0.0, 0.0, 0.5, until_s=math.pi / 2 / 0.5 + 0.5 * (0.5 / 2.5 - 0.5 / 6.0), lease=lease)
+    engine.advance(5.0)
+    x, y, yaw, _ = pose(engine)
+    assert yaw == pytest.approx(math.pi / 2, abs=math.radians(2.0))
+    assert (x, y) == pytest.approx((x0, y0), abs=0.01)
+
+
+def test_it_refuses_to_drive_sideways(engine, fetch, lease):
+    command = fetch.drive(0.3, 0.1, 0.0, until_s=1.0, lease=lease)
+    assert fetch.command_status(command).state is CommandState.REFUSED
+    assert "sideways" in fetch.command_status(command).reason
+    engine.advance(0.5)
+    assert pose(engine)[0] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_a_drive_that_expires_stops_the_robot(engine, fetch, lease):
+    command = fetch.drive(0.8, 0.0, 0.0, until_s=0.5, lease=lease)
+    engine.advance(2.0)
+    assert fetch.command_status(command).state is CommandState.DONE
+    before = pose(engine)
+    engine.advance(1.0)
+    np.testing.assert_allclose(pose(engine), before, atol=1e-3)
+
+
+def test_speed_and_acceleration_are_limited(engine, fetch, lease):
+    fetch.drive(5.0, 0.0, 0.0, until_s=10.0, lease=lease)
+    engine.advance(0.4)
+    assert pose(engine)[0] - 0.5 < 0.5 * 1.0 * 0.4**2 + 0.02
+    engine.advance(1.5)
+    x0 = pose(engine)[0]
+    engine.advance(0.5)
+    assert (pose(engine)[0] - x0) / 0.5 == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_push_from_the_side_does_not_roll_it_away(engine):
+    """Wheels roll ahead only: 150 N from the side are less than the tyres hold, 0.9 x 600 N."""
+    plant, base = engine.world.plant, engine.world.robots["Bob"].base
+    engine.advance(0.5)
+    start = pose(engine)
+    velocities = plant.GetVelocities(engine.context)
+    velocities[base.floating_velocities_start_in_v() + 4] = 0.2
+    plant.SetVelocities(engine.context, velocities)
+    engine.advance(1.0)
+    assert abs(pose(engine)[1] - start[1]) < 0.02
+
+
+def test_the_lift_moves_up_and_down_at_its_speed(engine, fetch, lease):
+    """0.3 m at 0.1 m/s: 3 s."""
+    up = fetch.stand(TRAVELLING_M + 0.3, 0.0, until_s=10.0, lease=lease)
+    engine.advance(2.5)
+    assert fetch.command_status(up).state is CommandState.RUNNING
+    engine.advance(1.0)
+    assert fetch.command_status(up).state is CommandState.DONE
+    assert pose(engine)[3] == pytest.approx(TRAVELLING_M + 0.3, abs=0.01)
+    down = fetch.sit(until_s=10.0, lease=lease)
+    engine.advance(4.0)
+    assert fetch.command_status(down).state is CommandState.DONE
+    assert pose(engine)[3] == pytest.approx(0.377, abs=0.01)
+
+
+def test_the_lidar_stays_at_its_height_when_the_lift_goes_up(engine, fetch, lease):
+    fetch.stand(TRAVELLING_M + 0.2, 0.0, until_s=10.0, lease=lease)
+    engine.advance(3.0)
+    scan = fetch.scan()
+    assert scan.X_BL.translation()[2] + scan.X_OB.translation()[2] == pytest.approx(0.2878, abs=0.01)
+
+
+def test_a_pitch_is_refused(fetch, lease):
+    command = fetch.stand(0.5, 0.1, until_s=1.0, lease=lease)
+    assert fetch.command_status(command).state is CommandState.REFUSED
+
+
+def test_the_head_turns_to_where_it_is_told(engine, fetch, lease):
+    command = fetch.point_head(0.8, 0.4, until_s=5.0, lease=lease)
+    engine.advance(2.0)
+    assert fetch.command_status(command).state is CommandState.DONE
+    angles = fetch.joints().position_rad
+    assert (angles["head_pan"], angles["head_tilt"]) == pytest.approx((0.8, 0.4), abs=0.02)
+
+
+def test_a_head_that_cannot_turn_so_far_refuses(fetch, lease):
+    command = fetch.point_head(2.0, 0.0, until_s=5.0, lease=lease)
+    assert "pan 2.00 rad must lie in [-1.57, 1.57]" in fetch.command_status(command).reason
+
+
+def test_the_arm_follows_a_trajectory_to_its_end(engine, fetch, lease):
+    names = fetch.capabilities().arm.joint_names
+    start = np.array(fetch.capabilities().arm.stowed_rad)
+    goal = start + [-0.6, -0.5, 0.3, -0.3, 0.4, -0.4, 0.5]
+    command = fetch.move_arm(ArmTrajectory(np.array([0.0, 2.0]), np.array([start, goal])), until_s=10.0, lease=lease)
+    engine.advance(4.0)
+    assert fetch.command_status(command).state is CommandState.DONE
+    read = fetch.joints().position_rad
+    np.testing.assert_allclose([read[name] for name in names], goal, atol=0.03)
+
+
+def test_a_trajectory_that_is_too_fast_is_refused(fetch, lease):
+    """shoulder_pan turns at 1.256 rad/s at most."""
+    start = np.array(fetch.capabilities().arm.stowed_rad)
+    goal = start - [1.0, 0, 0, 0, 0, 0, 0]
+    path = ArmTrajectory(np.array([0.0, 0.5]), np.array([start, goal]))
+    command = fetch.move_arm(path, until_s=10.0, lease=lease)
+    assert "at most 1.3 is allowed" in fetch.command_status(command).reason
+
+
+def test_the_stowed_arm_stays_within_the_footprint(engine):
+    """The footprint's radius is 0.28 m."""
+    plant, bob = engine.world.plant, engine.world.robots["Bob"]
+    inspector = engine.world.scene_graph.model_inspector()
+    far_m = 0.0
+    for name in (*bob.kind.capabilities().arm.joint_names, "left_finger", "right_finger"):
+        link = plant.GetBodyByName(name, bob.instance)
+        X_BaseLink = plant.EvalBodyPoseInWorld(engine.context, bob.base).inverse() @ plant.EvalBodyPoseInWorld(
+            engine.context, link
+        )
+        for shape in plant.GetCollisionGeometriesForBody(link):
+            box = inspector.GetObbInGeometryFrame(shape)
+            signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1)
+            corners = X_BaseLink @ inspector.GetPoseInFrame(shape) @ box.pose() @ (signs.T * box.half_width()).T
+            far_m = max(far_m, float(np.hypot(corners[0], corners[1]).max()))
+    assert far_m < 0.29
+
+
+def test_a_second_holder_is_refused_until_it_takes_the_lease(engine, fetch, lease):
+    with pytest.raises(LeaseError, match="'test'"):
+        fetch.acquire_lease("other")
+    command = fetch.drive(0.5, 0.0, 0.0, until_s=5.0, lease=lease)
+    fetch.take_lease("other")
+    assert fetch.command_status(command).state is CommandState.STOPPED
+    refused = fetch.drive(0.5, 0.0, 0.0, until_s=5.0, lease=lease)
+    assert "no longer counts" in fetch.command_status(refused).reason
+
+
+def test_state_and_restore_go_on_as_if_nothing_had_been(floor):
+    """The same commands after a restore end at the same place as without one."""
+
+    def new():
+        world = build_diagram(directives=None, models=[floor], robots={"Bob": "fetch"}, render=False)
+        return Engine(world, {"Bob": Pose2D(0.5, 0.2, 0.0)}, seed=3)
+
+    first, second = new(), new()
+    lease = first.robots["Bob"].acquire_lease("test")
+    first.robots["Bob"].drive(0.4, 0.0, 0.3, until_s=1.0, lease=lease)
+    first.robots["Bob"].stand(0.5, 0.0, until_s=5.0, lease=lease)
+    first.advance(3.0)
+    second.go_on(first.state(), first.world_state())
+    first.advance(1.0)
+    second.advance(1.0)
+    np.testing.assert_allclose(pose(second), pose(first), atol=1e-3)
+    a, b = (engine.robots["Bob"].odometry().pose for engine in (first, second))
+    assert (a.x_m, a.y_m, a.yaw_rad) == pytest.approx((b.x_m, b.y_m, b.yaw_rad), abs=1e-3)
+
+
+@pytest.fixture
+def boxed(floor, tmp_path):
+    """A Fetch that looks at a box between its open fingers, held up by nothing until they close."""
+    path = tmp_path / "box.sdf"
+    path.write_text(BOX)
+    box = LooseModel("box", path, Pose2D(5.0, 5.0, 0.0).transform(0.06))
+    world = build_diagram(directives=None, models=[floor, box], robots={"Bob": "fetch"}, render=False)
+    return Engine(world, {"Bob": Pose2D(0.0, 0.0, 0.0)})
+
+
+def test_the_gripper_closes_on_a_box_and_carries_it(boxed):
+    """A box of 5 cm and 0.3 kg between the fingers stays there while the robot drives and turns."""
+    bob, plant = boxed.robots["Bob"], boxed.world.plant
+    lease = bob.acquire_lease("test")
+    start = np.array(bob.capabilities().arm.stowed_rad)
+    ahead = np.array([0.0, 0.3, 0.0, -0.3, 0.0, 0.0, 0.0])
+    bob.move_arm(ArmTrajectory(np.array([0.0, 4.0]), np.array([start, ahead])), until_s=10.0, lease=lease)
+    opened = bob.set_gripper(0.10, 30.0, until_s=10.0, lease=lease)
+    boxed.advance(5.0)
+    assert bob.command_status(opened).state is CommandState.DONE
+    assert bob.gripper().opening == pytest.approx(0.10, abs=0.004)
+    hand = boxed.world.robots["Bob"].hand
+    (index,) = plant.GetBodyIndices(boxed.world.models["box"])
+    box = plant.get_body(index)
+    closed = bob.set_gripper(0.0, 40.0, until_s=boxed.now() + 5.0, lease=lease)
+    while bob.gripper().opening > 0.052:
+        p_W = plant.EvalBodyPoseInWorld(boxed.context, hand) @ np.array([0.1665, 0.0, 0.0])
+        plant.SetFreeBodyPose(boxed.context, box, Pose2D(p_W[0], p_W[1], 0.0).transform(p_W[2]))
+        plant.SetFreeBodySpatialVelocity(context=boxed.context, body=box, V_JpJc=SpatialVelocity.Zero())
+        boxed.advance(0.025)
+    for _ in range(10):
+        boxed.advance(0.1)
+    assert bob.command_status(closed).state is CommandState.DONE
+    assert bob.gripper().holding
+    assert bob.gripper().opening == pytest.approx(0.05, abs=0.004)
+    assert bob.gripper().force_n == pytest.approx(40.0, abs=8.0)
+    X_HO = plant.EvalBodyPoseInWorld(boxed.context, hand).inverse() @ plant.EvalBodyPoseInWorld(boxed.context, box)
+    for _ in range(80):
+        bob.drive(0.5, 0.0, 0.5, until_s=boxed.now() + 0.3, lease=lease)
+        boxed.advance(0.1)
+    now = plant.EvalBodyPoseInWorld(boxed.context, hand).inverse() @ plant.EvalBodyPoseInWorld(boxed.context, box)
+    np.testing.assert_allclose(now.translation(), X_HO.translation(), atol=0.01)

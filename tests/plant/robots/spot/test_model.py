@@ -1,0 +1,44 @@
+from plant.robots.spot.model import simplified_obj
+
+# A square of two triangles with an edge of 1 m, and a sliver of a tenth of a millimetre at its corner.
+SOUP = """mtllib material.mtl
+usemtl material_0
+v 0 0 0
+v 1 0 0
+v 0 1 0
+v 1 0 0
+v 1 1 0
+v 0 1 0.00001
+v 0.0001 0 0
+vn 0 0 1
+vt 0 0
+f 1/1/1 2/1/1 3/1/1
+f 4/1/1 5/1/1 6/1/1
+f 1/1/1 7/1/1 3/1/1
+"""
+
+
+def rows(kind: str) -> list[list[str]]:
+    lines = (line.split() for line in simplified_obj(SOUP, cell_m=0.01).splitlines())
+    return [line[1:] for line in lines if line[0] == kind]
+
+
+def test_vertices_of_one_cell_are_joined_and_faces_share_them():
+    first, second = ({int(corner.split("//")[0]) for corner in face} for face in rows("f"))
+    assert len(rows("v")) == 4
+    assert len(first & second) == 2
+
+
+def test_a_face_whose_corners_fall_together_vanishes():
+    assert len(rows("f")) == 2
+
+
+def test_normals_stay_with_their_faces():
+    normals = rows("vn")
+    for face in rows("f"):
+        for corner in face:
+            assert [float(value) for value in normals[int(corner.split("//")[1]) - 1]] == [0.0, 0.0, 1.0]
+
+
+def test_material_files_are_not_named():
+    assert "mtl" not in simplified_obj(SOUP)

@@ -1,0 +1,49 @@
+"""Spot's own legs, without the floating base."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from plant.diagram import LooseModel, build_diagram
+from plant.engine import Engine
+from plant.robots.spot.description import spot_facts
+from skills.robot import Pose2D
+
+FLOOR = """<sdf version="1.9"><model name="ground"><link name="ground"><collision name="ground">
+<geometry><box><size>4 4 0.2</size></box></geometry></collision></link></model></sdf>"""
+
+
+@pytest.fixture
+def free_spot(tmp_path):
+    path = tmp_path / "ground.sdf"
+    path.write_text(FLOOR)
+    ground = LooseModel("ground", path, RigidTransform([0, 0, -0.1]), fixed=True)
+    world = build_diagram(
+        directives=None, models=[ground], robots={"Alice": "spot"}, carried=False, visuals=False, render=False
+    )
+    return Engine(world, {"Alice": Pose2D(0, 0, 0)})
+
+
+def test_free_spot_stands_on_its_own_feet(free_spot):
+    robot = free_spot.world.robots["Alice"]
+    free_spot.advance(1.0)
+    before = free_spot.world.plant.EvalBodyPoseInWorld(free_spot.context, robot.body)
+    free_spot.advance(4.0)
+    after = free_spot.world.plant.EvalBodyPoseInWorld(free_spot.context, robot.body)
+    assert after.translation()[2] == pytest.approx(0.52, abs=0.05)
+    assert np.linalg.norm(after.translation() - before.translation()) < 0.005
+    assert after.rotation().matrix()[2, 2] > 0.995
+
+
+def test_model_has_the_makers_masses_and_effort_limits(free_spot):
+    plant, facts = free_spot.world.plant, spot_facts()
+    robot = free_spot.world.robots["Alice"]
+    legs = sum(facts["legs"][part]["mass"] for part in ("hip", "upper_leg", "lower_leg"))
+    expected = facts["body"]["mass"] + 4 * legs + sum(part["mass"] for part in facts["arm"]) + facts["lidar"]["mass"]
+    assert plant.CalcTotalMass(free_spot.context, [robot.instance]) == pytest.approx(expected)
+    efforts = {
+        plant.get_joint_actuator(i).name(): plant.get_joint_actuator(i).effort_limit()
+        for i in plant.GetJointActuatorIndices(robot.instance)
+    }
+    assert len(efforts) == 19
+    assert efforts["fl_kn"] == 115 and efforts["arm_sh1"] == 181.8 and efforts["arm_f1x"] == 15.32

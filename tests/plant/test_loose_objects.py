@@ -1,0 +1,242 @@
+"""Objects at rest sleep, and wake for whatever may move them."""
+
+import itertools
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialVelocity
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import PrismaticJoint, RevoluteJoint, SpatialInertia
+from pydrake.systems.analysis import Simulator
+
+from plant.diagram import LooseModel, build_diagram
+from plant.engine import Engine
+from plant.loose_objects import FASTEST_SPIN_RAD_S, Carried, arc_m
+from plant.models.catalogue import load_catalogue
+from skills.robot import Pose2D
+
+SHELF = """<sdf version="1.9"><model name="shelf"><static>false</static><link name="shelf">
+<collision name="top"><pose>0 0 -0.5 0 0 0</pose><geometry><box><size>8 8 1</size></box></geometry></collision>
+</link></model></sdf>"""
+CORNERS = "".join(
+    f'<collision name="corner{i}"><pose>{x} {y} {z} 0 0 0</pose>'
+    "<geometry><sphere><radius>0.01</radius></sphere></geometry></collision>"
+    for i, (x, y, z) in enumerate(itertools.product((-0.04, 0.04), repeat=3))
+)
+BLOCK = f"""<sdf version="1.9"><model name="block"><link name="block">
+<inertial><mass>0.5</mass><inertia><ixx>0.001</ixx><iyy>0.001</iyy><izz>0.001</izz></inertia></inertial>
+<collision name="box"><geometry><box><size>0.09 0.09 0.09</size></box></geometry></collision>{CORNERS}
+</link></model></sdf>"""
+FLOOR = """directives:
+- add_model: {name: floor, file: "%s"}
+- add_weld: {parent: world, child: "floor::shelf"}
+"""
+
+
+@pytest.fixture
+def stage(tmp_path):
+    """A function from blocks' places to an engine in which they have come to rest on the floor."""
+    (tmp_path / "floor.sdf").write_text(SHELF)
+    (tmp_path / "block.sdf").write_text(BLOCK)
+    (tmp_path / "world.dmd.yaml").write_text(FLOOR % (tmp_path / "floor.sdf").as_uri())
+
+    def make(seconds=1.5, robots=None, **places_W):
+        models = [LooseModel(name, tmp_path / "block.sdf", RigidTransform(p_W)) for name, p_W in places_W.items()]
+        built = build_diagram(
+            directives=tmp_path / "world.dmd.yaml",
+            models=models,
+            robots=dict.fromkeys(robots or {}, "spot"),
+            visuals=False,
+            render=False,
+        )
+        engine = Engine(built, robots or {})
+        engine.advance(seconds)
+        return engine
+
+    return make
+
+
+def body(engine, name):
+    plant = engine.world.plant
+    return plant.get_body(plant.GetBodyIndices(engine.world.models[name])[0])
+
+
+def place(engine, name):
+    return engine.world.plant.EvalBodyPoseInWorld(engine.context, body(engine, name)).translation()
+
+
+def put(engine, name, p_W, v_W=(0.0, 0.0, 0.0)):
+    plant = engine.world.plant
+    plant.SetFloatingBaseBodyPoseInWorldFrame(engine.context, body(engine, name), RigidTransform(p_W))
+    plant.SetFreeBodySpatialVelocity(
+        context=engine.context, body=body(engine, name), V_JpJc=SpatialVelocity([0, 0, 0], v_W)
+    )
+
+
+def test_objects_at_rest_sleep_and_stay_where_they_are(stage):
+    engine = stage(one=(0, 0, 0.051), two=(1, 0, 0.051))
+    assert engine.asleep == {"one", "two"}
+    before = place(engine, "one").copy()
+    engine.advance(1.0)
+    np.testing.assert_allclose(place(engine, "one"), before, rtol=0, atol=1e-9)
+    assert before[2] == pytest.approx(0.05, abs=1e-3)
+
+
+def test_what_falls_is_awake_until_it_lies(stage):
+    engine = stage(0.3, one=(0, 0, 1.0))
+    assert engine.asleep == frozenset()
+    engine.advance(2.0)
+    assert engine.asleep == {"one"}
+    assert place(engine, "one")[2] == pytest.approx(0.05, abs=2e-3)
+
+
+def test_what_lies_on_an_object_that_is_taken_away_falls(stage):
+    engine = stage(under=(0, 0, 0.051), top=(0, 0, 0.152))
+    assert engine.asleep == {"under", "top"}
+    put(engine, "under", (3.0, 0.0, 0.05))
+    engine.advance(0.1)
+    assert "top" not in engine.asleep
+    engine.advance(1.5)
+    assert place(engine, "top")[2] == pytest.approx(0.05, abs=2e-3)
+    assert engine.asleep == {"under", "top"}
+
+
+def test_a_sleeping_object_that_is_hit_by_another_wakes_and_moves(stage):
+    engine = stage(one=(0, 0, 0.051), two=(1, 0, 0.051))
+    put(engine, "one", (0.01, 0.0, 0.05))
+    engine.advance(0.05)
+    assert engine.asleep == {"two"}
+    put(engine, "one", (0.6, 0.0, 0.05), v_W=(3.0, 0.0, 0.0))
+    rest, moved_m = place(engine, "two"), []
+    for _ in range(40):
+        engine.advance(0.01)
+        moved_m.append(np.linalg.norm(place(engine, "two") - rest))
+    assert max(moved_m) > 1e-3
+    assert engine.asleep == frozenset()
+
+
+def test_a_robot_that_walks_into_a_sleeping_object_pushes_it(stage):
+    engine = stage(robots={"Alice": Pose2D(0.0, 0.0, 0.0)}, box=(1.6, 0.17, 0.051))
+    assert engine.asleep == {"box"}
+    robot = engine.robots["Alice"]
+    robot.drive(0.5, 0.0, 0.0, until_s=engine.now() + 4.0, lease=robot.acquire_lease("test"))
+    engine.advance(4.0)
+    assert place(engine, "box")[0] > 1.7
+    assert "box" not in engine.asleep
+
+
+def test_the_same_run_twice_sleeps_and_moves_alike(stage):
+    ends = []
+    for _ in range(2):
+        engine = stage(one=(0, 0, 0.4), two=(0.05, 0.02, 0.9), three=(1, 0, 0.051))
+        ends.append((engine.asleep, place(engine, "one"), place(engine, "two")))
+    assert ends[0][0] == ends[1][0] == {"one", "three"}
+    np.testing.assert_array_equal(ends[0][1:], ends[1][1:])
+
+
+DT_S, TURN_RAD_S, REACH_M = 0.0125, 0.75, 0.9
+
+
+@pytest.fixture
+def scene():
+    """A hand that slides along y and turns about z, and a free object."""
+    plant = MultibodyPlant(DT_S)
+    slide, hand, thing = (
+        plant.AddRigidBody(name, SpatialInertia.SolidSphereWithMass(1.0, 0.1)) for name in ("slide", "hand", "thing")
+    )
+    plant.AddJoint(PrismaticJoint("along", plant.world_frame(), slide.body_frame(), [0.0, 1.0, 0.0]))
+    plant.AddJoint(RevoluteJoint("turn", slide.body_frame(), hand.body_frame(), [0.0, 0.0, 1.0]))
+    plant.Finalize()
+    return plant, plant.CreateDefaultContext(), hand, thing
+
+
+def _move(plant, context, along_m_s, turn_rad_s):
+    plant.GetJointByName("along").set_translation_rate(context, along_m_s)
+    plant.GetJointByName("turn").set_angular_rate(context, turn_rad_s)
+
+
+def _set(plant, context, body, p_W, w_W, v_W):
+    plant.SetFreeBodyPose(context, body, RigidTransform(p_W))
+    plant.SetFreeBodySpatialVelocity(context, body, SpatialVelocity(w=w_W, v=v_W))
+
+
+BENT_MM = 1e3 * 0.5 * DT_S**2 * TURN_RAD_S**2 * REACH_M
+
+
+# where the object is, how fast it moves, how fast the hand slides -> how far it is moved (mm)
+@pytest.mark.parametrize(
+    ("p_W", "v_W", "along_m_s", "moved_mm"),
+    [
+        ([0.4, 0.0, 0.2], [0.0, TURN_RAD_S * 0.4, 0.0], 0.0, BENT_MM * 0.4 / REACH_M),
+        ([0.4, 0.0, 0.2], [0.0, TURN_RAD_S * 0.4 + 1.0, 0.0], 1.0, BENT_MM * 0.4 / REACH_M),  # sliding bends nothing
+        ([0.0, 0.0, 0.2], [0.0, 1.0, 0.0], 1.0, 0.0),  # on the axis of a wrist that turns
+        ([0.4, 0.0, 0.2], [0.0, 0.0, -1.0], 0.0, 0.0),  # falls past the hand
+        ([2.0, 0.0, 0.2], [0.0, TURN_RAD_S * 2.0, 0.0], 0.0, 0.0),  # far from the hand
+    ],
+)
+def test_what_moves_with_the_hand_is_moved_towards_the_axis_about_which_it_turns(scene, p_W, v_W, along_m_s, moved_mm):
+    plant, context, hand, thing = scene
+    _move(plant, context, along_m_s, TURN_RAD_S)
+    _set(plant, context, thing, p_W, [0.0, 0.0, TURN_RAD_S], v_W)
+    Carried(plant, context, [thing]).after_step(hand, DT_S)
+    moved = plant.EvalBodyPoseInWorld(context, thing).translation() - p_W
+    assert np.allclose(1e3 * moved, [-moved_mm, 0.0, 0.0], atol=1e-9)
+
+
+def test_steps_along_tangents_with_the_arc_stay_on_the_circle():
+    p_m, turn = np.array([REACH_M, 0.0, 0.0]), np.array([0.0, 0.0, TURN_RAD_S])
+    tangents_m = p_m.copy()
+    for _ in range(round(8.0 / DT_S)):
+        v, along = np.cross(turn, p_m), np.cross(turn, tangents_m)
+        p_m, tangents_m = p_m + DT_S * v + arc_m(np.cross(turn, v), DT_S), tangents_m + DT_S * along
+    assert np.linalg.norm(p_m) == pytest.approx(REACH_M, abs=1e-4)
+    assert np.linalg.norm(tangents_m) > REACH_M + 0.015
+
+
+def _spinning_bar(limited):
+    """The spin (rad/s) of a flat bar of 150 g, thrown into the air with a spin, after two seconds."""
+    plant = MultibodyPlant(DT_S)
+    bar = plant.AddRigidBody("bar", SpatialInertia.SolidBoxWithMass(0.15, 0.26, 0.03, 0.01))
+    plant.Finalize()
+    simulator = Simulator(plant)
+    context = simulator.get_mutable_context()
+    _set(plant, context, bar, np.zeros(3), [30.0, 3.0, 35.0], np.zeros(3))
+    carried = Carried(plant, context, [bar])
+    for step in range(160):
+        simulator.AdvanceTo((step + 1) * DT_S)
+        if limited:
+            carried.limit_spin()
+    return float(np.linalg.norm(plant.EvalBodySpatialVelocityInWorld(context, bar).rotational()))
+
+
+def test_a_bar_that_spins_as_it_flies_spins_no_faster_with_time():
+    assert _spinning_bar(limited=True) < 2.0 * FASTEST_SPIN_RAD_S
+    assert not _spinning_bar(limited=False) < 1000.0
+
+
+TABLE = """<sdf version="1.7"><model name="table"><link name="table"><collision name="table"><pose>0 0 -0.1 0 0 0</pose>
+<geometry><box><size>4 4 0.2</size></box></geometry></collision></link></model></sdf>"""
+
+
+@pytest.mark.parametrize("steps_before", [1, 2, 3, 4])
+def test_a_can_that_is_wrung_out_of_the_fingers_over_a_table_is_not_hurled_away(tmp_path, steps_before):
+    """It spins at 600 rad/s, 1 mm over a table: it falls over there, wherever in the engine's periods that happens."""
+    path = tmp_path / "table.sdf"
+    path.write_text(TABLE)
+    (can,) = list(load_catalogue()["coke"].forms.values())[:1]
+    models = [
+        LooseModel("table", path, RigidTransform(), fixed=True),
+        LooseModel("can", can.path(), RigidTransform([0.0, 0.0, 0.5])),
+    ]
+    engine = Engine(build_diagram(directives=None, models=models, robots={}, render=False), {})
+    plant, context = engine.world.plant, engine.context
+    body = plant.GetBodyByName("coke", engine.world.models["can"])
+    engine.advance(steps_before * DT_S)
+    _set(plant, context, body, [0.0, 0.0, can.rest_height_m + 0.001], [600.0, 0.0, 0.0], np.zeros(3))
+    fastest_m_s = 0.0
+    for _ in range(40):
+        engine.advance(DT_S)
+        velocity = plant.EvalBodySpatialVelocityInWorld(context, body).translational()
+        fastest_m_s = max(fastest_m_s, float(np.linalg.norm(velocity)))
+    assert fastest_m_s < 2.0

@@ -37,13 +37,13 @@ from skills.world_model import LeavesOthersOut as LeavesOthersOut
 from skills.world_model import LocalisationEstimate as LocalisationEstimate
 from skills.world_model import Localiser as Localiser
 from skills.world_model import NoWorkCounter as NoWorkCounter
+from skills.world_model import ObjectKind as ObjectKind
 from skills.world_model import ObjectObservation as ObjectObservation
 from skills.world_model import ParticleView as ParticleView
 from skills.world_model import PlanningError as PlanningError
 from skills.world_model import ReturnsView as ReturnsView
 from skills.world_model import SearchingLocaliser as SearchingLocaliser
 from skills.world_model import Surface as Surface
-from skills.world_model import Thing as Thing
 from skills.world_model import WorkCounter as WorkCounter
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ class Payload:
 
     corners_H: NDArray[np.float64] | None = None
     R_BH: RotationMatrix | None = None
-    thing: Thing | None = None
+    kind: ObjectKind | None = None
     offered: bool = False
 
 

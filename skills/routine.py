@@ -294,7 +294,7 @@ class RoutineSkill(Skill[InputsT]):
         """Gives the gripper its command, and do not wait for it."""
         context = self.context
         if opening > context.robot.gripper().opening:
-            context.payload.corners_H = context.payload.R_BH = context.payload.thing = None
+            context.payload.corners_H = context.payload.R_BH = context.payload.kind = None
         until_s = context.clock.now() + GRIPPER_EXPIRY_S
         return context.robot.set_gripper(opening, force_n, until_s=until_s, lease=context.lease)
 

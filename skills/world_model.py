@@ -28,8 +28,8 @@ class PlanningError(Exception):
 
 
 @dataclass(frozen=True)
-class Thing:
-    """A kind of object, perhaps with attributes: "red wrench" is Thing("wrench", ("red",))."""
+class ObjectKind:
+    """A kind of object, perhaps with attributes: "red wrench" is ObjectKind("wrench", ("red",))."""
 
     name: str
     attributes: tuple[str, ...] = ()
@@ -60,7 +60,7 @@ class ObjectObservation:
     """
 
     stamp_s: Delay
-    thing: Thing
+    kind: ObjectKind
     position_W: tuple[Coordinate, Coordinate, Height]
     size_m: tuple[Margin, Margin, Margin]
     yaw_rad: Angle

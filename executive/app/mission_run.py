@@ -156,7 +156,7 @@ def spoken_classes(prepared: Prepared) -> frozenset[str]:
     """The classes of the objects that a mission speaks of; clutter is of none of them."""
     named = {each.name for command in prepared.tree.commands for each in (command.item, command.object) if each}
     known = prepared.knowledge
-    return frozenset(one for name in named for one in known.classes(known.thing(name) or name))
+    return frozenset(one for name in named for one in known.classes(known.object_name(name) or name))
 
 
 def log_map(log: EventLog, world: World, knowledge: Knowledge) -> None:

@@ -317,4 +317,4 @@ def _object(seen: ObjectObservation, knowledge: Knowledge) -> ReportedObject:
     x_m, y_m, _ = seen.position_W
     rooms = (name for name, room in knowledge.places.items() if inside(room.polygon, (x_m, y_m)))
     place = knowledge.room(seen.surface) if seen.surface in knowledge.surfaces else next(rooms, None)
-    return ReportedObject(str(seen.thing), seen.surface, place, seen.position_W, seen.stamp_s)
+    return ReportedObject(str(seen.kind), seen.surface, place, seen.position_W, seen.stamp_s)

@@ -277,7 +277,7 @@ class _Events:
             self.doors.append({"name": name, "at": door.at, "width": door.width, **times})
 
     def _move(self, event: EventFile, said: str, path: KeyPath) -> None:
-        classes = self._knowledge.classes(self._knowledge.thing(said) or said)
+        classes = self._knowledge.classes(self._knowledge.object_name(said) or said)
         named = [name for name in self._objects if name.lower() == said.lower()]
         of_class = [name for name, kind in self._objects.items() if kind in classes]
         if not named and not of_class:

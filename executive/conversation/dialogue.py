@@ -44,7 +44,7 @@ from executive.tree.compiler import CompiledTree
 from executive.words.command import Command, Task
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.step import Step
-from skills.api import Thing
+from skills.api import ObjectKind
 from skills.files.errors import InputError
 
 REMEMBERED_S: Final = 60.0
@@ -277,7 +277,7 @@ class Conversation(RunVisitor):
             return None
         bare = re.sub(r"^(?:the|a|an|my|some)\s+", "", said, flags=re.IGNORECASE)
         knowledge = self._speech.knowledge
-        return knowledge.thing(bare) or knowledge.place(bare) or knowledge.person(bare)
+        return knowledge.object_name(bare) or knowledge.place(bare) or knowledge.person(bare)
 
     # -- missions ----------------------------------------------------------------------------------------------------
 
@@ -336,7 +336,7 @@ class Conversation(RunVisitor):
         last = () if self._last is None else self._last.commands
         return bool({c.object or c.item for c in commands} & {c.object or c.item for c in last} - {None})
 
-    def _held(self) -> Thing | None:
+    def _held(self) -> ObjectKind | None:
         """The object in the gripper, as far as the last request says."""
         status = None if self._progress is None else self._progress.robots.get(self._speech.robot_name)
         missions = self._control.state.missions.get(self._speech.robot_name, ())

@@ -14,7 +14,7 @@ from typing import Final
 from executive.language.lexicon import Patterns, read_table
 from executive.words.command import Command, Task
 from executive.words.knowledge import Knowledge
-from skills.api import Thing
+from skills.api import ObjectKind
 
 
 class FollowUpKind(enum.Enum):
@@ -47,7 +47,7 @@ class Amendment:
     `source` says that the place is where the thing is; `old` is the name that it takes the place of, where said.
     """
 
-    thing: Thing | None = None
+    thing: ObjectKind | None = None
     count: int | None = None
     goal: str | None = None
     goal_at: str | None = None
@@ -86,7 +86,7 @@ def amended(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) ->
     )
 
 
-def without_fetching(commands: Sequence[Command], held: Thing | None, knowledge: Knowledge) -> tuple[Command, ...]:
+def without_fetching(commands: Sequence[Command], held: ObjectKind | None, knowledge: Knowledge) -> tuple[Command, ...]:
     """What is left to do when the robot holds something already.
 
     The same thing is not gone for again; another one is put down first, in the place where such things usually are.

@@ -22,7 +22,7 @@ from executive.language.spelling import look_alikes, synonyms_of, words_for
 from executive.language.tokens import Token
 from executive.words.command import Command, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
-from skills.api import Thing
+from skills.api import ObjectKind
 from skills.files.errors import known_names, listing
 
 
@@ -30,7 +30,9 @@ def known_line(knowledge: Knowledge | None) -> str:
     """What can be asked for and where one can be sent, in one line."""
     if knowledge is None:
         return ABLE
-    return f"{ABLE}; known things: {listing(knowledge.thing_names())}; known places: {listing(knowledge.place_names())}"
+    return (
+        f"{ABLE}; known things: {listing(knowledge.object_names())}; known places: {listing(knowledge.place_names())}"
+    )
 
 
 def ground(
@@ -55,7 +57,7 @@ def check_unwanted(unwanted: Sequence[Phrase], commands: Sequence[Command], know
     Raises RefusalError.
     """
     for phrase in unwanted:
-        names = filter(None, (knowledge.thing(form) for _, form in _readings(phrase)))
+        names = filter(None, (knowledge.object_name(form) for _, form in _readings(phrase)))
         kinds = {kind for name in names for kind in knowledge.classes(name)}
         things = (thing for command in commands for thing in (command.object, command.item) if thing is not None)
         if any(not thing.attributes and kinds & {*knowledge.classes(thing.name)} for thing in things):
@@ -92,7 +94,7 @@ class _Grounder:
         item = None if frame.item is None else self.taken(frame.item)
         target = None if frame.object is None else self.target(frame.object, frame.task)
         if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
-            raise RefusalError(f"which object? Known are {listing(self.knowledge.thing_names())}", [target.name])
+            raise RefusalError(f"which object? Known are {listing(self.knowledge.object_names())}", [target.name])
         people = target is not None and frame.task is Task.FIND and self.knowledge.somebody(target.name) is not None
         goal, goal_at = (None, None) if frame.goal is None else self._kept_goal(frame, frame.goal, people)
         if goal is None and target is not None and target.name == EVERYTHING:
@@ -110,15 +112,15 @@ class _Grounder:
             verb=frame.verb,
         )
 
-    def target(self, phrase: Phrase, task: Task | None) -> Thing:
+    def target(self, phrase: Phrase, task: Task | None) -> ObjectKind:
         """What a task is done to: a known thing, or a time."""
         if task is Task.WAIT:
-            return Thing(phrase.head.lemma)
+            return ObjectKind(phrase.head.lemma)
         if task is not Task.FIND:
             return self.taken(phrase)
-        return self.thing(phrase) if (person := self._sought(phrase)) is None else Thing(person)
+        return self.thing(phrase) if (person := self._sought(phrase)) is None else ObjectKind(person)
 
-    def taken(self, phrase: Phrase) -> Thing:
+    def taken(self, phrase: Phrase) -> ObjectKind:
         """The known thing or category; "all the things", whatever they are, is everything."""
         thing = self.thing(phrase)
         return replace(thing, name=EVERYTHING) if thing.name == ANYTHING and phrase.count == 0 else thing
@@ -139,7 +141,7 @@ class _Grounder:
         if phrase.named_person:
             raise self._unknown(Slot.PERSON, (phrase.text,), self._known(self.knowledge.people))
         somebody = phrase.person or phrase.stands_for_somebody or phrase.head.word in lexicon().anyone
-        if somebody and self.knowledge.thing(phrase.text) is None:
+        if somebody and self.knowledge.object_name(phrase.text) is None:
             what = f"I see whether anybody is there, but not whether it is {phrase.spoken!r}"
             raise RefusalError(what, [phrase.text])
         return None
@@ -164,18 +166,18 @@ class _Grounder:
         check_relation(act, [kind for kind, fits in zip(_KINDS, own, strict=True) if fits][:1], location)
         return goal, goal_at
 
-    def thing(self, phrase: Phrase) -> Thing:
+    def thing(self, phrase: Phrase) -> ObjectKind:
         """The known thing or category, with the adjectives before it."""
-        known = self._known(self.knowledge.thing_names())
+        known = self._known(self.knowledge.object_names())
         for attributes, form in _readings(phrase):
-            if (name := self.knowledge.thing(form)) is not None:
-                return Thing(name, attributes)
+            if (name := self.knowledge.object_name(form)) is not None:
+                return ObjectKind(name, attributes)
             if candidates := synonyms_of(form, known):
-                return Thing(self._only(candidates, Slot.THING, form), attributes)
+                return ObjectKind(self._only(candidates, Slot.THING, form), attributes)
         for attributes, form in _readings(phrase):  # "bottle" for "water bottle"
             ending = (name for spelling, name in known.items() if spelling.endswith(f" {form.lower()}"))
             if candidates := tuple(dict.fromkeys(ending)):
-                return Thing(self._only(candidates, Slot.THING, form), attributes)
+                return ObjectKind(self._only(candidates, Slot.THING, form), attributes)
         raise self._unknown(Slot.THING, (phrase.text, phrase.singular), known)
 
     def place(self, location: Location) -> str:
@@ -276,7 +278,7 @@ class _Grounder:
         return RefusalError(f"I know no {slot.value} {heard!r}; {known_names(heard, known.values())}", [heard])
 
 
-def _count(phrase: Phrase | None, thing: Thing | None) -> int:
+def _count(phrase: Phrase | None, thing: ObjectKind | None) -> int:
     """How many are meant; everything is one thing to take."""
     return 1 if phrase is None or thing is None or thing.name == EVERYTHING else phrase.count
 

@@ -11,7 +11,7 @@ from typing import Final
 from executive.language.lexicon import lexicon
 from executive.language.nouns import NounKind
 from executive.language.tokens import Token
-from skills.api import Thing
+from skills.api import ObjectKind
 
 _LEFT: Final = frozenset(
     {"det", "amod", "compound", "nummod", "poss", "nmod", "predet", "quantmod", "advmod", "case", "npadvmod", "punct"}
@@ -53,13 +53,13 @@ class Phrase:
         return _joined_text((*left, head.lemma, *self.extra))
 
     @property
-    def thing(self) -> Thing:
+    def thing(self) -> ObjectKind:
         """The phrase as a thing: leading adjectives are attributes."""
         words = self.content
         leads = (n for n, t in enumerate(words[:-1]) if not t.adjective)
         first = next(leads, len(words) - 1)
         name = _joined_text((*words[first:], *self.extra))
-        return Thing(name, tuple(t.text for t in words[:first]))
+        return ObjectKind(name, tuple(t.text for t in words[:first]))
 
     @property
     def plural(self) -> bool:

@@ -247,7 +247,7 @@ def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -
     A word is misspelled when it is no English word; the name must be within one slip, or two for long names. Names
     that are written together or apart ("night stand", "nightstand") are the same.
     """
-    own = [*knowledge.thing_names(), *knowledge.place_names(), *knowledge.people]
+    own = [*knowledge.object_names(), *knowledge.place_names(), *knowledge.people]
     known = _known(knowledge.spellings(own))
     words = list(_WORD.finditer(text))[:_MOST_WORDS]
     pieces, notes, end, at = [], [], 0, 0

@@ -7,22 +7,22 @@ from typing import Final
 
 from executive.words.command import Command, Task
 from executive.words.knowledge import Knowledge
-from skills.api import Thing
+from skills.api import ObjectKind
 
 
 @dataclass(frozen=True)
 class InGripper:
-    """What is held; `thing` is None where only that something is held is known; not even that unless `sure`.
+    """What is held; `item` is None where only that something is held is known; not even that unless `sure`.
 
     `perhaps` are the things of which one may be held, where they are known.
     """
 
-    thing: Thing | None = None
+    kind: ObjectKind | None = None
     sure: bool = True
-    perhaps: tuple[Thing, ...] = ()
+    perhaps: tuple[ObjectKind, ...] = ()
 
     def __str__(self) -> str:
-        return "an object" if self.thing is None else f"the {self.thing}"
+        return "an object" if self.kind is None else f"the {self.kind}"
 
 
 UNNAMED: Final = InGripper()
@@ -32,12 +32,12 @@ UNSURE: Final = InGripper(sure=False)
 
 def either(*held: InGripper | None) -> InGripper:
     """What is held where nobody knows which of these it is, nor whether it is anything."""
-    things: list[Thing] = []
+    kinds: list[ObjectKind] = []
     for each in held:
-        if each is not None and each.thing is None and not each.perhaps:
+        if each is not None and each.kind is None and not each.perhaps:
             return UNSURE
-        things += () if each is None else each.perhaps or filter(None, (each.thing,))
-    return InGripper(sure=False, perhaps=tuple(dict.fromkeys(things)))
+        kinds += () if each is None else each.perhaps or filter(None, (each.kind,))
+    return InGripper(sure=False, perhaps=tuple(dict.fromkeys(kinds)))
 
 
 def after_command(command: Command, held: InGripper | None, knowledge: Knowledge) -> InGripper | None:
@@ -47,11 +47,11 @@ def after_command(command: Command, held: InGripper | None, knowledge: Knowledge
     return held if _carried(command) is None else None
 
 
-def is_same(held: InGripper | None, thing: Thing | None, knowledge: Knowledge) -> bool:
-    """Returns whether what is held, or whatever of several it is, is what `thing` asks for."""
+def is_same(held: InGripper | None, item: ObjectKind | None, knowledge: Knowledge) -> bool:
+    """Returns whether what is held, or whatever of several it is, is what `item` asks for."""
     if held is None:
         return False
-    return all(_fits(one, thing, knowledge) for one in map(InGripper, held.perhaps or (held.thing,)))
+    return all(_fits(one, item, knowledge) for one in map(InGripper, held.perhaps or (held.kind,)))
 
 
 def objection(command: Command, held: InGripper | None, knowledge: Knowledge) -> tuple[str, str] | None:
@@ -75,14 +75,14 @@ def cannot_take(held: InGripper, what: str) -> tuple[str, str]:
     return f"{what} cannot be grasped: the gripper holds {held} then", f"put {held} down before"
 
 
-def _carried(command: Command) -> Thing | None:
+def _carried(command: Command) -> ObjectKind | None:
     """What a command carries."""
     return command.object if command.task is Task.PLACE and command.item is None else command.item
 
 
-def _fits(held: InGripper, thing: Thing | None, knowledge: Knowledge) -> bool:
-    """Returns whether what is held is surely what `thing` names; an object that is not known may be anything."""
-    if held.thing is None or thing is None:
+def _fits(held: InGripper, item: ObjectKind | None, knowledge: Knowledge) -> bool:
+    """Returns whether what is held is surely what `item` names; an object that is not known may be anything."""
+    if held.kind is None or item is None:
         return True
-    of_held, asked = (set(knowledge.classes(knowledge.thing(one.name) or one.name)) for one in (held.thing, thing))
-    return of_held <= asked and set(thing.attributes) <= set(held.thing.attributes)
+    of_held, asked = (set(knowledge.classes(knowledge.object_name(one.name) or one.name)) for one in (held.kind, item))
+    return of_held <= asked and set(item.attributes) <= set(held.kind.attributes)

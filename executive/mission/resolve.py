@@ -25,7 +25,7 @@ from executive.words.mission import Mission, Parameter, QuestionPolicy
 from executive.words.policy import Policy
 from executive.words.step import Step
 from executive.words.steps import ForEach, Group, Steps
-from skills.api import Thing
+from skills.api import ObjectKind
 from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.files.outside import is_file
 from skills.files.schema import validate
@@ -334,7 +334,7 @@ class _Resolver:
         """Refuses a parameter that names no place, object or person of the world."""
         known = {
             "place": (self.knowledge.place, self.knowledge.place_names()),
-            "object": (self.knowledge.thing, self.knowledge.thing_names()),
+            "object": (self.knowledge.object_name, self.knowledge.object_names()),
             "person": (self.knowledge.person, tuple(self.knowledge.people)),
         }
         if parameter.type in known:
@@ -413,10 +413,10 @@ def _unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str
         return f"unknown {kind} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
 
     waits = command.task is Task.WAIT and command.object is not None and command.object.name in TIME_UNITS_S
-    for key, thing in (("take", command.item), ("object", None if waits else command.object)):
-        person = command.task is Task.FIND and thing is not None and knowledge.somebody(thing.name) is not None
-        if thing is not None and knowledge.thing(thing.name) is None and not person:
-            yield key, *unknown("object", thing.name, knowledge.thing_names())
+    for key, item in (("take", command.item), ("object", None if waits else command.object)):
+        person = command.task is Task.FIND and item is not None and knowledge.somebody(item.name) is not None
+        if item is not None and knowledge.object_name(item.name) is None and not person:
+            yield key, *unknown("object", item.name, knowledge.object_names())
     goals = (*knowledge.place_names(), *knowledge.people, START)
     if command.goal is not None and _goal(command.goal, knowledge) is None:
         yield "to", *unknown("place or person", command.goal, goals)
@@ -427,9 +427,9 @@ def _unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str
 def _in_world_names(command: Command, knowledge: Knowledge) -> Command:
     """The command in the world's own names."""
 
-    def named(thing: Thing | None) -> Thing | None:
-        known = thing and (knowledge.thing(thing.name) or knowledge.somebody(thing.name))
-        return thing and Thing(known or thing.name, thing.attributes)
+    def named(item: ObjectKind | None) -> ObjectKind | None:
+        known = item and (knowledge.object_name(item.name) or knowledge.somebody(item.name))
+        return item and ObjectKind(known or item.name, item.attributes)
 
     return Command(
         item=named(command.item),

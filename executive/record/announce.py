@@ -17,7 +17,7 @@ from executive.record.schemas import RUN, TASK
 from executive.tree.compiler import CompiledTree
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
-from skills.api import Publish, Thing
+from skills.api import ObjectKind, Publish
 from skills.estimate.grid_map import GridMap
 from skills.perception.class_forms import class_forms
 from skills.robot import Clock
@@ -61,11 +61,13 @@ def _task_message(command: Command, knowledge: Knowledge) -> Mapping[str, Any]:
     5 charge.
     """
 
-    def ids(thing: Thing | None) -> tuple[int, ...]:
+    def ids(item: ObjectKind | None) -> tuple[int, ...]:
         """The numbers of an object's classes."""
-        if thing is None:
+        if item is None:
             return (_NOTHING_ID,)
-        return tuple(class_forms()[name].id for name in knowledge.classes(knowledge.thing(thing.name) or thing.name))
+        return tuple(
+            class_forms()[name].id for name in knowledge.classes(knowledge.object_name(item.name) or item.name)
+        )
 
     items, objects = ids(command.item), ids(command.object)
     goal_x, goal_y = goal_position(knowledge, command)

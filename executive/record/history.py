@@ -35,7 +35,7 @@ from executive.record.schemas import (
 from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, logged_view
 from executive.words.robot_config import robot_called
-from skills.api import Cause, ObjectObservation, Thing
+from skills.api import Cause, ObjectKind, ObjectObservation
 from skills.detect.words import told_apart
 from skills.files.errors import InputError
 from skills.files.outside import plain_file
@@ -288,7 +288,7 @@ def _observation(track: Mapping[str, Any]) -> ObjectObservation:
     x_m, y_m, z_m = track["position_W"]
     return ObjectObservation(
         stamp_s=float(track["last_seen_s"]),
-        thing=Thing(track["class_name"]),
+        kind=ObjectKind(track["class_name"]),
         position_W=(x_m, y_m, z_m),
         size_m=(0.0, 0.0, 0.0),
         yaw_rad=0.0,

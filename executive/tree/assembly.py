@@ -262,7 +262,7 @@ def _words(items: Sequence[_Item]) -> str:
 
 def _command_words(command: Command) -> str:
     """A command in a few words: "grasp coke at kitchen table"."""
-    thing = command.object or command.item
+    item = command.object or command.item
     action = command.task.value if command.task is not None else "take" if command.item is not None else "go"
     goal = "" if command.goal is None else f"{'at' if command.task is not None else 'to'} {command.goal}"
-    return " ".join(filter(None, (action, str(thing or ""), goal)))
+    return " ".join(filter(None, (action, str(item or ""), goal)))

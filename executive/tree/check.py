@@ -142,19 +142,19 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
         yield from _out_of_reach(command.goal, knowledge, abilities)
     if command.task not in (Task.GRASP, Task.FIND) or command.object is None:
         return
-    thing = command.object
-    classes = knowledge.classes(knowledge.thing(thing.name) or thing.name)
+    item = command.object
+    classes = knowledge.classes(knowledge.object_name(item.name) or item.name)
     masses = [abilities.masses_kg[one] for one in classes if one in abilities.masses_kg]
     unseen = [one for one in classes if one not in abilities.classes]
-    unseen += [word for word in thing.attributes if word not in abilities.attributes]
+    unseen += [word for word in item.attributes if word not in abilities.attributes]
     if command.task is Task.GRASP and not masses:
         known = [one for one in knowledge.things if one in abilities.masses_kg]
-        yield f"there is no '{thing.name}' that could be picked up", suggestion(thing.name, known)
+        yield f"there is no '{item.name}' that could be picked up", suggestion(item.name, known)
     elif command.task is Task.GRASP and min(masses) > abilities.lift_kg:
-        message = f"'{thing.name}' is too heavy: {min(masses):g} kg, and the arm lifts {abilities.lift_kg:g} kg"
+        message = f"'{item.name}' is too heavy: {min(masses):g} kg, and the arm lifts {abilities.lift_kg:g} kg"
         yield message, "ask for something lighter"
     elif command.task is Task.GRASP and (least_m := _narrowest_m(classes, abilities)) > abilities.opens_m:
-        message = f"'{thing.name}' is too wide: {least_m:g} m, and the gripper takes {abilities.opens_m:g} m"
+        message = f"'{item.name}' is too wide: {least_m:g} m, and the gripper takes {abilities.opens_m:g} m"
         yield message, "ask for something narrower"
     elif unseen:
         known = [one for one in knowledge.things if one in abilities.classes]
@@ -187,7 +187,7 @@ def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilitie
         place = None if command is None or command.goal is None else knowledge.place(command.goal)
         if command is None or item is None or place is None or not knowledge.surfaces_in(place):
             continue
-        classes = knowledge.classes(knowledge.thing(item.name) or item.name)
+        classes = knowledge.classes(knowledge.object_name(item.name) or item.name)
         width_m = min((abilities.widths_m.get(one, 0.0) for one in classes), default=0.0)
         brought_m2[place] = brought_m2.get(place, 0.0) + max(1, command.item_count) * (width_m + abilities.apart_m) ** 2
         surfaces = knowledge.surfaces_in(place)

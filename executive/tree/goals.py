@@ -9,7 +9,7 @@ from typing import Final
 from executive.words.command import START, Command, Task
 from executive.words.goal import GoalCondition, GoalKind, Region, When
 from executive.words.knowledge import ANYBODY, Knowledge, Pose
-from skills.api import Thing
+from skills.api import ObjectKind
 
 __all__ = [
     "clearing_goals",
@@ -54,13 +54,13 @@ def door_goal(knowledge: Knowledge, between: tuple[str, str]) -> GoalCondition:
     return GoalCondition(GoalKind.DOOR_OPEN, source=(Region(f"door between {between[0]} and {between[1]}", square),))
 
 
-def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
+def surfaces_to_search(knowledge: Knowledge, item: str, place: str | None) -> tuple[str, ...]:
     """The surfaces to look at, those where the thing usually is first; without a place, all that there are.
 
     A usual place may be a room: then its surfaces count as usual.
     """
     inside = tuple(knowledge.surfaces) if place is None else knowledge.surfaces_in(place)
-    usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
+    usual = (name for spot in knowledge.usual_surfaces(item) for name in knowledge.surfaces_in(spot))
     return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
 
 
@@ -70,9 +70,9 @@ def surface_region(knowledge: Knowledge, surface: str) -> Region:
     return Region(surface, facts.polygon, facts.height - BELOW_TOP_M, facts.height + ABOVE_TOP_M)
 
 
-def _classes(thing: Thing | None, knowledge: Knowledge) -> tuple[str, ...]:
-    assert thing is not None
-    return knowledge.classes(knowledge.thing(thing.name) or thing.name)
+def _classes(item: ObjectKind | None, knowledge: Knowledge) -> tuple[str, ...]:
+    assert item is not None
+    return knowledge.classes(knowledge.object_name(item.name) or item.name)
 
 
 def _regions(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> tuple[Region, ...]:

@@ -17,7 +17,7 @@ from executive.words.command import Command, Task
 from executive.words.goal import GoalCondition
 from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
 from executive.words.slug import slug
-from skills.api import Cause, Part, Skill, Surface, Thing
+from skills.api import Cause, ObjectKind, Part, Skill, Surface
 from skills.files.errors import InputError, SourceLine, suggestion
 from skills.perception.class_forms import THING
 from skills.robot import Pose2D
@@ -99,7 +99,7 @@ class PlanBuilder:
     anywhere: bool = True
     avoided: frozenset[str] = frozenset()
     in_gripper: bool = False
-    carried: Thing | None = None
+    carried: ObjectKind | None = None
     pick_ups: int = PICK_UPS
     move_aside: int = 0
     following: Command | None = None
@@ -210,17 +210,17 @@ class PlanBuilder:
 
     def classes(self, name: str) -> tuple[str, ...]:
         """The classes that an object's name stands for. Raises InputError: it is not known."""
-        classes = self.knowledge.classes(self.knowledge.thing(name) or name)
+        classes = self.knowledge.classes(self.knowledge.object_name(name) or name)
         if not classes:
-            raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.thing_names()))
+            raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.object_names()))
         return classes
 
-    def known(self, thing: Thing | None) -> Thing:
+    def known(self, item: ObjectKind | None) -> ObjectKind:
         """The object that the command is about. Raises InputError: it names none, or none that is known."""
-        if thing is None:
+        if item is None:
             raise self.error("the command names no object", "say what it is about")
-        self.classes(thing.name)
-        return thing
+        self.classes(item.name)
+        return item
 
     def sought(self, name: str) -> tuple[str, ...]:
         """What the robot looks for when it is to take an object of that name: its classes, or `THING` for any object.
@@ -228,7 +228,7 @@ class PlanBuilder:
         A question names what it finds, and so is about the known classes. Raises InputError: the name is not known.
         """
         classes = self.classes(name)
-        unnamed = self.knowledge.thing(name) in (ANYTHING, EVERYTHING)
+        unnamed = self.knowledge.object_name(name) in (ANYTHING, EVERYTHING)
         return (THING,) if unnamed and self.command.task is not Task.FIND else classes
 
     def error(self, message: str, hint: str) -> InputError:

@@ -2,7 +2,7 @@
 
 What a type takes: numbers, texts, true and false as they are; a tuple takes a list; an enum one of its values; a
 dataclass a mapping of its fields, whose units may be left out ("yaw" for "yaw_rad"). A pose may also be the name of a
-place, a `Surface` the name of a surface, several surfaces the name of a room, a `Thing` its words ("red wrench").
+place, a `Surface` the name of a surface, several surfaces the name of a room, an `ObjectKind` its words ("red wrench").
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from types import MappingProxyType
 from typing import Any, Final, Union
 
 from executive.tree.types import describe_type, field_types, required
-from executive.words.command import thing
+from executive.words.command import parse_object
 from executive.words.knowledge import Knowledge
-from skills.api import Surface, Thing
+from skills.api import ObjectKind, Surface
 from skills.files.errors import listing, suggestion
 from skills.quantities import QuantityError, bounds, number_of, without_unit
 from skills.robot import Pose2D
@@ -230,13 +230,13 @@ def _surfaces(name: str, knowledge: Knowledge, path: Path) -> tuple[Surface, ...
     return tuple(_surface(surface, knowledge, path) for surface in surfaces)
 
 
-def _thing(value: Any, knowledge: Knowledge, path: Path) -> Thing:
+def _object_kind(value: Any, knowledge: Knowledge, path: Path) -> ObjectKind:
     """An object in words, by its own name."""
-    said = thing(_name(value, "an object in words", path))
-    known = knowledge.thing(said.name)
+    said = parse_object(_name(value, "an object in words", path))
+    known = knowledge.object_name(said.name)
     if known is None:
-        raise _unknown("thing", said.name, knowledge.thing_names(), knowledge, path)
-    return Thing(known, said.attributes)
+        raise _unknown("object", said.name, knowledge.object_names(), knowledge, path)
+    return ObjectKind(known, said.attributes)
 
 
 def _name(value: Any, wanted: str, path: Path) -> str:
@@ -265,6 +265,6 @@ _PLAIN: Final[Mapping[Any, tuple[tuple[type, ...], str]]] = {
 _SPECIAL: Final[Mapping[type, Callable[[Any, Knowledge, Path], Any]]] = {
     Pose2D: _pose,
     Surface: _surface,
-    Thing: _thing,
+    ObjectKind: _object_kind,
 }
 _DEFAULTS: Final[Mapping[type, Mapping[str, Any]]] = {Pose2D: MappingProxyType({"yaw_rad": 0.0})}

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from skills.api import Thing
+from skills.api import ObjectKind
 
 _ATTRIBUTE: Final = re.compile(
     r"red|green|blue|yellow|orange|white|black|gr[ae]y|brown|pink|purple|violet|silver|golden|dark|bright|light"
@@ -30,7 +30,7 @@ _RESERVED: Final = re.compile(r'[\[\]"]|^\s|\s$|\s\s|[^\S ]|^$')
 _NO_ATTRIBUTE: Final = re.compile(rf"\d+|{_PLURAL}|.*\s.*")
 _FORM: Final = re.compile(r"\s*Take \[(.+?)\] to \[(.+?)\] and do \[(.+?)\] to \[(.+?)\]\s*")
 _GOAL: Final = re.compile(r'("[^"]+"|.+?)(?: at ("[^"]+"|.+))?')
-_THING: Final = re.compile(r'(?:(\d+|some) )?(?:([^"]*) )?(?:"([^"]+)"|([^"]+))')
+_COUNTED: Final = re.compile(r'(?:(\d+|some) )?(?:([^"]*) )?(?:"([^"]+)"|([^"]+))')
 
 
 class Task(enum.Enum):
@@ -55,11 +55,11 @@ class Command:
             `goal_at` stands without a goal.
     """
 
-    item: Thing | None = None
+    item: ObjectKind | None = None
     goal: str | None = None
     goal_at: str | None = None
     task: Task | None = None
-    object: Thing | None = None
+    object: ObjectKind | None = None
     item_count: int = 1
     object_count: int = 1
     verb: str = ""
@@ -68,19 +68,19 @@ class Command:
         for name in (self.goal, self.goal_at, *_words(self.item), *_words(self.object)):
             if name is not None and _RESERVED.search(name):
                 raise ValueError(f"{name!r} cannot be a name in a command")
-        for thing, count in ((self.item, self.item_count), (self.object, self.object_count)):
-            if count < 0 or (thing is None and count != 1):
-                raise ValueError(f"{count} cannot be the count of {thing or _NOTHING}")
-            if not all(map(may_be_attribute, _words(thing)[1:])):
-                raise ValueError(f"{thing} has an attribute that is no single word, or a number")
+        for kind, count in ((self.item, self.item_count), (self.object, self.object_count)):
+            if count < 0 or (kind is None and count != 1):
+                raise ValueError(f"{count} cannot be the count of {kind or _NOTHING}")
+            if not all(map(may_be_attribute, _words(kind)[1:])):
+                raise ValueError(f"{kind} has an attribute that is no single word, or a number")
         if self.goal_at is not None and self.goal is None:
             raise ValueError(f"a goal is missing at {self.goal_at!r}")
 
     def __str__(self) -> str:
         """The text form, for instance "Take [Nothing] to [kitchen] and do [grasp] to [drink]"."""
-        item = _thing_text(self.item, self.item_count)
+        item = _counted_text(self.item, self.item_count)
         task = _NOTHING if self.task is None else self.task.value
-        target = _thing_text(self.object, self.object_count)
+        target = _counted_text(self.object, self.object_count)
         return f"Take [{item}] to [{_goal_text(self.goal, self.goal_at)}] and do [{task}] to [{target}]"
 
     def to_json(self) -> dict[str, Any]:
@@ -101,11 +101,11 @@ class Command:
         """The command of such values; keys may be left out. Raises ValueError for an unknown task or a bad name."""
         item, target, task = values.get("item"), values.get("object"), values.get("task")
         return cls(
-            item=None if item is None else thing(item),
+            item=None if item is None else parse_object(item),
             goal=values.get("goal"),
             goal_at=values.get("goal_at"),
             task=None if task is None else Task(task),
-            object=None if target is None else thing(target),
+            object=None if target is None else parse_object(target),
             item_count=1 if item is None else values.get("item_count", 1),
             object_count=1 if target is None else values.get("object_count", 1),
             verb=values.get("verb", ""),
@@ -122,11 +122,11 @@ def may_be_attribute(word: str) -> bool:
     return _NO_ATTRIBUTE.fullmatch(word) is None
 
 
-def thing(text: str) -> Thing:
-    """The words as a Thing: leading attribute words are split off, and the rest is the name."""
+def parse_object(text: str) -> ObjectKind:
+    """The words as an ObjectKind: leading attribute words are split off, and the rest is the name."""
     words = text.split()
     first = next((n for n, word in enumerate(words) if not is_attribute(word)), len(words) - 1)
-    return Thing(" ".join(words[first:]), tuple(words[:first]))
+    return ObjectKind(" ".join(words[first:]), tuple(words[:first]))
 
 
 def parse_command(text: str) -> Command:
@@ -139,19 +139,19 @@ def parse_command(text: str) -> Command:
     if match is None:
         raise ValueError(f"{text!r} is not of the form 'Take [item] to [goal] and do [task] to [object]'")
     item, goal, task, target = match.groups()
-    item_thing, item_count = _parse_thing(item)
-    target_thing, target_count = _parse_thing(target)
+    item_kind, item_count = _parse_counted(item)
+    target_kind, target_count = _parse_counted(target)
     goal_name, goal_at = _parse_goal(goal)
-    return Command(item_thing, goal_name, goal_at, _parse_task(task), target_thing, item_count, target_count)
+    return Command(item_kind, goal_name, goal_at, _parse_task(task), target_kind, item_count, target_count)
 
 
 def parts_of_command(command: Command) -> dict[str, str]:
     """The parts of a command's text form under the keys of mission files; those that are Nothing are left out."""
     parts = {
-        "take": _thing_text(command.item, command.item_count),
+        "take": _counted_text(command.item, command.item_count),
         "to": _goal_text(command.goal, command.goal_at),
         "do": _NOTHING if command.task is None else command.task.value,
-        "object": _thing_text(command.object, command.object_count),
+        "object": _counted_text(command.object, command.object_count),
     }
     return {key: text for key, text in parts.items() if text != _NOTHING}
 
@@ -162,30 +162,30 @@ def command_of_parts(parts: Mapping[str, str | None]) -> Command:
     return parse_command(f"Take [{take}] to [{to}] and do [{do}] to [{target}]")
 
 
-def _words(of: Thing | None) -> tuple[str, ...]:
-    return () if of is None else (of.name, *of.attributes)
+def _words(kind: ObjectKind | None) -> tuple[str, ...]:
+    return () if kind is None else (kind.name, *kind.attributes)
 
 
-def _thing_text(of: Thing | None, count: int) -> str:
+def _counted_text(of: ObjectKind | None, count: int) -> str:
     """The words between the brackets; quoted where they would not read back."""
     if of is None:
         return _NOTHING
     number = {0: f"{_PLURAL} ", 1: ""}.get(count, f"{count} ")
     plain = f"{number}{of}"
-    return plain if _parse_thing(plain) == (of, count) else f'{number}{" ".join((*of.attributes, ""))}"{of.name}"'
+    return plain if _parse_counted(plain) == (of, count) else f'{number}{" ".join((*of.attributes, ""))}"{of.name}"'
 
 
-def _parse_thing(text: str) -> tuple[Thing | None, int]:
+def _parse_counted(text: str) -> tuple[ObjectKind | None, int]:
     if text == _NOTHING:
         return None, 1
-    match = _THING.fullmatch(text)
+    match = _COUNTED.fullmatch(text)
     if match is None:
-        raise ValueError(f"[{text}] is no thing")
+        raise ValueError(f"[{text}] is no object")
     number, attributes, quoted, plain = match.groups()
     count = 1 if number is None else 0 if number == _PLURAL else int(number)
     if quoted is not None:
-        return Thing(quoted, tuple((attributes or "").split())), count
-    return thing(" ".join(filter(None, (attributes, plain)))), count
+        return ObjectKind(quoted, tuple((attributes or "").split())), count
+    return parse_object(" ".join(filter(None, (attributes, plain)))), count
 
 
 def _goal_text(goal: str | None, goal_at: str | None) -> str:

@@ -91,7 +91,7 @@ class SurfaceFacts(_Facts):
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
 
 
-class ThingFacts(_Facts):
+class ObjectFacts(_Facts):
     """A class of objects: other names, the categories it belongs to, the surfaces where it usually is."""
 
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
@@ -122,7 +122,7 @@ class Knowledge(_Facts):
     surfaces: dict[Name, SurfaceFacts] = Field(
         default_factory=dict, description="the flat tops where objects lie, by name"
     )
-    things: dict[Name, ThingFacts] = Field(default_factory=dict, description="the classes of objects by name")
+    things: dict[Name, ObjectFacts] = Field(default_factory=dict, description="the classes of objects by name")
     people: dict[Name, Person] = Field(default_factory=dict, description="the people by name")
     defaults: dict[str, dict[str, str]] = Field(
         default_factory=dict, description="for a task, the room for each class or category when the request names none"
@@ -144,7 +144,7 @@ class Knowledge(_Facts):
         """Where to stand for a known room (its pose) or surface (its first viewpoint)."""
         return self.surfaces[place].viewpoints[0] if place in self.surfaces else self.places[place].pose
 
-    def thing(self, name: str) -> str | None:
+    def object_name(self, name: str) -> str | None:
         """The class or category that `name` means, by its own name; None when unknown."""
         own = _resolve(name, self.things) or next((c for c in self.categories() if c.lower() == name.lower()), None)
         return own or _UNNAMED.get(name.lower())
@@ -152,7 +152,7 @@ class Knowledge(_Facts):
     def classes(self, name: str) -> tuple[str, ...]:
         """The classes that a class, alias or category stands for, in the file's order; empty when unknown."""
         known = _resolve(name, self.things)
-        if known is None and self.thing(name) in _UNNAMED:
+        if known is None and self.object_name(name) in _UNNAMED:
             return tuple(self.things)
         return (known,) if known else tuple(c for c, facts in self.things.items() if name.lower() in facts.categories)
 
@@ -190,7 +190,7 @@ class Knowledge(_Facts):
         said = next((table[word] for table in tables for word in words if word in table), None)
         return said or next((self.room(surface) for surface in self.usual_surfaces(name)), None)
 
-    def thing_names(self) -> tuple[str, ...]:
+    def object_names(self) -> tuple[str, ...]:
         """What can be asked for: classes, then categories."""
         return (*self.things, *self.categories())
 
@@ -200,14 +200,15 @@ class Knowledge(_Facts):
 
     def spellings(self, names: Iterable[str]) -> tuple[str, ...]:
         """The names with all their aliases, for guessing what a misspelled one means."""
-        groups: tuple[Mapping[str, Place | SurfaceFacts | ThingFacts | Person], ...]
+        groups: tuple[Mapping[str, Place | SurfaceFacts | ObjectFacts | Person], ...]
         groups = (self.places, self.surfaces, self.things, self.people)
         aliases = {name: facts.aliases for group in groups for name, facts in group.items()}
         return tuple(word for name in names for word in (name, *aliases.get(name, ())))
 
 
 def _resolve(
-    name: str, group: Mapping[str, Place] | Mapping[str, SurfaceFacts] | Mapping[str, ThingFacts] | Mapping[str, Person]
+    name: str,
+    group: Mapping[str, Place] | Mapping[str, SurfaceFacts] | Mapping[str, ObjectFacts] | Mapping[str, Person],
 ) -> str | None:
     wanted = name.lower()
     own = (known for known in group if known.lower() == wanted)
@@ -250,7 +251,7 @@ def _cross_errors(knowledge: Knowledge, source: YamlSource) -> Iterator[InputErr
     for task, table in knowledge.defaults.items():
         yield from _unless_known(source, ("defaults", task), task, tasks)
         for word, place in table.items():
-            yield from _unless_known(source, ("defaults", task, word), word, knowledge.thing_names())
+            yield from _unless_known(source, ("defaults", task, word), word, knowledge.object_names())
             yield from _unless_known(source, ("defaults", task, word), place, knowledge.place_names())
     yield from _doubles(knowledge, source)
 

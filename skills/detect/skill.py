@@ -15,11 +15,11 @@ from skills.api import (
     Cause,
     Detection,
     LocalisationEstimate,
+    ObjectKind,
     ObjectObservation,
     Running,
     Succeeded,
     Surface,
-    Thing,
 )
 from skills.detect.messages import (
     coverage_message,
@@ -397,7 +397,7 @@ def _is_sure(inputs: DetectInputs, track: Track) -> bool:
 def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:
     """A track as an observation: its fused place, the rest from its last detection; a `THING` without a sure class."""
     seen = observation(replace(track.latest, position_W=track.position_W), attributes)
-    return seen if track.confirmed(1) else replace(seen, thing=Thing(THING, attributes))
+    return seen if track.confirmed(1) else replace(seen, kind=ObjectKind(THING, attributes))
 
 
 def _tries_for(track: Track, shifts: int) -> int:

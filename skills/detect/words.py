@@ -26,13 +26,13 @@ def describe(seen: ObjectObservation) -> str:
     """ "a red coke on the kitchen table, score 0.90"; where no surface is known, its position in the world (m)."""
     x, y, z = seen.position_W
     place = f"on the {seen.surface}" if seen.surface else f"at ({x:.2f}, {y:.2f}, {z:.2f})"
-    return f"a {seen.thing} {place}, score {seen.score:.2f}"
+    return f"a {seen.kind} {place}, score {seen.score:.2f}"
 
 
 def counted(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> str:
     """ "there are two wrenches on the bench"; each kind of object is counted for itself."""
-    kinds = list(dict.fromkeys(str(seen.thing) for seen in found))
-    numbers = {kind: sum(str(seen.thing) == kind for seen in found) for kind in kinds}
+    kinds = list(dict.fromkeys(str(seen.kind) for seen in found))
+    numbers = {kind: sum(str(seen.kind) == kind for seen in found) for kind in kinds}
     told = " and ".join(numbered(count, kind) for kind, count in numbers.items())
     places = dict.fromkeys(seen.surface for seen in found if seen.surface)
     where = " and ".join(f"the {name}" for name in places) or surface_names(surfaces)
@@ -69,7 +69,7 @@ def _new(known: Sequence[ObjectObservation], look: Sequence[ObjectObservation]) 
         (apart_m, k, n)
         for k, old in enumerate(known)
         for n, seen in enumerate(look)
-        if old.thing.name == seen.thing.name and (apart_m := math.dist(old.position_W, seen.position_W)) < SAME_WITHIN_M
+        if old.kind.name == seen.kind.name and (apart_m := math.dist(old.position_W, seen.position_W)) < SAME_WITHIN_M
     )
     paired_old, paired_new = set[int](), set[int]()
     for _, k, n in pairs:

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import shapely
 
-from skills.api import Cause, ObjectObservation, Running, Succeeded, Thing
+from skills.api import Cause, ObjectKind, ObjectObservation, Running, Succeeded
 from skills.detect.words import counted
 from skills.find_people.ports import FindPeopleInputs, FindPeoplePorts
 from skills.navigate.arm_footprint import ArmFootprint
@@ -134,7 +134,7 @@ def _apart_m(one: SeenPerson, other: SeenPerson) -> float:
 
 def _told(seen: ObjectObservation) -> str:
     """ "saw Robin in the kitchen"."""
-    who = "somebody" if seen.thing.name == PERSON else seen.thing.name
+    who = "somebody" if seen.kind.name == PERSON else seen.kind.name
     return f"saw {who} in the {seen.surface}"
 
 
@@ -142,4 +142,4 @@ def _observation(seen: SeenPerson, inputs: FindPeopleInputs) -> ObjectObservatio
     """Somebody who was seen, as an observation of what was asked for."""
     x_m, y_m = seen.place_W
     middle_W = (x_m, y_m, _SIZE_M[2] / 2)
-    return ObjectObservation(seen.stamp_s, Thing(inputs.person), middle_W, _SIZE_M, 0.0, seen.score, inputs.place)
+    return ObjectObservation(seen.stamp_s, ObjectKind(inputs.person), middle_W, _SIZE_M, 0.0, seen.score, inputs.place)

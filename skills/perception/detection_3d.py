@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from skills.api import FLOOR, Detection, LocalisationEstimate, ObjectObservation, Surface, Thing
+from skills.api import FLOOR, Detection, LocalisationEstimate, ObjectKind, ObjectObservation, Surface
 from skills.geometry import inside_polygon
 from skills.perception.class_forms import class_forms
 from skills.perception.point_cloud import camera_pose_W
@@ -146,7 +146,7 @@ def observation(detected: Detection3D, attributes: tuple[str, ...] = ()) -> Obje
     x, y, z = (float(value) for value in detected.position_W)
     return ObjectObservation(
         stamp_s=detected.stamp_s,
-        thing=Thing(detected.class_name, attributes),
+        kind=ObjectKind(detected.class_name, attributes),
         position_W=(x, y, z),
         size_m=detected.size_m,
         yaw_rad=detected.yaw_rad,

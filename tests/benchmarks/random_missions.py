@@ -43,7 +43,7 @@ from executive.words.mission import Mission
 from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
 from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Steps, Together, Try, While
-from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectObservation, Part, Running, Skill, Succeeded, Thing
+from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectKind, ObjectObservation, Part, Running, Skill, Succeeded
 from skills.check_door.skill import CheckDoorInputs
 from skills.files.errors import InputError
 from skills.speak.skill import SpeakInputs
@@ -367,7 +367,7 @@ class Robotics:
         if name == "check_door":
             return Succeeded("seen", {"open": self.rng.random() < 0.5})
         if name == "find_people":
-            seen = ObjectObservation(0.0, Thing("person"), (0.5, 4.5, 0.9), (0.5, 0.5, 1.7), 0.0, 0.9)
+            seen = ObjectObservation(0.0, ObjectKind("person"), (0.5, 4.5, 0.9), (0.5, 0.5, 1.7), 0.0, 0.9)
             some = Succeeded("seen", {"observation": seen, "observations": (seen,)})
             return some if self.rng.random() < 0.5 else Failed(Cause.POSTCONDITION, "nobody is there")
         if name in ("place", "hand_over"):

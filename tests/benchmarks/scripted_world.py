@@ -21,7 +21,7 @@ from plant.referee import Verdict
 from plant.referee.judge import LOOKS_AT_DOOR_S, judge
 from plant.referee.object_history import ObjectHistory, ObjectSample
 from plant.referee.truth import TimedPath, Truth, extend, note_stay
-from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
 from tests.executive.conftest import KNOWLEDGE, ManualClock
 
 __all__ = ["WORLD", "Clock", "ScriptedWorld", "expected"]
@@ -139,7 +139,9 @@ class ScriptedWorld:
             if seen:
                 return Failed(Cause.POSTCONDITION, "not seen")
             x, y, z = self.on_surface(next(iter(OBJECTS)), on[0]) if on[0] in _SURFACES else (0.0, 0.0, 0.0)
-            return _seen([ObjectObservation(now_s, Thing(inputs.classes[0]), (x, y + 0.07, z), (0.06,) * 3, 0.0, 0.9)])
+            return _seen(
+                [ObjectObservation(now_s, ObjectKind(inputs.classes[0]), (x, y + 0.07, z), (0.06,) * 3, 0.0, 0.9)]
+            )
         if not seen:
             return Failed(Cause.POSTCONDITION, "not seen")
         return _seen([self.observation(now_s, name) for name in seen])
@@ -153,7 +155,7 @@ class ScriptedWorld:
         if not there:
             return Failed(Cause.POSTCONDITION, "nobody is there")
         size = (0.5, 0.5, 1.7)
-        return _seen([ObjectObservation(now_s, Thing("person"), (x, y, 0.9), size, 0.0, 0.9) for x, y in there])
+        return _seen([ObjectObservation(now_s, ObjectKind("person"), (x, y, 0.9), size, 0.0, 0.9) for x, y in there])
 
     def charge(self, now_s: float, inputs: Any) -> Succeeded | Failed:
         """Charge, at the dock only."""
@@ -214,7 +216,7 @@ class ScriptedWorld:
     def observation(self, now_s: float, name: str) -> ObjectObservation:
         """An object as it is seen."""
         x, y, z = map(float, self.position(name))
-        thing, place = Thing(OBJECTS[name][0]), self.places[name]
+        thing, place = ObjectKind(OBJECTS[name][0]), self.places[name]
         return ObjectObservation(now_s, thing, (x, y, z), (0.06, 0.06, 0.12), 0.0, 0.9, place)
 
     def accident(self, now_s: float) -> None:

@@ -26,12 +26,12 @@ from skills.api import (
     Cause,
     Failed,
     LocalisationEstimate,
+    ObjectKind,
     ObjectObservation,
     Running,
     Skill,
     Succeeded,
     Surface,
-    Thing,
 )
 from skills.api import Step as SkillStep
 from skills.robot import (
@@ -193,7 +193,7 @@ class Script:
     ended: list[str] = field(default_factory=list)
 
 
-COKE = ObjectObservation(0.0, Thing("coke"), (1.0, 2.0, 0.9), (0.06, 0.06, 0.12), 0.0, 0.9, "counter")
+COKE = ObjectObservation(0.0, ObjectKind("coke"), (1.0, 2.0, 0.9), (0.06, 0.06, 0.12), 0.0, 0.9, "counter")
 
 
 def scripted_skill(

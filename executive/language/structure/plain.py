@@ -20,7 +20,7 @@ from executive.words.command import START, Command, Task
 from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import inside
-from skills.api import Thing
+from skills.api import ObjectKind
 
 _LEFT_OUT: Final = frozenset({"not", "n't", "but", "except", "instead", "rather", "neither", "nor"})
 SEES: Final = "I can see whether something or somebody is somewhere"
@@ -36,7 +36,7 @@ class State:
     """
 
     memory: Memory = field(default_factory=Memory)
-    held: Thing | None = None
+    held: ObjectKind | None = None
     goal: str | None = START
     at: str | None = None
     door: DoorOpen | None = None

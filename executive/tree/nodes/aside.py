@@ -13,7 +13,7 @@ from executive.tree.board import FromBoard
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.plan import PlanBuilder
-from skills.api import FLOOR, Cause, Failed, ObjectObservation, Surface, Thing
+from skills.api import FLOOR, Cause, Failed, ObjectKind, ObjectObservation, Surface
 from skills.geometry import compose
 from skills.quantities import Coordinate, Length
 from skills.robot import Pose2D
@@ -34,7 +34,7 @@ class InTheWay(ExplainedLeaf):
     """
 
     kind = "in the way"
-    thing: str
+    item: str
     blocking_key: str
     wanted_key: str
     obstacle_key: str
@@ -60,12 +60,12 @@ class InTheWay(ExplainedLeaf):
         floor = floor_square(Pose2D(x, y, 0.0), 0.0, _FLOOR_HALF_M)
         surface = next((each for each in (*self.surfaces, floor) if each.name == obstacle.surface), None)
         if surface is None:
-            return self.fail(Failed(Cause.PRECONDITION, f"it is not known what the {obstacle.thing} stands on"))
+            return self.fail(Failed(Cause.PRECONDITION, f"it is not known what the {obstacle.kind} stands on"))
         board.put(self.obstacle_key, obstacle)
         board.put(self.surface_key, surface)
         board.put(self.pose_key, self.context.pose())
         board.put(self.clear_key, _way_circles(wanted, self.context.pose(), self.clear_m))
-        return self.say(f"the {obstacle.thing} is in the way of the {self.thing}; it is moved aside")
+        return self.say(f"the {obstacle.kind} is in the way of the {self.item}; it is moved aside")
 
 
 def floor_square(pose: Pose2D, ahead_m: float, half_m: float) -> Surface:
@@ -90,7 +90,7 @@ def can_move_aside(builder: PlanBuilder) -> bool:
 
 def move_aside_plan(
     below: PlanBuilder,
-    thing: Thing,
+    item: ObjectKind,
     wanted: str,
     blocking: str,
     surfaces: tuple[Surface, ...] | FromBoard,
@@ -104,9 +104,9 @@ def move_aside_plan(
     obstacle, surface, clear, pose = map(below.key, ("obstacle", "surface", "clear", "pose"))
     what = below.node(
         "in the way",
-        f"what is in the way of the {thing}?",
+        f"what is in the way of the {item}?",
         part="what",
-        thing=str(thing),
+        item=str(item),
         blocking_key=blocking,
         wanted_key=wanted,
         obstacle_key=obstacle,

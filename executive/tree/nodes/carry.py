@@ -22,7 +22,7 @@ from executive.tree.nodes.search import detect_plan, where
 from executive.tree.plan import PlanBuilder, after, pose_2d
 from executive.words.command import START
 from executive.words.outlines import Point, distance_m, inside
-from skills.api import FLOOR, Cause, Failed, Surface, Thing
+from skills.api import FLOOR, Cause, Failed, ObjectKind, Surface
 from skills.geometry import compose
 from skills.quantities import Coordinate, Height
 from skills.robot import Pose2D
@@ -46,7 +46,7 @@ def carry_plan(builder: PlanBuilder) -> NodeSpec:
     return unless_fallen(builder.at("carry-on"), item, f"to the {place}", put, guards, skills)
 
 
-def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
+def _hand_over_plan(builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
     """Carries it there and holds it out; the gripper opens when the person takes it."""
     to = "the start" if isinstance(pose, FromBoard) else person
     ports = {"person": person, **({"thing": str(item)} if builder.has_ports("hand_over", ("thing",)) else {})}
@@ -57,7 +57,7 @@ def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard,
     return unless_fallen(builder.at("carry-on"), item, f"to {to}", bring, (way, give), (hand_over,))
 
 
-def put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> tuple[NodeSpec, tuple[NodeSpec, ...]]:
+def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[NodeSpec, tuple[NodeSpec, ...]]:
     """Any surface of the place will do: the next one is tried when one does not work. With it, the guards of the ways.
 
     Raises InputError: the place has no surfaces.
@@ -73,7 +73,7 @@ def put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> tuple[NodeSp
     return put, tuple(guard for way in ways for guard in way.children)
 
 
-def _put_on_plan(builder: PlanBuilder, item: Thing, surface: str, to: str) -> NodeSpec:
+def _put_on_plan(builder: PlanBuilder, item: ObjectKind, surface: str, to: str) -> NodeSpec:
     """Carries it there and puts it down; both under guards."""
     view, carry = pose_2d(builder.knowledge.surfaces[surface].viewpoints[0]), builder.at("carry")
     place = builder.skill("place", {"surface": builder.surface(surface)})
@@ -95,7 +95,9 @@ def carried_along_plan(builder: PlanBuilder, way: NodeSpec, to: str) -> NodeSpec
     return unless_fallen(builder.at("carry-on"), builder.carried, to, guard, (guard,))
 
 
-def _holding(builder: PlanBuilder, item: Thing, to: str, below: NodeSpec, *, until_put_down: bool = False) -> NodeSpec:
+def _holding(
+    builder: PlanBuilder, item: ObjectKind, to: str, below: NodeSpec, *, until_put_down: bool = False
+) -> NodeSpec:
     """A guard: what is carried stays in the gripper, perhaps until it is put down."""
     condition = Holds(str(item), to, until_put_down, builder.sought(item.name), item.attributes)
     return builder.node("guard", f"holding {item}", below, condition=condition)
@@ -157,7 +159,7 @@ class Fallen(ExplainedLeaf):
     """
 
     kind = "fallen"
-    thing: str
+    item: str
     to: str
     pose_key: str
     spot_key: str
@@ -192,7 +194,7 @@ class Fallen(ExplainedLeaf):
     def update(self) -> Status:
         """Feels for a moment whether the gripper still holds something."""
         if self.context.clock.now() < self._end_s:
-            return self.say(f"feels whether the {self.thing} is still held", Status.RUNNING)
+            return self.say(f"feels whether the {self.item} is still held", Status.RUNNING)
         towards = self._towards_free_floor()
         self.context.board.put(self.set_down_key, floor_square(towards, self.set_down_ahead_m, self.set_down_half_m))
         slipped = self.context.robot.gripper().holding
@@ -200,7 +202,7 @@ class Fallen(ExplainedLeaf):
             self._write(towards, self.set_down_ahead_m)
         happened = "slips in the gripper" if slipped else "fell"
         then = "is set down and gripped anew" if slipped else "is picked up again"
-        return self.say(f"the {self.thing} {happened} on the way {self.to}; it {then}")
+        return self.say(f"the {self.item} {happened} on the way {self.to}; it {then}")
 
     def _write(self, pose: Pose2D, ahead_m: float) -> None:
         """Writes where the object lies: so far (m) before the body at a pose."""
@@ -261,7 +263,7 @@ class SurfacesNear(ExplainedLeaf):
 
 def unless_fallen(
     builder: PlanBuilder,
-    item: Thing,
+    item: ObjectKind,
     to: str,
     carry: NodeSpec,
     guards: tuple[NodeSpec, ...],
@@ -281,13 +283,13 @@ def unless_fallen(
     return builder.recover(f"carry {item}", carry, (recovery, lost), attempts=builder.pick_ups + 1)
 
 
-def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
+def _pick_up_again_plan(builder: PlanBuilder, item: ObjectKind, to: str) -> NodeSpec:
     keys = {name: builder.key(name) for name in ("pose", "spot", "floor", "around", "set-down", "detection")}
     fell = builder.node(
         "fallen",
         f"where is the {item}?",
         part="fell",
-        thing=str(item),
+        item=str(item),
         to=to,
         pose_key=keys["pose"],
         spot_key=keys["spot"],
@@ -313,7 +315,7 @@ def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
     )
 
 
-def _free_gripper_plan(builder: PlanBuilder, item: Thing, set_down_key: str) -> NodeSpec:
+def _free_gripper_plan(builder: PlanBuilder, item: ObjectKind, set_down_key: str) -> NodeSpec:
     """Sets down what is still held; where that fails, draws it in. An empty arm is stowed."""
     below = builder.at("set-down")
     set_down = below.skill("place", {"surface": FromBoard(set_down_key)})
@@ -328,7 +330,7 @@ def _stand_back_plan(builder: PlanBuilder) -> NodeSpec:
     return builder.node("selector", "stand back", builder.skill("back_off", ports), stay)
 
 
-def _look_plan(builder: PlanBuilder, item: Thing, keys: dict[str, str]) -> NodeSpec:
+def _look_plan(builder: PlanBuilder, item: ObjectKind, keys: dict[str, str]) -> NodeSpec:
     """Looks from here where it fell and about there, then at the surfaces near, then at the floor from either side."""
     floor, detection = FromBoard(keys["floor"]), keys["detection"]
     aside = [
@@ -354,7 +356,7 @@ def _look_plan(builder: PlanBuilder, item: Thing, keys: dict[str, str]) -> NodeS
     )
 
 
-def _near_plan(builder: PlanBuilder, item: Thing, detection: str) -> NodeSpec:
+def _near_plan(builder: PlanBuilder, item: ObjectKind, detection: str) -> NodeSpec:
     """Looks at the surfaces near where it was lost."""
     facts, near = builder.knowledge, builder.key("surfaces")
     surfaces = builder.node(

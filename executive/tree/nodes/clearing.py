@@ -21,7 +21,7 @@ from executive.tree.nodes.search import detect_plan, look_plans, required_surfac
 from executive.tree.plan import PlanBuilder
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import EVERYTHING
-from skills.api import Cause, ObjectObservation, Thing
+from skills.api import Cause, ObjectKind, ObjectObservation
 from skills.detect.words import numbered
 from skills.files.errors import listing
 from skills.perception.class_forms import THING
@@ -109,7 +109,7 @@ class ForEachFound(MemoryComposite):
             return
         cause, why = cause_of(action), message_of(action)
         self._failures += 1
-        self._why = f"the {seen.thing}: {why}"
+        self._why = f"the {seen.kind}: {why}"
         self.board.put(self.missed, (*elsewhere, seen))
         if cause in FINAL_CAUSES or self._failures >= self.misses or self.robot.gripper().holding:
             self._end(cause, f"{self._told()}, then {why}")
@@ -123,7 +123,7 @@ class ForEachFound(MemoryComposite):
     def _nothing_left(self) -> None:
         """The end: all that was found was done, unless an object is gone that was missed."""
         if missed := self._noted(self.missed):
-            told = listing(f"the {each.thing}" for each in missed)
+            told = listing(f"the {each.kind}" for each in missed)
             self._end(Cause.POSTCONDITION, f"{self._told()}, but {told} is gone from there ({self._why})")
             return
         done = self._noted(self.done)
@@ -132,7 +132,7 @@ class ForEachFound(MemoryComposite):
     def _told(self) -> str:
         """ "moved one cube and two things to the bench"."""
         verb, to = self.did
-        kinds = Counter(str(each.thing) for each in self._noted(self.done))
+        kinds = Counter(str(each.kind) for each in self._noted(self.done))
         return f"{verb} {listing(numbered(count, kind) for kind, count in kinds.items())} {to}"
 
     def _noted(self, key: str) -> Seen:
@@ -154,24 +154,24 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     """
     get, goal = builder.command, bring.goal
     assert get.object is not None
-    thing = Thing(THING, get.object.attributes)
+    item = ObjectKind(THING, get.object.attributes)
     if get.goal is None or goal is None:
         raise builder.error("it is not said from where to where everything is to be taken", "name both places")
     if goal == START or builder.knowledge.person(goal) is not None:
         raise builder.error("everything cannot be handed over: there is one gripper", "name a place with a surface")
     place, to = builder.place(get.goal), builder.place(goal)
-    surfaces = required_surfaces(builder, thing, place)
+    surfaces = required_surfaces(builder, item, place)
     if shared := set(surfaces) & set(builder.knowledge.surfaces_in(to)):
         raise builder.error(f"everything that is on the {min(shared)} is to be brought there", "name two surfaces")
     key, missed = builder.key("detection"), builder.key("missed")
     extra = {"avoid": FromBoardOr(missed, ())} if builder.has_ports("detect", ("avoid",)) else {}
-    looks = (look for _, look in look_plans(builder.at("left"), thing, surfaces, key, extra))
+    looks = (look for _, look in look_plans(builder.at("left"), item, surfaces, key, extra))
     look = builder.at("left").node("selector", f"is anything left {where(builder.knowledge, place)}?", *looks)
-    again = detect_plan(builder.at("find"), thing, surfaces, key, extra)
+    again = detect_plan(builder.at("find"), item, surfaces, key, extra)
     around = tuple(map(builder.surface, surfaces))
     carry = replace(builder.at("bring"), command=bring)
-    put = carry.at("tidy").tidied(put_down_plan(carry, thing, to)[0], only_after_failure=True)
-    take = pick_up_plan(builder, thing, again, key, around, seen=True)
+    put = carry.at("tidy").tidied(put_down_plan(carry, item, to)[0], only_after_failure=True)
+    take = pick_up_plan(builder, item, again, key, around, seen=True)
     move = builder.at("move").sequence("move it", take, put)
     return builder.node(
         "for each found",
@@ -192,6 +192,6 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
 def refuse_everything(builder: PlanBuilder) -> None:
     """Refuses to take everything in one go. Raises InputError: a command on its own that is about everything."""
     command = builder.command
-    if any(thing is not None and thing.name == EVERYTHING for thing in (command.item, command.object)):
+    if any(item is not None and item.name == EVERYTHING for item in (command.item, command.object)):
         hint = "say from where to where in one step: 'move everything from the desk to the shelf'"
         raise builder.error("everything cannot be taken in one go", hint)

@@ -29,7 +29,7 @@ from executive.words.command import START, TIME_UNITS_S, Command, Task
 from executive.words.goal import GoalCondition, When
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Do, Say
-from skills.api import Thing
+from skills.api import ObjectKind
 from skills.files.errors import InputError, listing
 from skills.quantities import Quantity
 
@@ -61,7 +61,7 @@ def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembl
         builder,
         avoided=_goals(following, knowledge),
         in_gripper=is_same(held, command.object, knowledge),
-        carried=None if held is None else held.thing,
+        carried=None if held is None else held.kind,
     )
     refuse_several(builder)
     refuse_everything(builder)
@@ -117,7 +117,7 @@ def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
     command, knowledge = builder.command, builder.knowledge
     if command.task is not Task.GRASP or command.object is None or command.goal is None or not builder.anywhere:
         return ()
-    name = knowledge.thing(command.object.name) or command.object.name
+    name = knowledge.object_name(command.object.name) or command.object.name
     return surfaces_elsewhere(knowledge, name, builder.place(command.goal), builder.avoided)
 
 
@@ -129,27 +129,25 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     earlier step grasped, be it that this step failed, is not looked for, unless the gripper is empty. While it holds
     another object, nothing is looked for: PRECONDITION.
     """
-    thing = builder.known(builder.command.object)
+    item = builder.known(builder.command.object)
     if builder.command.item is not None:
         raise builder.error("the one gripper cannot take hold of a second object", "put the first one down before")
     place = None if builder.command.goal is None else builder.place(builder.command.goal)
-    surfaces = set(required_surfaces(builder, thing, place))
+    surfaces = set(required_surfaces(builder, item, place))
     if anywhere and builder.anywhere:
-        name = builder.knowledge.thing(thing.name) or thing.name
+        name = builder.knowledge.object_name(item.name) or item.name
         surfaces |= set(surfaces_elsewhere(builder.knowledge, name, place, builder.avoided))
     around = tuple(builder.surface(name) for name in builder.knowledge.surfaces if name in surfaces)
     key = builder.key("detection")
-    search = search_plan(builder.at("find"), thing, place, key, anywhere=anywhere)
-    get = pick_up_plan(builder, thing, search, key, around)
+    search = search_plan(builder.at("find"), item, place, key, anywhere=anywhere)
+    get = pick_up_plan(builder, item, search, key, around)
     if not builder.in_gripper:
-        held = known_held_plan(builder.at("have"), thing)
-        alone = HoldsNothingElse(str(thing), builder.sought(thing.name), thing.attributes)
-        get = builder.node("guard", f"get {thing} with an empty gripper", get, part="empty-handed", condition=alone)
-        have = builder.node("selector", f"have {thing}, or get it", held, get, part="have")
-        return builder.sequence(f"get {thing} {where(builder.knowledge, place)}", have)
-    return builder.node(
-        "selector", f"have {thing}", held_plan(builder, thing), builder.at("get").sequence("get it", get)
-    )
+        held = known_held_plan(builder.at("have"), item)
+        alone = HoldsNothingElse(str(item), builder.sought(item.name), item.attributes)
+        get = builder.node("guard", f"get {item} with an empty gripper", get, part="empty-handed", condition=alone)
+        have = builder.node("selector", f"have {item}, or get it", held, get, part="have")
+        return builder.sequence(f"get {item} {where(builder.knowledge, place)}", have)
+    return builder.node("selector", f"have {item}", held_plan(builder, item), builder.at("get").sequence("get it", get))
 
 
 def go_plan(builder: PlanBuilder) -> NodeSpec:
@@ -184,11 +182,11 @@ def wait_plan(builder: PlanBuilder) -> NodeSpec:
     return builder.sequence(f"wait at {to}", way, pause)
 
 
-def _required(builder: PlanBuilder, thing: Thing | None) -> Thing:
-    if thing is None:
+def _required(builder: PlanBuilder, item: ObjectKind | None) -> ObjectKind:
+    if item is None:
         raise builder.error("the command names no object", "say what it is about")
-    builder.classes(thing.name)
-    return thing
+    builder.classes(item.name)
+    return item
 
 
 def are_trips(get: Command, bring: Command | None) -> bool:
@@ -206,8 +204,8 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     one where those that were brought would be found again.
     """
     get, goal = builder.command, bring.goal
-    count, thing = get.object_count, get.object
-    several = f"{count} of '{thing}'"
+    count, item = get.object_count, get.object
+    several = f"{count} of '{item}'"
     if count > MAX_TRIPS:
         raise builder.error(f"{several} are too many trips", f"ask for {MAX_TRIPS} at most")
     if goal == START or (goal is not None and builder.knowledge.person(goal) is not None):
@@ -216,13 +214,13 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     if get.goal is None:
         raise builder.error(f"it is not said where to take {several} from", "name the place")
     brought = set(builder.knowledge.surfaces_in(builder.place(goal))) if goal is not None else set()
-    if thing is not None and brought & set(surfaces_to_search(builder.knowledge, thing.name, builder.place(get.goal))):
+    if item is not None and brought & set(surfaces_to_search(builder.knowledge, item.name, builder.place(get.goal))):
         hint = "name the surface that they are to be taken from"
         raise builder.error(
             f"{several} that lie in the {get.goal} already cannot be told from those brought there", hint
         )
     trips = tuple(_trip(builder, bring, number) for number in range(1, count + 1))
-    return builder.sequence(f"bring {count} {thing} to {goal}, one at a time", *trips)
+    return builder.sequence(f"bring {count} {item} to {goal}, one at a time", *trips)
 
 
 def _trip(builder: PlanBuilder, bring: Command, number: int) -> NodeSpec:

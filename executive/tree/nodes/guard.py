@@ -18,7 +18,7 @@ from py_trees.common import Status
 from executive.tree.behaviour import ExplainedDecorator, suspend
 from executive.tree.context import RunContext
 from executive.words.policy import StaleData
-from skills.api import Cause, Failed, Thing
+from skills.api import Cause, Failed, ObjectKind
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.perception.class_forms import THING
 from skills.robot import Pose2D
@@ -105,16 +105,16 @@ class Condition(ABC):
         return Failed(Cause.PRECONDITION, said)
 
 
-def is_known_as(thing: Thing | None, classes: Sequence[str], attributes: Sequence[str] = ()) -> bool:
+def is_known_as(item: ObjectKind | None, classes: Sequence[str], attributes: Sequence[str] = ()) -> bool:
     """Whether an object was taken for one of these classes, or any (`THING`), with at least these attributes."""
-    if thing is None:
+    if item is None:
         return False
-    return (THING in classes or thing.name in classes) and set(attributes) <= set(thing.attributes)
+    return (THING in classes or item.name in classes) and set(attributes) <= set(item.attributes)
 
 
 @dataclass
 class Holds(Condition):
-    """The gripper holds `thing`, which is brought `to` somewhere ("to the kitchen").
+    """The gripper holds `item`, which is brought `to` somewhere ("to the kitchen").
 
     PRECONDITION at the start when what it holds was taken for something else than one of the classes `known_as` with
     all `attributes`; of what nobody knows, as after a restart, it is believed.
@@ -126,7 +126,7 @@ class Holds(Condition):
     """
 
     reading = "the gripper"
-    thing: str
+    item: str
     to: str = ""
     until_put_down: bool = False
     known_as: tuple[str, ...] = ()
@@ -145,32 +145,32 @@ class Holds(Condition):
 
     def judged(self, context: RunContext) -> Verdict:
         """A failure when it is lost or slips on, or is another object; grips again what slips."""
-        watch, held = self._watch, context.payload.thing
+        watch, held = self._watch, context.payload.kind
         begins, self._begins = self._begins, False
         another = held is not None and self.known_as and not is_known_as(held, self.known_as, self.attributes)
         if begins and another and context.robot.gripper().holding:
-            return Failed(Cause.PRECONDITION, f"the gripper holds the {held}, not the {self.thing}")
+            return Failed(Cause.PRECONDITION, f"the gripper holds the {held}, not the {self.item}")
         grip = watch.judge(context.robot.gripper(), context.clock.now())
         if grip is Grip.SLIPPING:
             grip_again(context.robot, watch.force_n, clock=context.clock, lease=context.lease)
-            sentence = f"the {self.thing} began to slip and is gripped again, more firmly"
+            sentence = f"the {self.item} began to slip and is gripped again, more firmly"
             context.publish(CONTROL_TOPIC, {"t": round(context.clock.now(), 6), "what": "slip", "message": sentence})
         if grip is Grip.EMPTY:
-            why = f"there is no {self.thing} in the gripper"
+            why = f"there is no {self.item} in the gripper"
             return None if self.until_put_down else Failed(Cause.PRECONDITION, why)
         if grip is Grip.LOST and self.until_put_down and context.payload.offered:
             return None
         if grip is Grip.LOST or (grip is Grip.RELEASED and not self.until_put_down):
-            return Failed(Cause.EXECUTION, f"the {self.thing} was lost on the way{self._to}")
+            return Failed(Cause.EXECUTION, f"the {self.item} was lost on the way{self._to}")
         if grip is Grip.SLIPS_ON and not self.until_put_down:
-            return Failed(Cause.EXECUTION, f"the {self.thing} slips out of the gripper on the way{self._to}")
+            return Failed(Cause.EXECUTION, f"the {self.item} slips out of the gripper on the way{self._to}")
         return None
 
     def violated_at_end(self, context: RunContext) -> Failed | None:
         """A failure when the gripper feels nothing any more."""
         if self.until_put_down or context.robot.gripper().holding:
             return None
-        return Failed(Cause.EXECUTION, f"the {self.thing} was lost on the way{self._to}")
+        return Failed(Cause.EXECUTION, f"the {self.item} was lost on the way{self._to}")
 
     @property
     def _to(self) -> str:
@@ -179,14 +179,14 @@ class Holds(Condition):
 
 @dataclass
 class HoldsNothingElse(Condition):
-    """The gripper holds no other object when `thing` is to be taken, one of the classes `known_as` with `attributes`.
+    """The gripper holds no other object when `item` is to be taken, one of the classes `known_as` with `attributes`.
 
     PRECONDITION at the start when what it holds was taken for something else; what nobody knows, as after a restart, is
     left to the skill that grasps.
     """
 
     reading = "the gripper"
-    thing: str
+    item: str
     known_as: tuple[str, ...]
     attributes: tuple[str, ...] = ()
     _begins: bool = field(default=True, init=False, repr=False, compare=False)
@@ -199,7 +199,7 @@ class HoldsNothingElse(Condition):
     def judged(self, context: RunContext) -> Verdict:
         """A failure when it begins with another object."""
         begins, self._begins = self._begins, False
-        held = context.payload.thing
+        held = context.payload.kind
         if not begins or held is None or not context.robot.gripper().holding:
             return None
         if is_known_as(held, self.known_as, self.attributes):

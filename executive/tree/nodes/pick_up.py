@@ -17,7 +17,7 @@ from executive.tree.nodes.guard import Holds
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.plan import PlanBuilder
 from executive.words.outlines import inside
-from skills.api import Cause, Surface, Thing
+from skills.api import Cause, ObjectKind, Surface
 from skills.robot import Pose2D
 
 ATTEMPTS: Final = 4
@@ -73,7 +73,7 @@ def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float,
 
 def pick_up_plan(
     builder: PlanBuilder,
-    thing: Thing,
+    item: ObjectKind,
     search: NodeSpec,
     key: str,
     surfaces: tuple[Surface, ...] | FromBoard,
@@ -89,17 +89,17 @@ def pick_up_plan(
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
     aside = not seen and can_move_aside(builder)
     grasp = _grasp_plan(builder, near, tried, blocking if aside else None)
-    tuck = _tucked(builder, thing)
+    tuck = _tucked(builder, item)
     steps = (approach, grasp, tuck) if seen else (search, approach, grasp, tuck)
-    attempt = builder.at("pick-up").sequence(f"pick up {thing}", *steps)
+    attempt = builder.at("pick-up").sequence(f"pick up {item}", *steps)
     around, beside = builder.at("around"), builder.at("aside")
     work = {
-        "have it": known_held_plan(builder.at("in-hand"), thing),
+        "have it": known_held_plan(builder.at("in-hand"), item),
         "see what is around": around.skill("clear_costmap"),
         "back off": around.skill("back_off"),
     }
     if aside:
-        work["move aside"] = move_aside_plan(beside, thing, near, blocking, surfaces, tuck_plan(beside))
+        work["move aside"] = move_aside_plan(beside, item, near, blocking, surfaces, tuck_plan(beside))
     if seen:
         work["search"] = search
     else:
@@ -141,21 +141,21 @@ def tuck_plan(builder: PlanBuilder) -> NodeSpec:
     return builder.node("selector", "tuck the arm in", twice, as_it_is, part="tucked-in")
 
 
-def held_plan(builder: PlanBuilder, thing: Thing) -> NodeSpec:
+def held_plan(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
     """What an earlier step grasped: nothing to do while the gripper holds something."""
     below = builder.at("in-gripper")
     return below.node(
-        "only if holding", f"the {thing} is in the gripper", below.pause("settle", "hold it", LOOK_AGAIN_S)
+        "only if holding", f"the {item} is in the gripper", below.pause("settle", "hold it", LOOK_AGAIN_S)
     )
 
 
-def known_held_plan(builder: PlanBuilder, thing: Thing) -> NodeSpec:
+def known_held_plan(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
     """Draws in what a grasp that failed or was broken off took hold of; only if that is the object."""
-    known = {"known_as": builder.sought(thing.name), "attributes": thing.attributes}
-    tuck = _tucked(builder, thing)
-    return builder.node("only if holding", f"it took hold of the {thing}", tuck, part="only-if", **known)
+    known = {"known_as": builder.sought(item.name), "attributes": item.attributes}
+    tuck = _tucked(builder, item)
+    return builder.node("only if holding", f"it took hold of the {item}", tuck, part="only-if", **known)
 
 
-def _tucked(builder: PlanBuilder, thing: Thing) -> NodeSpec:
+def _tucked(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
     """Draws the arm in under a guard that the gripper holds the object."""
-    return builder.node("guard", f"holding {thing}", tuck_plan(builder), part="held", condition=Holds(str(thing)))
+    return builder.node("guard", f"holding {item}", tuck_plan(builder), part="held", condition=Holds(str(item)))

@@ -236,4 +236,4 @@ class OnlyIfHolding(MemoryComposite):
         """Returns whether something is held, or that object."""
         if not self.context.robot.gripper().holding:
             return False
-        return self.known_as is None or is_known_as(self.context.payload.thing, self.known_as, self.attributes)
+        return self.known_as is None or is_known_as(self.context.payload.kind, self.known_as, self.attributes)

@@ -18,7 +18,7 @@ from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.command import Task
 from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge, Pose
 from executive.words.outlines import inside
-from skills.api import Cause, Failed, ObjectObservation, Publish, Thing
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Publish
 from skills.detect.words import counted, numbered, plural, told_apart
 from skills.files.errors import listing
 
@@ -132,13 +132,13 @@ def _obstacle(nodes: Mapping[str, Explained]) -> Cause:
 
 
 def surfaces_elsewhere(
-    knowledge: Knowledge, thing: str, place: str | None, avoided: frozenset[str] = frozenset()
+    knowledge: Knowledge, item: str, place: str | None, avoided: frozenset[str] = frozenset()
 ) -> tuple[str, ...]:
     """The surfaces to look at when the object is not in its place: where it usually is, then others of the same room,
     then any others, the nearest first; `MOST_ELSEWHERE` at most, and none that are `avoided`."""
     if place is None:
         return ()
-    usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
+    usual = (name for spot in knowledge.usual_surfaces(item) for name in knowledge.surfaces_in(spot))
     near = knowledge.surfaces_in(knowledge.room(place))
     inside = knowledge.surfaces_in(place)
     here = knowledge.place_pose(place)
@@ -154,7 +154,7 @@ def _apart_m(one: Pose, other: Pose) -> float:
 
 def look_plans(
     builder: PlanBuilder,
-    thing: Thing,
+    item: ObjectKind,
     surfaces: tuple[str, ...],
     key: str,
     extra: Ports = NO_PORTS,
@@ -166,9 +166,7 @@ def look_plans(
     With `tallied`, all that a look saw goes to a key of its own (see `tally_of`).
     """
     views = [(name, n) for name in surfaces for n in range(1, len(builder.knowledge.surfaces[name].viewpoints) + 1)]
-    return tuple(
-        (name, _look_plan(builder.at(f"{name}-{n}"), thing, name, n, key, extra, tallied)) for name, n in views
-    )
+    return tuple((name, _look_plan(builder.at(f"{name}-{n}"), item, name, n, key, extra, tallied)) for name, n in views)
 
 
 def tally_of(leaf: NodeSpec) -> str:
@@ -178,13 +176,13 @@ def tally_of(leaf: NodeSpec) -> str:
 
 
 def _look_plan(
-    builder: PlanBuilder, thing: Thing, surface: str, number: int, key: str, extra: Ports, tallied: bool
+    builder: PlanBuilder, item: ObjectKind, surface: str, number: int, key: str, extra: Ports, tallied: bool
 ) -> NodeSpec:
     view = builder.knowledge.surfaces[surface].viewpoints[number - 1]
     return builder.sequence(
         f"look at {surface}" + (f" ({number})" if number > 1 else ""),
         builder.navigate(pose_2d(view), f"the {surface}"),
-        detect_plan(builder, thing, (surface,), key, extra, tallied=tallied),
+        detect_plan(builder, item, (surface,), key, extra, tallied=tallied),
     )
 
 
@@ -215,7 +213,7 @@ def _look_about_plan(builder: PlanBuilder, person: str, room: str, key: str, tal
 
 def detect_plan(
     builder: PlanBuilder,
-    thing: Thing,
+    item: ObjectKind,
     surfaces: tuple[str, ...] | FromBoard,
     key: str,
     extra: Ports = NO_PORTS,
@@ -224,46 +222,50 @@ def detect_plan(
 ) -> NodeSpec:
     """Looks for the object on some surfaces, by name or from the blackboard, from where the robot stands."""
     where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(builder.surface, surfaces))
-    ports = {"classes": builder.sought(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
+    ports = {"classes": builder.sought(item.name), "attributes": item.attributes, "surfaces": where_to_look}
     tally = {_TALLY: builder.key("all")} if tallied else {}
     return builder.skill("detect", {**ports, **extra}, {"observation": key, **tally})
 
 
-def find_again_plan(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodeSpec:
+def find_again_plan(builder: PlanBuilder, item: ObjectKind, surfaces: tuple[str, ...], key: str) -> NodeSpec:
     """When it was seen before: look from here first, where it was seen, and at the floor beside. Else passed over."""
     seen_on = SurfaceOfDetection(key, tuple(map(builder.surface, surfaces)))
     floor = {"floor": True} if builder.has_ports("detect", ("floor",)) else NO_PORTS
-    look = detect_plan(builder, thing, seen_on, key, floor)
+    look = detect_plan(builder, item, seen_on, key, floor)
     return builder.node("only if known", "look from here, if seen before", look, key=key)
 
 
-def search_plan(builder: PlanBuilder, thing: Thing, place: str | None, key: str, *, anywhere: bool = True) -> NodeSpec:
+def search_plan(
+    builder: PlanBuilder, item: ObjectKind, place: str | None, key: str, *, anywhere: bool = True
+) -> NodeSpec:
     """Looks from here when it was seen before, else at each surface in turn; the first detection ends the search.
 
     When it is nowhere in its place, look at some of its surfaces from aside, then, with `anywhere`, at surfaces
     elsewhere. Raises InputError: the place has no surfaces.
     """
-    surfaces = required_surfaces(builder, thing, place)
-    name = builder.knowledge.thing(thing.name) or thing.name
+    surfaces = required_surfaces(builder, item, place)
+    name = builder.knowledge.object_name(item.name) or item.name
     elsewhere = (
         surfaces_elsewhere(builder.knowledge, name, place, builder.avoided) if anywhere and builder.anywhere else ()
     )
-    looks = look_plans(builder, thing, surfaces, key)
-    further = look_plans(builder.at("elsewhere"), thing, elsewhere, key)
+    looks = look_plans(builder, item, surfaces, key)
+    further = look_plans(builder.at("elsewhere"), item, elsewhere, key)
     looked = where(builder.knowledge, place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
     return builder.node(
         "selector",
-        f"find {thing}",
-        find_again_plan(builder.at("again"), thing, (*surfaces, *elsewhere), key),
+        f"find {item}",
+        find_again_plan(builder.at("again"), item, (*surfaces, *elsewhere), key),
         *(look for _, look in looks),
-        *_looks_from_aside(builder, thing, surfaces, key),
+        *_looks_from_aside(builder, item, surfaces, key),
         *(look for _, look in further),
         exhausted_cause=Cause.PRECONDITION,
-        exhausted_message=f"found no {thing} {looked}",
+        exhausted_message=f"found no {item} {looked}",
     )
 
 
-def _looks_from_aside(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, ...], key: str) -> Iterator[NodeSpec]:
+def _looks_from_aside(
+    builder: PlanBuilder, item: ObjectKind, surfaces: tuple[str, ...], key: str
+) -> Iterator[NodeSpec]:
     """Looks again at surfaces that have only one viewpoint, from beside it."""
     facts = builder.knowledge.surfaces
     single = [name for name in surfaces if len(facts[name].viewpoints) == 1]
@@ -274,13 +276,13 @@ def _looks_from_aside(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, .
         aside = next((pose for pose in poses if inside(room, (pose.x_m, pose.y_m))), None)
         if aside is not None:
             below = builder.at(f"{name}-aside")
-            look = detect_plan(below, thing, (name,), key)
+            look = detect_plan(below, item, (name,), key)
             yield below.sequence(f"look at {name} from aside", below.navigate(aside, f"the side of the {name}"), look)
 
 
-def required_surfaces(builder: PlanBuilder, thing: Thing, place: str | None) -> tuple[str, ...]:
+def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
     """The surfaces to look at. Raises InputError when there are none."""
-    surfaces = surfaces_to_search(builder.knowledge, builder.knowledge.thing(thing.name) or thing.name, place)
+    surfaces = surfaces_to_search(builder.knowledge, builder.knowledge.object_name(item.name) or item.name, place)
     if not surfaces:
         raise builder.error(f"'{place}' has no surface to look at", "add one under 'surfaces' in the knowledge file")
     return surfaces
@@ -310,12 +312,12 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         asked = what if command.object_count == 1 else _asked_for(person, command.object_count)
         looks = people_looks(builder.at("search"), person, place, key, tallied=counting)
     else:
-        thing = builder.known(command.object)
-        what, asked = str(thing), _asked_for(str(thing), command.object_count)
+        item = builder.known(command.object)
+        what, asked = str(item), _asked_for(str(item), command.object_count)
         whole_room = place is None or place in knowledge.places
         extra = {"floor": whole_room, "count": 0 if counting else 1}
-        surfaces = required_surfaces(builder, thing, place)
-        looks = look_plans(builder.at("search"), thing, surfaces, key, extra, tallied=counting)
+        surfaces = required_surfaces(builder, item, place)
+        looks = look_plans(builder.at("search"), item, surfaces, key, extra, tallied=counting)
     below = builder.at("search")
     search = below.node("round" if counting else "selector", f"look for {what}", *(look for _, look in looks))
     leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
@@ -343,11 +345,11 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
     return builder.at("tidy").tidied(answer)
 
 
-def _asked_for(thing: str, count: int) -> str:
+def _asked_for(item: str, count: int) -> str:
     """What a question is about: "beer", "two beers", or "beers" for any number."""
     if count == 1:
-        return thing
-    return numbered(count, thing) if count else plural(thing)
+        return item
+    return numbered(count, item) if count else plural(item)
 
 
 def answering(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
@@ -364,8 +366,8 @@ def refuse_several(builder: PlanBuilder) -> None:
     """
     command = builder.command
     asked = 1 if command.task in (Task.FIND, Task.WAIT) else command.object_count
-    for thing, count in ((command.item, command.item_count), (command.object, asked)):
+    for item, count in ((command.item, command.item_count), (command.object, asked)):
         if count != 1:
-            said = f"{count} of '{thing}'" if count else f"an open number of '{thing}'"
+            said = f"{count} of '{item}'" if count else f"an open number of '{item}'"
             hint = "say from where to where, and how many, or ask for one at a time"
             raise builder.error(f"{said} cannot be carried in one go", hint)

@@ -197,7 +197,7 @@ def _spoken(match: str | None, builder: PlanBuilder) -> dict[str, str]:
     groups: Mapping[str, tuple[Sequence[str], Callable[[str], str | None]]] = {
         "place": (knowledge.place_names(), knowledge.place),
         "person": (tuple(knowledge.people), knowledge.person),
-        "object": (knowledge.thing_names(), knowledge.thing),
+        "object": (knowledge.object_names(), knowledge.object_name),
     }
     if match is None or match not in groups:
         return {}

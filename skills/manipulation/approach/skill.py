@@ -100,21 +100,21 @@ class Approach(ApproachPorts, LookingSkill[ApproachInputs]):
         """Judged by the robot's pose."""
         (x, y, _), pose = inputs.observation.position_W, self.context.pose()
         off_m = math.hypot(x - pose.x_m, y - pose.y_m)
-        return None if off_m < _STILL_BEFORE_M else f"the robot is {off_m:.1f} m from the {inputs.observation.thing}"
+        return None if off_m < _STILL_BEFORE_M else f"the robot is {off_m:.1f} m from the {inputs.observation.kind}"
 
     def _look_again(self, inputs: ApproachInputs) -> Routine[Succeeded]:
         seen = inputs.observation
         surfaces, on_floor = own_surfaces(inputs), seen.surface == FLOOR
         again = DetectInputs(
-            (seen.thing.name,),
+            (seen.kind.name,),
             surfaces,
-            seen.thing.attributes,
+            seen.kind.attributes,
             seen.position_W,
             floor=on_floor,
             seen_before=seen,
         )
         found = yield from self.perform(Detect(self.context), again)
-        return Succeeded(f"standing before the {seen.thing}", found.outputs)
+        return Succeeded(f"standing before the {seen.kind}", found.outputs)
 
     def _free_places(self, seen: ObjectObservation) -> list[Standing]:
         context = self.context
@@ -127,8 +127,8 @@ class Approach(ApproachPorts, LookingSkill[ApproachInputs]):
         """Returns whether the object itself is beyond the gripper, or only the places about it are."""
         target, p_BS = observed_target(seen, self.X_WB()), self.model.p_BS
         if self.context.stack.grasp_planner.candidates(target, p_BS=p_BS, gripper=self.gripper):
-            return f"there is no free place to stand from which the {seen.thing} is within reach"
-        return without_grasp(target, p_BS, self.gripper, str(seen.thing))
+            return f"there is no free place to stand from which the {seen.kind} is within reach"
+        return without_grasp(target, p_BS, self.gripper, str(seen.kind))
 
 
 def own_surfaces(inputs: ApproachInputs) -> tuple[Surface, ...]:

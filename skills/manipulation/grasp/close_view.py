@@ -9,7 +9,7 @@ from functools import reduce
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import LocalisationEstimate, ObjectObservation, Surface, Thing
+from skills.api import LocalisationEstimate, ObjectKind, ObjectObservation, Surface
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
 from skills.manipulation.arm.collision import Box
 from skills.manipulation.grasp.candidates import Target
@@ -64,11 +64,11 @@ def examine(
     view = view_surface(image, place.X_WO, surface, margin_m=0.0)
     if view is None:
         return None
-    own = [each for each in found if seen.thing.name in (THING, each.detection.class_name)]
+    own = [each for each in found if seen.kind.name in (THING, each.detection.class_name)]
     view = reduce(parted, own, view)
-    if seen.thing.name == THING:
+    if seen.kind.name == THING:
         view, own = apart(view, camera_pose_W(image, place.X_WO).translation()), []
-    cluster = _same_thing(view, seen, own, within_m)
+    cluster = _same_object(view, seen, own, within_m)
     if cluster is None:
         return None
     names = {id(cluster_of(view.clusters, each)): each.class_name for each in found}
@@ -98,7 +98,7 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
     return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), top_m)
 
 
-def _same_thing(
+def _same_object(
     view: SurfaceView, seen: ObjectObservation, found: Sequence[Detection3D], within_m: float
 ) -> Cluster | None:
     """The cluster that is the object: detected as of its class and nearest, else nearest of all; None: all are far."""
@@ -120,7 +120,7 @@ def _observed(cluster: Cluster, name: str, beside: ObjectObservation, image: Ima
     (x, y), shape = cluster.shape.centre, cluster.shape
     return ObjectObservation(
         stamp_s=image.stamp_s,
-        thing=Thing(name),
+        kind=ObjectKind(name),
         position_W=(float(x), float(y), cluster.base_m + 0.5 * shape.height_m),
         size_m=(shape.length_m, shape.width_m, shape.height_m),
         yaw_rad=shape.yaw_rad,

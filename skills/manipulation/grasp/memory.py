@@ -45,7 +45,7 @@ def same_grasp(one: TriedGrasp, other: TriedGrasp) -> bool:
     least = math.cos(SAME_TURN_RAD)
     pointing = float(np.dot(one.pointing_W, other.pointing_W))
     closing = abs(float(np.dot(one.closing_W, other.closing_W)))
-    apart_xy_m = float(np.linalg.norm(np.subtract(one.hand_from_thing_W, other.hand_from_thing_W)[:2]))
+    apart_xy_m = float(np.linalg.norm(np.subtract(one.hand_from_object_W, other.hand_from_object_W)[:2]))
     return pointing > least and closing > least and apart_xy_m < SAME_PLACE_M
 
 

@@ -56,7 +56,7 @@ class Obstacle:
 class Surroundings:
     """What stands around the object, and the object itself, as boxes in B; `up_B` points up in the body frame.
 
-    `others` are the objects among the boxes. `thing` and `reach_m`, the arm's furthest reach, serve to say why there is
+    `others` are the objects among the boxes. `name` and `reach_m`, the arm's furthest reach, serve to say why there is
     no grasp.
     """
 
@@ -64,7 +64,7 @@ class Surroundings:
     target: Box
     up_B: FloatArray
     others: Sequence[Obstacle] = ()
-    thing: str = "object"
+    name: str = "object"
     reach_m: float = np.inf
 
     def lets_rise(self, lift_B: FloatArray) -> bool:
@@ -134,7 +134,7 @@ class GeometricGraspPlanner:
             outputs = {IN_THE_WAY: tuple(other.seen for other in in_the_way)}
             raise PlanningError(_behind(scene.model, around, in_the_way), outputs)
         last = f": {max(sorted(set(reasons)), key=reasons.count)}" if reasons else ""
-        raise PlanningError(f"none of {len(candidates)} grasps of the {around.thing} is within reach and free{last}")
+        raise PlanningError(f"none of {len(candidates)} grasps of the {around.name} is within reach and free{last}")
 
     def _in_the_way(
         self,
@@ -195,7 +195,7 @@ class GeometricGraspPlanner:
 
 def _out_of_reach(model: ArmModel, around: Surroundings) -> str:
     off_m = float(np.linalg.norm(around.target.X_FG.translation() - model.p_BS))
-    where = f"the {around.thing} is out of reach: {off_m:.2f} m from the shoulder"
+    where = f"the {around.name} is out of reach: {off_m:.2f} m from the shoulder"
     if off_m > around.reach_m:
         return f"{where}, and the arm reaches {around.reach_m:.2f} m"
     return f"{where}, and the arm does not turn the hand there as a grasp needs it"
@@ -205,8 +205,8 @@ def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -
     """Which other objects are in the way: before the object as the shoulder sees it, or close beside it."""
     p_ST = around.target.X_FG.translation() - model.p_BS
     before = any((other.centre_B - model.p_BS) @ p_ST < p_ST @ p_ST for other in others)
-    names = " and ".join(f"the {other.seen.thing}" for other in others)
-    return f"the {around.thing} is {'behind' if before else 'too near'} {names}"
+    names = " and ".join(f"the {other.seen.kind}" for other in others)
+    return f"the {around.name} is {'behind' if before else 'too near'} {names}"
 
 
 def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, margin_rad: float = 0.08) -> bool:

@@ -17,7 +17,7 @@ class TriedGrasp:
 
     pointing_W: tuple[Cosine, Cosine, Cosine]
     closing_W: tuple[Cosine, Cosine, Cosine]
-    hand_from_thing_W: tuple[Coordinate, Coordinate, Coordinate]
+    hand_from_object_W: tuple[Coordinate, Coordinate, Coordinate]
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ _RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.014, 0.1
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
 _FEEL_S = 0.4
 _AIM_LATENCY_S = 0.1
-_AT_THING_M = 0.4
+_AT_OBJECT_M = 0.4
 _CARRY_RAD_S, _GENTLY_RAD_S, _LONG_LEVER_M = 0.9, 0.45, 0.05
 _HEIGHTS_TRIED = 2
 _PULL_BACK_UP_M = (0.02, 0.0)
@@ -74,11 +74,11 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
 
     def undone(self, inputs: GraspInputs) -> str | None:
         """Judged by the gripper."""
-        return None if self.context.robot.gripper().holding else f"the {inputs.observation.thing} is not in the gripper"
+        return None if self.context.robot.gripper().holding else f"the {inputs.observation.kind} is not in the gripper"
 
     def run(self, inputs: GraspInputs) -> Routine[Succeeded]:
         """Look, plan, take, lift, carry."""
-        thing = inputs.observation.thing
+        name = inputs.observation.kind
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "the gripper holds something already")
         seen = inputs.observation
@@ -89,11 +89,11 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
             yield from self._let_go(draw_back=len(self._tried) > len(inputs.avoid))
             raise self._telling(failure) from failure
         try:
-            yield from self._carry(plan.candidate, str(thing), view.target.height_m < THIN_M)
-            yield from self.stand_as_usual(f"carrying the {thing}")
+            yield from self._carry(plan.candidate, str(name), view.target.height_m < THIN_M)
+            yield from self.stand_as_usual(f"carrying the {name}")
         except SkillFailure as failure:
             raise self._telling(failure) from failure
-        return Succeeded(f"holding the {thing}", self._learnt())
+        return Succeeded(f"holding the {name}", self._learnt())
 
     def _take_where_it_is(self, inputs: GraspInputs) -> Routine[tuple[CloseView, GraspPlan]]:
         """Look, plan and take; what moved meanwhile is looked at once more. Raises SkillFailure."""
@@ -103,30 +103,30 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         if moved:
             view, plan = yield from self._look_and_plan(seen, inputs.avoid)
             if (yield from self._taken(view, plan, inputs)):
-                raise SkillFailure(Cause.PRECONDITION, f"the {seen.thing} moves while the hand reaches for it")
+                raise SkillFailure(Cause.PRECONDITION, f"the {seen.kind} moves while the hand reaches for it")
         return view, plan
 
     def _taken(self, view: CloseView, plan: GraspPlan, inputs: GraspInputs) -> Routine[bool]:
         """Reaches for the object and takes it, unless it is seen to have moved away: then whether it has."""
         seen = inputs.observation
         self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
-        aimed = yield from self._reach(view, plan, str(seen.thing))
+        aimed = yield from self._reach(view, plan, str(seen.kind))
         if aimed is None:
             return True
         yield from self._take(*aimed, seen)
         return False
 
-    def _reach(self, view: CloseView, plan: GraspPlan, thing: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
+    def _reach(self, view: CloseView, plan: GraspPlan, name: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
         """Brings the hand to the pre-grasp; view and plans as they are aimed there (see `_aimed`)."""
-        yield from self.follow(plan.to_pregrasp, f"reaching for the {thing}")
-        return (yield from self._aimed(view, plan, thing))
+        yield from self.follow(plan.to_pregrasp, f"reaching for the {name}")
+        return (yield from self._aimed(view, plan, name))
 
-    def _aimed(self, view: CloseView, plan: GraspPlan, thing: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
+    def _aimed(self, view: CloseView, plan: GraspPlan, name: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
         """View and plan corrected across the fingers by what is seen from the pre-grasp; None: the object is not there.
 
         Along the fingers, the guard stops the hand; along the object, a few cm do not matter.
         """
-        message = f"reaching for the {thing}"
+        message = f"reaching for the {name}"
         if not self.object_camera.on_hand:
             return view, plan
         image = yield from self.picture(message, settle_s=0.0)
@@ -153,7 +153,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         """Looks and plans with the body at the height that suits best, or at another where that one does not do."""
 
         heights_m = yield from self._heights(seen)
-        message = f"standing up to the {seen.thing}"
+        message = f"standing up to the {seen.kind}"
         return (yield from self.from_a_height(heights_m, message, lambda: self._look_and_plan(seen, avoid)))
 
     def _look_and_plan(
@@ -161,7 +161,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
     ) -> Routine[tuple[CloseView, GraspPlan]]:
         """What is seen from the height at which the body stands, and a plan for it."""
         view = yield from self._look_closely(seen)
-        return view, (yield from self._plan(view, str(seen.thing), avoid))
+        return view, (yield from self._plan(view, str(seen.kind), avoid))
 
     def _heights(self, seen: ObjectObservation) -> Routine[list[float]]:
         """Body heights (m) from which the arm seems to reach the object, the best first; at least the usual one."""
@@ -184,7 +184,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
             found = sorted(check.all(pose.transform, heights_m), key=lambda each: each.cost)
             return [each.height_m for each in found][:_HEIGHTS_TRIED], check.arm_W(pose.transform, heights_m)
 
-        message = f"choosing how high to stand before the {seen.thing}"
+        message = f"choosing how high to stand before the {seen.kind}"
         return (yield from self.compute(choose, latency_s=0.1, name="choose a height", message=message))
 
     def begin(self, inputs: GraspInputs) -> None:
@@ -213,27 +213,27 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         """An object in the gripper is taken along; with an empty gripper all begins anew."""
         seen, self._watch = inputs.observation, None
         yield from self.pause(_FEEL_S, "feeling what the gripper holds")
-        at_thing = self.hand_near(np.array(seen.position_W), _AT_THING_M)
+        at_object = self.hand_near(np.array(seen.position_W), _AT_OBJECT_M)
         if not self.context.robot.gripper().holding:
-            if at_thing:
+            if at_object:
                 yield from self._let_go()
             return (yield from self.run(inputs))
-        yield from self._take_along(seen, at_thing)
-        return Succeeded(f"the {seen.thing} was in the gripper already; holding it", self._learnt())
+        yield from self._take_along(seen, at_object)
+        return Succeeded(f"the {seen.kind} was in the gripper already; holding it", self._learnt())
 
-    def _take_along(self, seen: ObjectObservation, at_thing: bool) -> Routine[None]:
+    def _take_along(self, seen: ObjectObservation, at_object: bool) -> Routine[None]:
         """Clamp, lift and draw back what the gripper grips, carry it near the body, and check that it is held."""
-        yield from self.move_gripper(0.0, self.options.force_n, f"closing on the {seen.thing}")
-        yield from self.pause(_FEEL_S, f"closing on the {seen.thing}")
-        message, opening = f"carrying the {seen.thing}", self._check_held(str(seen.thing), None)
+        yield from self.move_gripper(0.0, self.options.force_n, f"closing on the {seen.kind}")
+        yield from self.pause(_FEEL_S, f"closing on the {seen.kind}")
+        message, opening = f"carrying the {seen.kind}", self._check_held(str(seen.kind), None)
         R_BH = self.model.X_BH(self.q_rad()).rotation()
-        if at_thing:
-            yield from self._lifted((), f"lifting the {seen.thing}")
+        if at_object:
+            yield from self._lifted((), f"lifting the {seen.kind}")
             yield from self.try_shift_hand(-self.options.pull_back_m * R_BH.matrix()[:, 0] * [1.0, 1.0, 0.0], message)
         arm = self.arm
         yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q), message, speed_rad_s=0.9)
         yield from self.pause(0.2, message)
-        self._check_held(str(seen.thing), opening)
+        self._check_held(str(seen.kind), opening)
         yield from self.stand_as_usual(message)
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
@@ -257,13 +257,13 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
             if best is not None and (best.target.upright or best.target.length_m > _MOST_OF_IT * seen.size_m[0]):
                 break
         if best is None:
-            raise SkillFailure(Cause.PRECONDITION, f"the {seen.thing} is no longer where it was seen")
+            raise SkillFailure(Cause.PRECONDITION, f"the {seen.kind} is no longer where it was seen")
         self.known_W = space_about(seen, LOOK_HALF_SIDE_M)
         return best
 
     def _view_from(self, seen: ObjectObservation, base_m: float, aside_rad: float) -> Routine[CloseView | None]:
         """What a picture from near shows of the object, the camera turned about it; None when it is not there."""
-        message = f"looking closely at the {seen.thing}"
+        message = f"looking closely at the {seen.kind}"
         surface = square(seen.position_W, base_m, seen.surface or "surface")
         p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
         if aside_rad != 0.0 or not self._looks_closely(p_BT):
@@ -274,7 +274,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
 
         def look() -> CloseView | None:
             found = detections_in(detector, image)
-            named = [each for each in found if seen.thing.name in (THING, each.class_name)]
+            named = [each for each in found if seen.kind.name in (THING, each.class_name)]
             rest = [each for each in found if each not in named]
             placed = tuple(one for some in (named, rest) for one in detections_3d(image, place, some, [surface]))
             return examine(image, X_WB, surface, seen, place, placed, self.options.same_object_m)
@@ -287,18 +287,18 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         open_wide = self.context.robot.gripper().opening > WIDE * self.widest
         return camera.on_hand and open_wide and sees_closely(self.model.X_BH(self.q_rad()) @ camera.X_FC, p_BT)
 
-    def _plan(self, view: CloseView, thing: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
+    def _plan(self, view: CloseView, name: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
         self.boxes = view.boxes
         candidates = self.context.stack.grasp_planner.candidates(view.target, self.model.p_BS, self.gripper)
         candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
-            raise SkillFailure(Cause.PLANNING, without_grasp(view.target, self.model.p_BS, self.gripper, thing))
+            raise SkillFailure(Cause.PLANNING, without_grasp(view.target, self.model.p_BS, self.gripper, name))
         openings_rad = openings(candidates, self.gripper)
         scene_now, q, stack, seen = self.scene_now(), self.q_rad(), self.context.stack, self.seen_boxes()
         arm = self.context.robot.capabilities().arm
         reach_m = np.inf if arm is None else arm.max_reach_m
 
-        around = Surroundings((*view.boxes, *seen), view.target_box, up_B(view.X_WB), view.others, thing, reach_m)
+        around = Surroundings((*view.boxes, *seen), view.target_box, up_B(view.X_WB), view.others, name, reach_m)
 
         def planned(scene: ArmScene, opening: float, space: Surroundings) -> tuple[GraspPlan, float]:
             """A plan for a gripper that is open so far, and that opening."""
@@ -314,7 +314,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
             return planned(scene, last_rad, around)
 
         found, opening = yield from self.compute(
-            plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}"
+            plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {name}"
         )
         yield from self.move_gripper(opening, GRIPPER_FORCE_N, "opening the gripper")
         return found
@@ -324,34 +324,34 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
 
         Raises SkillFailure with cause POSTCONDITION when it is not held then, PRECONDITION when it is too heavy.
         """
-        thing, least_kg = str(seen.thing), least_mass_kg(seen)
-        yield from self.follow(plan.to_grasp, f"reaching for the {thing}")
+        name, least_kg = str(seen.kind), least_mass_kg(seen)
+        yield from self.follow(plan.to_grasp, f"reaching for the {name}")
         ahead = plan.candidate.X_BH.rotation().matrix()[:, 0]
-        touched = yield from self.follow(plan.last_bit, f"reaching for the {thing}", self.held_up(ahead))
+        touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", self.held_up(ahead))
         relax_m = _RELAX_M if view.target.height_m > THIN_M else _RELAX_THIN_M
-        yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {thing}")
+        yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
         X_BH = self.model.X_BH(self.q_rad())
-        self.context.payload.thing = seen.thing
+        self.context.payload.kind = seen.kind
         force_n = self.options.force_n + _PER_LEVER_N_M * plan.candidate.lever_m
         most_n = _MOST_OF_FORCE * self.gripper.max_force_n
-        yield from self.move_gripper(0.0, min(force_n + _PER_KG_N * least_kg, most_n), f"closing on the {thing}")
-        yield from self.pause(0.4, f"closing on the {thing}")
-        opening = self._check_held(thing, None)
+        yield from self.move_gripper(0.0, min(force_n + _PER_KG_N * least_kg, most_n), f"closing on the {name}")
+        yield from self.pause(0.4, f"closing on the {name}")
+        opening = self._check_held(name, None)
         turns = view.target.upright and self.gripper.kind is GripperKind.HINGED
         X_BH = turned_in_hand(X_BH, self.p_HT) if turns else X_BH
         self.held = [held_box(X_BH.inverse(), view.target_box)]
         self.context.payload.corners_H = box_corners(self.held[0])
         self.context.payload.R_BH = X_BH.rotation()
         self._watch = self.hold_watch()
-        if not (yield from self._lifted([plan.lift_B], f"lifting the {thing}")):
+        if not (yield from self._lifted([plan.lift_B], f"lifting the {name}")):
             raise SkillFailure(Cause.PLANNING, "the arm cannot lift the object from where it has hold of it")
         self._watch = None
         p_HO = self.held[0].X_FG.translation()
-        mass_kg = yield from self.weigh(p_HO, f"lifting the {thing}")
-        self._check_held(thing, opening)
-        yield from self._refuse_heavy(mass_kg, plan.lift_B, thing)
+        mass_kg = yield from self.weigh(p_HO, f"lifting the {name}")
+        self._check_held(name, opening)
+        yield from self._refuse_heavy(mass_kg, plan.lift_B, name)
         firmly_n = min(force_n + _PER_KG_N * max(mass_kg, least_kg), most_n)
-        yield from self.move_gripper(0.0, firmly_n, f"lifting the {thing}")
+        yield from self.move_gripper(0.0, firmly_n, f"lifting the {name}")
 
     def _refuse_known_heavy(self, seen: ObjectObservation) -> None:
         """Raises SkillFailure with cause PRECONDITION for what is known, by its class and size, to be too heavy."""
@@ -360,7 +360,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         if too_heavy is not None:
             raise SkillFailure(Cause.PRECONDITION, too_heavy)
 
-    def _refuse_heavy(self, mass_kg: float, lift_B: FloatArray, thing: str) -> Routine[None]:
+    def _refuse_heavy(self, mass_kg: float, lift_B: FloatArray, name: str) -> Routine[None]:
         """Sets down again what weighs more than the arm may carry, and raises SkillFailure with cause PRECONDITION."""
         arm = self.context.robot.capabilities().arm
         if arm is None or mass_kg <= arm.max_payload_kg:
@@ -369,11 +369,11 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - lift_B)
         try:
             down = planner.timed(planner.line(self.model, self.q_rad(), lowered), speed_rad_s=_FEEL_RAD_S)
-            yield from self.follow(down, f"setting the {thing} down again", self.held_up(-up_B(self.X_WB())))
+            yield from self.follow(down, f"setting the {name} down again", self.held_up(-up_B(self.X_WB())))
         except PlanningError:
             pass
         most = f"the arm carries {arm.max_payload_kg:.1f} kg at most"
-        raise SkillFailure(Cause.PRECONDITION, f"the {thing} weighs {mass_kg:.1f} kg, and {most}")
+        raise SkillFailure(Cause.PRECONDITION, f"the {name} weighs {mass_kg:.1f} kg, and {most}")
 
     def _to_the_ground(self, ahead_B: FloatArray, touched: bool, relax_m: float, message: str) -> Routine[None]:
         """Fingers that point down go on until they touch the surface, whose height is known to a few mm only."""
@@ -397,19 +397,19 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
                 return True
         return False
 
-    def _check_held(self, thing: str, opening_before_rad: float | None) -> float:
+    def _check_held(self, name: str, opening_before_rad: float | None) -> float:
         gripper = self.context.robot.gripper()
         if gripper.opening < self.gripper.like_turn(_CLOSED_RAD) or not gripper.holding:
-            raise SkillFailure(Cause.POSTCONDITION, f"the gripper closed on nothing where the {thing} was seen")
+            raise SkillFailure(Cause.POSTCONDITION, f"the gripper closed on nothing where the {name} was seen")
         slip = self.gripper.like_turn(self.options.slip_rad)
         if opening_before_rad is not None and abs(gripper.opening - opening_before_rad) > slip:
-            raise SkillFailure(Cause.POSTCONDITION, f"the {thing} slipped in the gripper while it was lifted")
+            raise SkillFailure(Cause.POSTCONDITION, f"the {name} slipped in the gripper while it was lifted")
         return gripper.opening
 
-    def _carry(self, grasp: GraspCandidate, thing: str, gently: bool) -> Routine[None]:
+    def _carry(self, grasp: GraspCandidate, name: str, gently: bool) -> Routine[None]:
         """Draws back from the surface, holds the object near the body, and checks once more."""
-        opening, self._watch = self._check_held(thing, None), self.hold_watch()
-        message = f"carrying the {thing}"
+        opening, self._watch = self._check_held(name, None), self.hold_watch()
+        message = f"carrying the {name}"
         for up_m in _PULL_BACK_UP_M:
             way_B = self.options.pull_back_m * pull_back_B(grasp.X_BH, self.model.p_BS) + up_m * up_B(self.X_WB())
             if (yield from self.try_shift_hand(way_B, message, clear_of_boxes=True)):
@@ -419,7 +419,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         arm = self.arm
         yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q), message, speed_rad_s)
         yield from self.pause(0.2, message)
-        self._check_held(thing, opening)
+        self._check_held(name, opening)
 
     def _let_go(self, draw_back: bool = True) -> Routine[None]:
         """On failure: open the gripper, draw back from the object, stow; what does not work is left out."""

@@ -36,7 +36,7 @@ def look_into_unseen(skill: LookingSkill[Any], seen: ObjectObservation, arm_W: F
     p_BT = skill.X_WB().inverse() @ unseen_W.mean(axis=0)
     if np.linalg.norm(p_BT - skill.model.p_BS) > _FURTHEST_M:
         return False
-    message = f"looking above the {seen.thing}"
+    message = f"looking above the {seen.kind}"
     try:
         yield from skill.look_at(p_BT, level_viewpoints(skill.model, p_BT), message)
     except SkillFailure as failure:

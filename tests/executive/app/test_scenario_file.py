@@ -4,7 +4,7 @@ import pytest
 
 from executive.app.scenarios import read_scenario
 from executive.mission.request import Request
-from executive.words.knowledge import Door, Knowledge, Person, Place, Pose, SurfaceFacts, ThingFacts
+from executive.words.knowledge import Door, Knowledge, ObjectFacts, Person, Place, Pose, SurfaceFacts
 from skills.files.errors import InputError
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
@@ -13,7 +13,7 @@ KNOWLEDGE = Knowledge(
     places={name: Place(pose=Pose(x=x, y=2.0), polygon=SQUARE) for name, x in (("kitchen", 1.0), ("hall", 5.0))},
     doors=(Door(between=("kitchen", "hall"), at=(3.0, 2.0), width=0.9),),
     surfaces={"table": SurfaceFacts(place="kitchen", height=0.7, polygon=SQUARE, viewpoints=(Pose(x=0.5, y=2.0),))},
-    things={"coke": ThingFacts(categories=("drink",))},
+    things={"coke": ObjectFacts(categories=("drink",))},
     people={"Robin": Person(at="hall", aliases=("the boss",))},
 )
 OBJECTS = {"coke_1": "coke", "coke_2": "coke", "hammer": "hammer"}

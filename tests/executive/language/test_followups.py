@@ -12,7 +12,7 @@ from executive.language.followups import (
     without_fetching,
 )
 from executive.words.command import parse_command
-from skills.api import Thing
+from skills.api import ObjectKind
 
 FETCH = tuple(
     map(
@@ -65,13 +65,13 @@ def texts(commands):
     ("by", "commands"),
     [
         (
-            Amendment(thing=Thing("hammer")),
+            Amendment(thing=ObjectKind("hammer")),
             [
                 "Take [Nothing] to [workshop] and do [grasp] to [hammer]",
                 "Take [hammer] to [start] and do [Nothing] to [Nothing]",
             ],
         ),
-        (Amendment(thing=Thing("hammer"), old="beer"), texts(FETCH)),
+        (Amendment(thing=ObjectKind("hammer"), old="beer"), texts(FETCH)),
         (
             Amendment(goal="Robin", goal_at="hall"),
             [str(FETCH[0]), "Take [coke] to [Robin at hall] and do [Nothing] to [Nothing]"],
@@ -98,11 +98,11 @@ def test_the_place_that_was_named_is_changed(knowledge):
 
 
 def test_a_thing_that_is_held_is_not_gone_for_again(knowledge):
-    assert without_fetching(FETCH, Thing("coke"), knowledge) == FETCH[1:]
+    assert without_fetching(FETCH, ObjectKind("coke"), knowledge) == FETCH[1:]
 
 
 def test_another_thing_is_put_down_first(knowledge):
-    commands = without_fetching(FETCH, Thing("hammer"), knowledge)
+    commands = without_fetching(FETCH, ObjectKind("hammer"), knowledge)
     assert texts(commands)[0] == "Take [hammer] to [workbench] and do [place] to [hammer]"
     assert commands[1:] == FETCH
 

@@ -54,7 +54,7 @@ def test_a_refusal_is_short_and_names_what_is_near_not_all_that_is_known(parser,
     answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
     assert answer.unknown_words == (unknown,)
     assert hint in answer.reason
-    assert sum(name in answer.reason for name in (*knowledge.thing_names(), *knowledge.place_names())) <= 3
+    assert sum(name in answer.reason for name in (*knowledge.object_names(), *knowledge.place_names())) <= 3
 
 
 def test_the_verb_is_kept(parser, knowledge):

@@ -8,7 +8,7 @@ from executive.mission.certainty import refuse_certain, refuse_certain_compariso
 from executive.words.command import Command, Task
 from executive.words.condition import RANGES, AllOf, AnyOf, ButtonPressed, Condition, Look, Not, ValueIs
 from executive.words.expression import Expression, ExpressionError
-from skills.api import Thing
+from skills.api import ObjectKind
 from skills.quantities import Tries
 
 NAMES = {**RANGES, "count": Tries}
@@ -18,7 +18,7 @@ def value(text: str) -> ValueIs:
     return ValueIs(text=text)
 
 
-LOOK = Look.of(Command(item=None, goal=None, task=Task.FIND, object=Thing("beer")))
+LOOK = Look.of(Command(item=None, goal=None, task=Task.FIND, object=ObjectKind("beer")))
 
 
 @pytest.mark.parametrize(

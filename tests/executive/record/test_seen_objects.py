@@ -29,7 +29,7 @@ HERE, BESIDE, THERE = (1.0, 2.0, 0.8), (1.05, 2.0, 0.8), (3.0, 2.0, 0.8)
 
 
 def names(*events):
-    return [(seen.thing.name, seen.surface) for seen in seen_objects(events)]
+    return [(seen.kind.name, seen.surface) for seen in seen_objects(events)]
 
 
 def test_a_track_counts_when_it_is_confirmed():

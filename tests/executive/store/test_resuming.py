@@ -22,7 +22,7 @@ from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from executive.words.policy import Policy
-from skills.api import Cause, Failed, ObjectObservation, Running, Succeeded, Surface, Thing
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Running, Succeeded, Surface
 from skills.quantities import Coordinate, Length
 
 TIDY = (
@@ -90,7 +90,7 @@ def handling(world, robot, script, registry):
         outputs: ClassVar = {"in_the_way": tuple[ObjectObservation, ...]}
 
         def step(self):
-            if world.in_the_way and self.count == 3 and self.inputs.observation.thing.name == "coke":
+            if world.in_the_way and self.count == 3 and self.inputs.observation.kind.name == "coke":
                 return Failed(Cause.PLANNING, "it is behind another", {"in_the_way": world.in_the_way})
             return super().step()
 
@@ -235,7 +235,7 @@ def test_a_kill_in_any_round_moves_each_object_once(live, store, robot, world, s
 
 def test_a_kill_while_something_is_moved_aside_moves_it_once(live, store, robot, world, script, make):
     script.ends["approach"] = lambda skill: Succeeded("near", {"observation": skill.inputs.observation})
-    cube, allowed = dataclasses.replace(make.COKE, thing=Thing("cube")), Policy(move_aside=1)
+    cube, allowed = dataclasses.replace(make.COKE, kind=ObjectKind("cube")), Policy(move_aside=1)
     world.in_the_way = (cube,)
     result, ticks, _ = live(TIDY, policy=allowed)
     assert (result.outcome, world.grasps, world.places) == (Outcome.SUCCESS, 2, 2)

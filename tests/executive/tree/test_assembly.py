@@ -182,7 +182,7 @@ def test_names_in_texts_are_checked(compiled_steps, refusal):
 def held(tree, number):
     """What the gripper holds before the last step, and whether that is what it held at first."""
     part = tree.parts[number]
-    return (None if part.held is None else (part.held.sure, str(part.held.thing))), part.opening
+    return (None if part.held is None else (part.held.sure, str(part.held.kind))), part.opening
 
 
 @pytest.mark.parametrize(

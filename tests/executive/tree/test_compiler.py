@@ -16,7 +16,7 @@ from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from executive.words.step import Place
-from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
 from skills.files.errors import InputError
 from skills.files.yaml_source import YamlSource
 from skills.robot import Pose2D
@@ -200,7 +200,7 @@ def test_people_are_looked_for_in_rooms(
         if skill.inputs.place not in people_in:
             return Failed(Cause.POSTCONDITION, "nobody")
         (x_m, y_m), *_ = skill.inputs.area_W
-        who = Thing(skill.inputs.person)
+        who = ObjectKind(skill.inputs.person)
         seen = ObjectObservation(0.0, who, (x_m, y_m, 1.0), (0.5, 0.5, 1.7), 0.0, 0.9, skill.inputs.place)
         return Succeeded(f"saw them in the {skill.inputs.place}", {"observation": seen, "observations": (seen,)})
 
@@ -241,7 +241,7 @@ def test_things_are_counted_on_all_surfaces_of_a_place(compiled, run_tree, scrip
         if surface.name not in seen_on:
             return Failed(Cause.POSTCONDITION, "not seen")
         x_m, y_m = surface.polygon_W[0]
-        seen = ObjectObservation(0.0, Thing("coke"), (x_m, y_m, 1.0), (0.1, 0.1, 0.1), 0.0, 0.9, surface.name)
+        seen = ObjectObservation(0.0, ObjectKind("coke"), (x_m, y_m, 1.0), (0.1, 0.1, 0.1), 0.0, 0.9, surface.name)
         return Succeeded("seen", {"observation": seen, "observations": (seen,)})
 
     script.ends["detect"] = look

@@ -9,7 +9,7 @@ import pytest
 from pydantic import Field
 
 from executive.tree.port_values import PortValueError, gathered, port_value
-from skills.api import ObjectObservation, Surface, Thing
+from skills.api import ObjectKind, ObjectObservation, Surface
 from skills.quantities import Length, Speed
 from skills.robot import Pose2D
 
@@ -64,8 +64,8 @@ class Positive:
         ({"x": 1, "y": 2, "yaw": 0.5}, Pose2D, Pose2D(1.0, 2.0, 0.5)),
         ({"x_m": 1, "y_m": 2}, Pose2D, Pose2D(1.0, 2.0, 0.0)),
         ("bedroom", Pose2D, Pose2D(-4.0, 0.0, 0.0)),
-        ("red hammer", Thing, Thing("hammer", ("red",))),
-        ({"name": "hammer", "attributes": ["red"]}, Thing, Thing("hammer", ("red",))),
+        ("red hammer", ObjectKind, ObjectKind("hammer", ("red",))),
+        ({"name": "hammer", "attributes": ["red"]}, ObjectKind, ObjectKind("hammer", ("red",))),
         (7, Any, 7),
         ({"size": 2}, Positive, Positive(2.0)),
     ],
@@ -89,10 +89,10 @@ def test_several_surfaces_are_named_by_their_room_or_in_a_list(knowledge, value,
 
 def test_a_record_of_records(knowledge):
     values = {
-        "stamp": 0.0, "thing": "coke", "position_W": [1, 2, 0.9], "size": [0.1, 0.1, 0.1], "yaw": 0, "score": 1,
+        "stamp": 0.0, "kind": "coke", "position_W": [1, 2, 0.9], "size": [0.1, 0.1, 0.1], "yaw": 0, "score": 1,
     }  # fmt: skip
     seen = port_value(values, ObjectObservation, knowledge)
-    assert (seen.thing, seen.position_W, seen.surface) == (Thing("coke"), (1.0, 2.0, 0.9), None)
+    assert (seen.kind, seen.position_W, seen.surface) == (ObjectKind("coke"), (1.0, 2.0, 0.9), None)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_a_record_of_records(knowledge):
         ("bedrom", Pose2D, (), "did you mean 'bedroom'?"),
         ("kitchen", Surface, (), "known are shelf, counter"),
         ("bathroom", tuple[Surface, ...], (), "known are kitchen"),
-        ("unicorn", Thing, (), "known are coke"),
+        ("unicorn", ObjectKind, (), "known are coke"),
         ({"size": -1}, Positive, (), "size"),
         ([1], Mapping[str, int], (), "a mapping"),
         (1, object, (), "let an earlier step give it"),

@@ -2,32 +2,35 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.words.command import Command, Task, parse_command, thing
-from skills.api import Thing
+from executive.words.command import Command, Task, parse_command, parse_object
+from skills.api import ObjectKind
 
 TEXT_FORMS = [
     (Command(), "Take [Nothing] to [Nothing] and do [Nothing] to [Nothing]"),
     (
-        Command(goal="kitchen", task=Task.GRASP, object=Thing("drink"), verb="fetch"),
+        Command(goal="kitchen", task=Task.GRASP, object=ObjectKind("drink"), verb="fetch"),
         "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
     ),
-    (Command(item=Thing("drink"), goal="start"), "Take [drink] to [start] and do [Nothing] to [Nothing]"),
+    (Command(item=ObjectKind("drink"), goal="start"), "Take [drink] to [start] and do [Nothing] to [Nothing]"),
     (
-        Command(goal="workshop", task=Task.GRASP, object=Thing("wrench", ("red",)), object_count=2),
+        Command(goal="workshop", task=Task.GRASP, object=ObjectKind("wrench", ("red",)), object_count=2),
         "Take [Nothing] to [workshop] and do [grasp] to [2 red wrench]",
     ),
     (
-        Command(item=Thing("wrench", ("red",)), item_count=2, goal="Robin", goal_at="entrance"),
+        Command(item=ObjectKind("wrench", ("red",)), item_count=2, goal="Robin", goal_at="entrance"),
         "Take [2 red wrench] to [Robin at entrance] and do [Nothing] to [Nothing]",
     ),
     (
-        Command(goal="kitchen counter", task=Task.FIND, object=Thing("cokes"), object_count=0),
+        Command(goal="kitchen counter", task=Task.FIND, object=ObjectKind("cokes"), object_count=0),
         "Take [Nothing] to [kitchen counter] and do [find] to [some cokes]",
     ),
-    (Command(item=Thing("apple juice"), goal="desk"), "Take [apple juice] to [desk] and do [Nothing] to [Nothing]"),
-    (Command(item=Thing("red wine"), goal="desk"), 'Take ["red wine"] to [desk] and do [Nothing] to [Nothing]'),
     (
-        Command(item=Thing("cup", ("ceramic",)), goal="desk"),
+        Command(item=ObjectKind("apple juice"), goal="desk"),
+        "Take [apple juice] to [desk] and do [Nothing] to [Nothing]",
+    ),
+    (Command(item=ObjectKind("red wine"), goal="desk"), 'Take ["red wine"] to [desk] and do [Nothing] to [Nothing]'),
+    (
+        Command(item=ObjectKind("cup", ("ceramic",)), goal="desk"),
         'Take [ceramic "cup"] to [desk] and do [Nothing] to [Nothing]',
     ),
 ]
@@ -48,7 +51,7 @@ WORDS = st.lists(
 )
 NAMES = st.one_of(WORDS.map(" ".join), st.from_regex(r"[^\[\]\"\s]+( [^\[\]\"\s]+){0,3}", fullmatch=True))
 ATTRIBUTES = st.from_regex(r"[^\[\]\"\s\d]+", fullmatch=True).filter(lambda word: word != "some")
-THINGS = st.builds(Thing, NAMES, st.lists(ATTRIBUTES, max_size=2).map(tuple))
+THINGS = st.builds(ObjectKind, NAMES, st.lists(ATTRIBUTES, max_size=2).map(tuple))
 
 
 @st.composite
@@ -80,7 +83,7 @@ def test_json_keeps_the_text_form_of_plain_names(command):
 
 def test_json_has_null_for_nothing_and_zero_for_its_count():
     values = Command(
-        goal="kitchen", task=Task.GRASP, object=Thing("wrench", ("red",)), object_count=2, verb="get"
+        goal="kitchen", task=Task.GRASP, object=ObjectKind("wrench", ("red",)), object_count=2, verb="get"
     ).to_json()
     assert values == {
         "item": None,
@@ -95,7 +98,7 @@ def test_json_has_null_for_nothing_and_zero_for_its_count():
 
 
 def test_json_reads_back():
-    command = Command(item=Thing("wrench", ("red",)), item_count=2, goal="Robin", goal_at="hall", verb="bring")
+    command = Command(item=ObjectKind("wrench", ("red",)), item_count=2, goal="Robin", goal_at="hall", verb="bring")
     assert Command.from_json(command.to_json()) == command
 
 
@@ -124,10 +127,10 @@ def test_an_unknown_task_is_refused_with_the_known_ones():
     [
         {"goal": "kit[chen"},
         {"goal": ""},
-        {"item": Thing('a "b"')},
-        {"item": Thing("cup", ("very  red",))},
-        {"item": Thing("cup", ("2",))},
-        {"item": Thing("cup"), "item_count": -1},
+        {"item": ObjectKind('a "b"')},
+        {"item": ObjectKind("cup", ("very  red",))},
+        {"item": ObjectKind("cup", ("2",))},
+        {"item": ObjectKind("cup"), "item_count": -1},
         {"item_count": 2},
         {"goal_at": "hall"},
     ],
@@ -140,12 +143,12 @@ def test_a_command_that_has_no_text_form_cannot_be_made(wrong):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        ("red wrench", Thing("wrench", ("red",))),
-        ("big red wrench", Thing("wrench", ("big", "red"))),
-        ("coffee cup", Thing("coffee cup")),
-        ("biggest snack", Thing("snack", ("biggest",))),
-        ("orange", Thing("orange")),
+        ("red wrench", ObjectKind("wrench", ("red",))),
+        ("big red wrench", ObjectKind("wrench", ("big", "red"))),
+        ("coffee cup", ObjectKind("coffee cup")),
+        ("biggest snack", ObjectKind("snack", ("biggest",))),
+        ("orange", ObjectKind("orange")),
     ],
 )
 def test_leading_attributes_are_split_off_a_things_words(words, expected):
-    assert thing(words) == expected
+    assert parse_object(words) == expected

@@ -85,9 +85,9 @@ def test_a_thing_stands_for_its_classes(knowledge, name, classes):
 
 
 def test_a_category_keeps_its_name(knowledge):
-    assert knowledge.thing("Drink") == "drink"
-    assert knowledge.thing("coca cola") == "coke"
-    assert knowledge.thing("banana") is None
+    assert knowledge.object_name("Drink") == "drink"
+    assert knowledge.object_name("coca cola") == "coke"
+    assert knowledge.object_name("banana") is None
 
 
 def test_a_person_is_found_by_alias(knowledge):

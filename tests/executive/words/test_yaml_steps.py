@@ -9,15 +9,15 @@ from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Loo
 from executive.words.leaf_steps import Awaited, Charging, Check, Do, Dock, Set, Speak, Wait, steps_of_commands
 from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Together, Try, While
 from executive.words.yaml_steps import steps_from_yaml, steps_to_data, steps_to_yaml
-from skills.api import Thing
+from skills.api import ObjectKind
 
 texts = st.text(st.characters(exclude_characters="{}", exclude_categories=["C", "Z"]), min_size=1, max_size=12)
 names = texts
 words = st.sampled_from(["beer", "red wine", "kitchen", "Nothing", "then", "if", "not", "a at b", "it's", "yes", "3"])
 seconds = st.floats(0.1, 86_000.0) | st.integers(1, 5000).map(float)
 expressions = st.sampled_from(["battery < 0.3 and not holding", 'clock >= "14:30"', "1 + 2", '"}" == drink', "true"])
-commands = st.builds(Command, item=st.none() | st.builds(Thing, words), goal=words)
-checks = st.builds(Command, goal=st.none() | words, task=st.just(Task.FIND), object=st.builds(Thing, words))
+commands = st.builds(Command, item=st.none() | st.builds(ObjectKind, words), goal=words)
+checks = st.builds(Command, goal=st.none() | words, task=st.just(Task.FIND), object=st.builds(ObjectKind, words))
 
 
 def built(model, **values):
@@ -96,11 +96,11 @@ def test_yaml_reads_back_to_the_same_steps(steps):
 
 
 def test_it_is_what_a_person_would_write():
-    look = Look.of(Command(goal="kitchen", task=Task.FIND, object=Thing("beer")))
+    look = Look.of(Command(goal="kitchen", task=Task.FIND, object=ObjectKind("beer")))
     fetch = steps_of_commands(
         [
-            Command(goal="kitchen", task=Task.GRASP, object=Thing("beer"), verb="fetch"),
-            Command(item=Thing("beer"), goal="start"),
+            Command(goal="kitchen", task=Task.GRASP, object=ObjectKind("beer"), verb="fetch"),
+            Command(item=ObjectKind("beer"), goal="start"),
         ]
     )
     steps = (

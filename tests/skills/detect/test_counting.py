@@ -2,12 +2,12 @@
 
 import pytest
 
-from skills.api import ObjectObservation, Thing
+from skills.api import ObjectKind, ObjectObservation
 from skills.detect.words import told_apart
 
 
 def beer(x_m, name="beer"):
-    return ObjectObservation(0.0, Thing(name), (x_m, 0.0, 0.8), (0.1, 0.1, 0.1), 0.0, 0.9, "bench")
+    return ObjectObservation(0.0, ObjectKind(name), (x_m, 0.0, 0.8), (0.1, 0.1, 0.1), 0.0, 0.9, "bench")
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def test_a_surface_out_of_sight_is_a_failed_precondition():
 def test_a_thing_is_found_where_it_stands_and_seen_from_two_places():
     step, log = found([COKE], DetectInputs(("coke", "hammer"), (TABLE,)))
     seen = step.outputs["observation"]
-    assert (seen.thing.name, seen.surface) == ("coke", "table")
+    assert (seen.kind.name, seen.surface) == ("coke", "table")
     assert seen.position_W == pytest.approx((COKE.x, COKE.y, 0.8075), abs=0.008)
     assert seen.size_m == pytest.approx((0.066, 0.066, 0.115), abs=0.01)
     topics = [topic for topic, _ in log]
@@ -83,7 +83,7 @@ def test_the_one_that_shows_the_attribute_is_taken(attribute, colour):
     colours = Colours({"coke": RED, "beer": PINK} if colour == RED else {"coke": PINK, "beer": RED})
     things = [COKE, replace(SECOND, colour=PINK)]
     step, _ = found(things, DetectInputs(("coke",), (TABLE,), (attribute,)), detector=colours)
-    assert step.outputs["observation"].thing.attributes == (attribute,)
+    assert step.outputs["observation"].kind.attributes == (attribute,)
 
 
 def test_a_thing_without_the_attribute_is_none():
@@ -230,7 +230,7 @@ def test_what_may_be_meant_though_it_is_likelier_something_else_is_looked_at_fro
             return replace(one, class_name="beer", score=0.6, alternatives=(("coke", 0.4),)) if small else one
 
     step, _ = found([COKE], DetectInputs(("coke",), (TABLE,)), detector=ConfusedFromAfar())
-    assert step.outputs["observation"].thing.name == "coke"
+    assert step.outputs["observation"].kind.name == "coke"
 
 
 def test_the_gripper_is_opened_to_look_and_closed_again():

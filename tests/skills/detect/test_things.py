@@ -22,14 +22,14 @@ def seen(things, inputs, **options):
 
 def test_what_has_no_label_is_a_thing_with_pose_and_extent():
     (found,) = seen([ODD], ALL).outputs["observations"]
-    assert (found.thing.name, found.surface) == ("thing", "table")
+    assert (found.kind.name, found.surface) == ("thing", "table")
     assert found.position_W == pytest.approx((ODD.x, ODD.y, 0.795), abs=0.012)
     assert found.size_m == pytest.approx((0.08, 0.08, 0.09), abs=0.015)
 
 
 def test_a_label_is_joined_to_its_segment():
     step = seen([COKE, ODD], ALL)
-    assert sorted(each.thing.name for each in step.outputs["observations"]) == ["coke", "thing"]
+    assert sorted(each.kind.name for each in step.outputs["observations"]) == ["coke", "thing"]
     assert sorted(step.message.removeprefix("there are ").removesuffix(" on the table").split(" and ")) == [
         "one coke",
         "one thing",
@@ -62,6 +62,6 @@ def test_a_thing_is_seen_again_where_it_is_expected():
 def test_a_thing_has_colours_and_no_size_among_its_kind():
     red = replace(ODD, colour=RED)
     unknowing = Colours({"coke": BLUE})
-    assert seen([red], replace(ANY, attributes=("red",)), detector=unknowing).outputs["observation"].thing.attributes
+    assert seen([red], replace(ANY, attributes=("red",)), detector=unknowing).outputs["observation"].kind.attributes
     skill = Detect(context_of(ScriptedRobot(things=[ODD])))
     failed(skill, replace(ANY, attributes=("big",)), Cause.POSTCONDITION, "no big thing")

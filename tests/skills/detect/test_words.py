@@ -2,14 +2,14 @@
 
 import pytest
 
-from skills.api import ObjectObservation, Surface, Thing
+from skills.api import ObjectKind, ObjectObservation, Surface
 from skills.detect.words import counted, plural, wanted
 
 BENCH = Surface("bench", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), 0.8)
 
 
 def seen(name, surface="bench", *attributes):
-    return ObjectObservation(0.0, Thing(name, attributes), (1.0, 0.0, 0.8), (0.1, 0.1, 0.1), 0.0, 0.9, surface)
+    return ObjectObservation(0.0, ObjectKind(name, attributes), (1.0, 0.0, 0.8), (0.1, 0.1, 0.1), 0.0, 0.9, surface)
 
 
 @pytest.mark.parametrize(

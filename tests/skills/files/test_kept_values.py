@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from skills.api import ObjectObservation, Surface, Thing
+from skills.api import ObjectKind, ObjectObservation, Surface
 from skills.files.kept_values import from_text, to_text
 from skills.robot import CommandState, Pose2D
 
-SEEN = ObjectObservation(12.5, Thing("coke", ("red",)), (1.0, 2.0, 0.9), (0.06, 0.06, 0.12), 0.3, 0.9, "counter")
+SEEN = ObjectObservation(12.5, ObjectKind("coke", ("red",)), (1.0, 2.0, 0.9), (0.06, 0.06, 0.12), 0.3, 0.9, "counter")
 
 
 @pytest.mark.parametrize(
@@ -65,10 +65,10 @@ def test_what_cannot_be_kept_is_refused():
         "[1]",
         '{"$kind": "spell"}',
         '{"a": 1}',
-        '{"$kind": "dataclass", "class": "gone.away:Thing", "fields": {}}',
-        '{"$kind": "dataclass", "class": "skills.api:Thing", "fields": {"colour": "red"}}',
+        '{"$kind": "dataclass", "class": "gone.away:ObjectKind", "fields": {}}',
+        '{"$kind": "dataclass", "class": "skills.api:ObjectKind", "fields": {"colour": "red"}}',
         '{"$kind": "dataclass", "class": "os:system", "fields": {}}',
-        '{"$kind": "enum", "class": "skills.api:Thing", "name": "A"}',
+        '{"$kind": "enum", "class": "skills.api:ObjectKind", "name": "A"}',
     ],
 )
 def test_damaged_text_and_classes_that_are_gone_are_refused(text):

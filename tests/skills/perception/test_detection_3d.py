@@ -83,7 +83,7 @@ def test_what_a_thing_rests_on(p_W, base_m, name):
 
 def test_an_observation_tells_what_was_seen():
     seen = observation(only(scene([COKE])), ("red",))
-    assert str(seen.thing) == "red coke"
+    assert str(seen.kind) == "red coke"
     assert seen.position_W == pytest.approx(tuple(COKE_W), abs=0.006)
     assert (seen.score, seen.surface) == (0.9, "table")
 

@@ -13,13 +13,13 @@ from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from executive.words.policy import Policy
-from skills.api import Cause, Failed, ObjectObservation, Succeeded, Surface, Thing
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded, Surface
 from skills.quantities import Coordinate, Length
 from skills.robot import Pose2D
 
 GRASP = parse_command("Take [Nothing] to [kitchen] and do [grasp] to [beer]")
-BEER = ObjectObservation(0.0, Thing("beer"), (1.0, 2.0, 0.9), (0.06, 0.06, 0.2), 0.0, 0.9, "counter")
-COKE = replace(BEER, thing=Thing("coke"), position_W=(0.9, 2.0, 0.9))
+BEER = ObjectObservation(0.0, ObjectKind("beer"), (1.0, 2.0, 0.9), (0.06, 0.06, 0.2), 0.0, 0.9, "counter")
+COKE = replace(BEER, kind=ObjectKind("coke"), position_W=(0.9, 2.0, 0.9))
 ROUND = ["detect", "approach", "grasp"]
 MOVED = ["approach", "grasp", "stow", "place", "navigate"]
 
@@ -41,12 +41,12 @@ class Table:
 
     def grasp(self, skill):
         seen, nothing = skill.inputs.observation, {"tried": (), "in_the_way": ()}
-        if seen.thing.name != "beer":
+        if seen.kind.name != "beer":
             cause = self.no_grasp.pop(0) if self.no_grasp else None
             if cause is not None:
-                return Failed(cause, f"the {seen.thing} is too wide", nothing)
+                return Failed(cause, f"the {seen.kind} is too wide", nothing)
         elif self.blocking:
-            why = f"the beer is behind the {self.blocking[0].thing}"
+            why = f"the beer is behind the {self.blocking[0].kind}"
             return Failed(Cause.PLANNING, why, {**nothing, "in_the_way": tuple(self.blocking)})
         skill.context.robot._robot.holding = True
         return Succeeded("held", nothing)
@@ -120,7 +120,7 @@ def test_the_robot_goes_back_to_where_it_stood_since_a_grasp_was_found_from_ther
     goals, usual = [], script.ends["approach"]
 
     def approaches(skill):
-        robot.standing = Pose2D(0.3 if skill.inputs.observation.thing.name == "beer" else 0.5, 0.0, 0.0)
+        robot.standing = Pose2D(0.3 if skill.inputs.observation.kind.name == "beer" else 0.5, 0.0, 0.0)
         return usual(skill)
 
     def goes(skill):
@@ -155,14 +155,14 @@ def test_where_it_is_not_allowed_the_failure_is_as_before(play, table, script):
 
 
 def test_only_as_many_are_moved_as_the_mission_allows(play, table, script):
-    table.blocking.append(replace(COKE, thing=Thing("cube")))
+    table.blocking.append(replace(COKE, kind=ObjectKind("cube")))
     result = play(1)
     assert (result.outcome, len(table.placed)) == (Outcome.FAILURE, 1)
     assert result.message.startswith("the beer is behind the cube")
 
 
 def test_two_are_moved_one_after_the_other(play, table):
-    table.blocking.append(replace(COKE, thing=Thing("cube")))
+    table.blocking.append(replace(COKE, kind=ObjectKind("cube")))
     assert play(2).outcome is Outcome.SUCCESS
     assert len(table.placed) == 2
 
@@ -185,7 +185,7 @@ def test_what_cannot_be_approached_is_taken_from_where_the_robot_stands(play, ta
     usual = script.ends["approach"]
 
     def not_the_coke(skill):
-        coke = skill.inputs.observation.thing.name == "coke"
+        coke = skill.inputs.observation.kind.name == "coke"
         return Failed(Cause.POSTCONDITION, "not seen again") if coke else usual(skill)
 
     script.ends["approach"] = not_the_coke

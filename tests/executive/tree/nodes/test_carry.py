@@ -21,7 +21,7 @@ FAR = Surface("shelf", ((4.0, 0.0), (5.0, 0.0), (5.0, 1.0)), 0.8)
 def leaf(context):
     keys = {f"{name}_key": f"alice/{name}" for name in ("pose", "spot", "floor", "around", "set_down")}
     return Fallen(
-        path_id="alice/fell", name="fell", thing="hammer", to="to the kitchen", surfaces=(NEAR, FAR), context=context,
+        path_id="alice/fell", name="fell", item="hammer", to="to the kitchen", surfaces=(NEAR, FAR), context=context,
         **keys,
     )  # fmt: skip
 

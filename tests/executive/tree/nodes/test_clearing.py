@@ -6,7 +6,7 @@ from executive.app.goal_conditions import conditions_of
 from executive.run.outcome import Outcome
 from executive.tree.board import Constant
 from executive.words.goal import GoalKind
-from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
 from skills.files.errors import InputError
 
 GET = "Take [Nothing] to [counter] and do [grasp] to [everything]"
@@ -15,7 +15,7 @@ BASE = "alice/fetch-drink/1-counter"
 
 
 def standing(name, x):
-    return ObjectObservation(0.0, Thing(name), (x, -1.5, 0.95), (0.06, 0.06, 0.1), 0.0, 0.9, "counter")
+    return ObjectObservation(0.0, ObjectKind(name), (x, -1.5, 0.95), (0.06, 0.06, 0.1), 0.0, 0.9, "counter")
 
 
 @pytest.fixture

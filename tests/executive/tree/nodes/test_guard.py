@@ -19,7 +19,7 @@ from executive.tree.nodes.guard import (
     Waiting,
 )
 from executive.words.policy import StaleData
-from skills.api import Cause, Failed, Thing
+from skills.api import Cause, Failed, ObjectKind
 from skills.robot import Lease, Pose2D
 from tests.executive.tree.scripted import F, N, Queue, R, S, tick
 
@@ -292,7 +292,7 @@ def test_the_guard_leaves_an_offered_object_to_the_skill_that_offers_it(context,
 
 
 def test_a_guard_takes_another_object_in_the_gripper_for_what_it_is(context, clock, robot):
-    robot.holding, context.payload.thing = True, Thing("hammer")
+    robot.holding, context.payload.kind = True, ObjectKind("hammer")
     root = Guard(
         path_id="a/g",
         name="g",

@@ -15,7 +15,7 @@ from executive.words.command import parse_command
 from executive.words.knowledge import load_knowledge
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
-from skills.api import Cause, Failed, Succeeded, Thing
+from skills.api import Cause, Failed, ObjectKind, Succeeded
 from skills.robot import Pose2D
 
 GO = "Take [Nothing] to [hall] and do [Nothing] to [Nothing]"
@@ -508,7 +508,7 @@ def test_thresholds_come_from_the_knowledge(compiled, knowledge, registry):
 
 def test_what_a_failed_grasp_holds_is_used_and_not_searched_for_again(compiled, run_tree, script, robot):
     def closes(skill):
-        robot.holding, skill.context.payload.thing = True, Thing("coke")
+        robot.holding, skill.context.payload.kind = True, ObjectKind("coke")
         return Failed(Cause.EXECUTION, "the arm was stopped while carrying the coke")
 
     script.ends["grasp"] = closes
@@ -519,7 +519,7 @@ def test_what_a_failed_grasp_holds_is_used_and_not_searched_for_again(compiled, 
 
 def test_an_object_lost_while_the_arm_is_drawn_in_is_grasped_again(compiled, run_tree, script, robot):
     def closes(skill):
-        robot.holding, skill.context.payload.thing = True, Thing("coke")
+        robot.holding, skill.context.payload.kind = True, ObjectKind("coke")
         first = script.begun.count("grasp") == 1
         return Failed(Cause.EXECUTION, "the gripper closed on nothing") if first else Succeeded("taken", {"tried": ()})
 
@@ -535,7 +535,7 @@ def test_an_object_lost_while_the_arm_is_drawn_in_is_grasped_again(compiled, run
 
 def test_what_an_earlier_step_took_is_not_searched_for(compiled, run_tree, script, robot, context):
     def holds_it(skill):
-        robot.holding, skill.context.payload.thing = True, Thing("coke")
+        robot.holding, skill.context.payload.kind = True, ObjectKind("coke")
         return Succeeded("gone")
 
     script.ends["navigate"] = holds_it
@@ -545,7 +545,7 @@ def test_what_an_earlier_step_took_is_not_searched_for(compiled, run_tree, scrip
 
 def test_with_another_object_in_the_gripper_nothing_is_searched_for(compiled, run_tree, script, robot):
     def holds_another(skill):
-        robot.holding, skill.context.payload.thing = True, Thing("beer")
+        robot.holding, skill.context.payload.kind = True, ObjectKind("beer")
         return Succeeded("gone")
 
     script.ends["navigate"] = holds_another

@@ -8,7 +8,7 @@ from executive.tree.behaviour import Explained
 from executive.tree.board import Board
 from executive.tree.nodes.composites import MemorySelector, MemorySequence
 from executive.tree.nodes.recovery import Afterwards, OnlyIfHolding, OnlyIfKnown, Recover, Recovery, Trigger
-from skills.api import Cause, Thing
+from skills.api import Cause, ObjectKind
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
 PLANNING, EXECUTION, POST = Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION
@@ -236,14 +236,14 @@ def test_a_recovery_that_completes_ends_it_without_another_attempt():
 @pytest.mark.parametrize(
     ("taken_for", "asked", "status"),
     [
-        (Thing("coke"), ("coke", "beer"), S),
-        (Thing("hammer"), ("coke", "beer"), F),
-        (Thing("hammer"), ("thing",), S),  # any object will do
+        (ObjectKind("coke"), ("coke", "beer"), S),
+        (ObjectKind("hammer"), ("coke", "beer"), F),
+        (ObjectKind("hammer"), ("thing",), S),  # any object will do
         (None, ("coke",), F),  # nobody knows what it is
     ],
 )
 def test_a_way_may_apply_only_while_a_certain_object_is_held(context, robot, taken_for, asked, status):
-    robot.holding, context.payload.thing = True, taken_for
+    robot.holding, context.payload.kind = True, taken_for
     held = OnlyIfHolding(path_id="alice/h", name="h", children=[Leaf("stow", S)], context=context, known_as=asked)
     root = MemorySelector(path_id="alice/f", name="f", children=[held, Leaf("search", PLANNING)])
     root.tick_once()

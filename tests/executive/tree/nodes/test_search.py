@@ -7,7 +7,7 @@ from py_trees.common import Status
 from executive.tree.behaviour import Explained
 from executive.tree.nodes.composites import MemoryRound, MemorySelector
 from executive.tree.nodes.search import Answer
-from skills.api import Cause, ObjectObservation, Thing
+from skills.api import Cause, ObjectKind, ObjectObservation
 
 
 class Look(Explained, py_trees.behaviour.Behaviour):
@@ -92,7 +92,7 @@ def test_no_is_not_said_when_a_view_was_missed(context, obstacle, at):
 
 
 def beer(x_m: float, surface: str) -> ObjectObservation:
-    return ObjectObservation(0.0, Thing("beer"), (x_m, 0.0, 0.8), (0.1, 0.1, 0.1), 0.0, 0.9, surface)
+    return ObjectObservation(0.0, ObjectKind("beer"), (x_m, 0.0, 0.8), (0.1, 0.1, 0.1), 0.0, 0.9, surface)
 
 
 def count_of(context, bench: Cause | tuple[float, ...], trolley: Cause | tuple[float, ...], needed: int = 1) -> Answer:

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 
-from skills.api import ObjectObservation, Thing
+from skills.api import ObjectKind, ObjectObservation
 from skills.manipulation.approach.standing import Standing, first_reachable_spot, free_places, is_comfortable, reachable
 from skills.manipulation.grasp.planning import GeometricGraspPlanner
 from skills.manipulation.grasp.reach import observed_target, reached_grasps
 from skills.navigate.footprint import Footprint
 from skills.robot import Pose2D
 
-CAN = ObjectObservation(0.0, Thing("coke"), (2.15, 0.0, 0.807), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
+CAN = ObjectObservation(0.0, ObjectKind("coke"), (2.15, 0.0, 0.807), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
 CANDIDATES = partial(GeometricGraspPlanner().candidates, p_BS=MODEL.p_BS, gripper=GRIPPER)
 
 
@@ -79,7 +79,7 @@ def test_standing_well_already(pose, comfortable):
 
 
 def test_an_observation_keeps_its_axes_when_the_body_is_turned():
-    hammer = ObjectObservation(0.0, Thing("hammer"), (1.0, 0.0, 0.765), (0.33, 0.12, 0.03), 0.5, 1.0, "bench")
+    hammer = ObjectObservation(0.0, ObjectKind("hammer"), (1.0, 0.0, 0.765), (0.33, 0.12, 0.03), 0.5, 1.0, "bench")
     target = observed_target(hammer, Pose2D(0.0, 0.0, 0.3).transform(0.52))
     assert target.yaw_rad == pytest.approx(0.2)
     assert target.base_m == pytest.approx(0.75 - 0.52)
@@ -88,7 +88,7 @@ def test_an_observation_keeps_its_axes_when_the_body_is_turned():
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, 1.57, 2.4])
 def test_a_hammer_lying_any_way_is_within_reach_from_some_place(yaw):
-    hammer = ObjectObservation(0.0, Thing("hammer"), (2.15, 0.0, 0.765), (0.33, 0.12, 0.03), yaw, 1.0, "bench")
+    hammer = ObjectObservation(0.0, ObjectKind("hammer"), (2.15, 0.0, 0.765), (0.33, 0.12, 0.03), yaw, 1.0, "bench")
     found = _poses(lambda pose: _grasp_cost(pose.transform(0.52), hammer))
     assert found
 

@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 from scripted_robot import GRIPPER, MODEL, ScriptedRobot, context_of, outcome
 
-from skills.api import Cause, Failed, ObjectObservation, Thing
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation
 from skills.manipulation.grasp.candidates import Target, grasp_candidates
 from skills.manipulation.grasp.memory import others_first, same_grasp, tried_grasp
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
@@ -82,7 +82,7 @@ class Slippery(Grasp):
 
 
 def test_a_failed_grasp_tells_what_it_tried_and_the_next_one_tries_another():
-    seen = ObjectObservation(0.0, Thing("hammer"), (0.85, 0.0, 0.215), (0.2, 0.03, 0.03), 0.0, 1.0, "table")
+    seen = ObjectObservation(0.0, ObjectKind("hammer"), (0.85, 0.0, 0.215), (0.2, 0.03, 0.03), 0.0, 1.0, "table")
     avoid = ()
     for count in (1, 2):
         step = outcome(Slippery(context_of(ScriptedRobot())), GraspInputs(seen, avoid))

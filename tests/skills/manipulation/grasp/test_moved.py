@@ -7,7 +7,7 @@ import pytest
 
 from executive.testing.bench import SkillBench
 from plant.robots.spot.kind import spot_capabilities
-from skills.api import Cause, ObjectObservation, Thing
+from skills.api import Cause, ObjectKind, ObjectObservation
 from skills.manipulation.grasp.skill import Grasp
 from skills.manipulation.grasp.skill import GraspInputs as Inputs
 from skills.robot import Pose2D
@@ -18,7 +18,9 @@ from skills.testing.robot import ScriptedRobot, Start
 
 HERE = Pose2D(0.45, 0.0, 0.0)
 AT = (0.5 * (TABLE_CAN.x0 + TABLE_CAN.x1), 0.5 * (TABLE_CAN.y0 + TABLE_CAN.y1), TABLE_CAN.z0)
-SEEN = Inputs(ObjectObservation(0.0, Thing("coke"), (AT[0], AT[1], 0.807), (0.066, 0.066, 0.115), 0.0, 1.0, "table"))
+SEEN = Inputs(
+    ObjectObservation(0.0, ObjectKind("coke"), (AT[0], AT[1], 0.807), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
+)
 
 
 class Disturbed(Grasp):

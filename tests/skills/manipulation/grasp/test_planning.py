@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from plant.robots.spot.kind import spot_capabilities
-from skills.api import ObjectObservation, PlanningError, Thing
+from skills.api import ObjectKind, ObjectObservation, PlanningError
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.arm.motion import RrtConnect
@@ -19,7 +19,7 @@ PLANNER = GeometricGraspPlanner()
 
 
 def _obstacle(name, x, y, *, width=0.1, height=0.5):
-    seen = ObjectObservation(0.0, Thing(name), (x, y, 0.2), (0.06, width, height), 0.0, 1.0, "table")
+    seen = ObjectObservation(0.0, ObjectKind(name), (x, y, 0.2), (0.06, width, height), 0.0, 1.0, "table")
     return Obstacle(seen, (Box(RigidTransform([x, y, 0.2]), (0.06, width, height)),))
 
 

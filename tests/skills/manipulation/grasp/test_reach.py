@@ -8,7 +8,7 @@ import pytest
 from pydrake.math import RigidTransform
 from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 
-from skills.api import ObjectObservation, Surface, Thing
+from skills.api import ObjectKind, ObjectObservation, Surface
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.grasp.candidates import hand_rotation
 from skills.manipulation.grasp.in_hand import turned_in_hand
@@ -17,7 +17,7 @@ from skills.manipulation.grasp.reach import ReachCheck, body_heights_m, resting_
 from skills.robot import Pose2D
 
 CANDIDATES = partial(GeometricGraspPlanner().candidates, p_BS=MODEL.p_BS, gripper=GRIPPER)
-CAN = ObjectObservation(0.0, Thing("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
+CAN = ObjectObservation(0.0, ObjectKind("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
 HERE = Pose2D(0.0, 0.0, 0.0)
 LOW_M, USUAL_M, HIGH_M = 0.425, 0.52, 0.575
 
@@ -61,14 +61,14 @@ def test_boxes_stay_where_they_are_in_the_world_when_the_body_stands_elsewhere()
 
 
 def test_the_space_about_an_object_holds_it_and_a_band_of_its_surface():
-    seen = ObjectObservation(0.0, Thing("coke"), (1.0, 2.0, 0.76), (0.066, 0.066, 0.12), 0.0, 1.0)
+    seen = ObjectObservation(0.0, ObjectKind("coke"), (1.0, 2.0, 0.76), (0.066, 0.066, 0.12), 0.0, 1.0)
     low, high = space_about(seen)[0]
     assert np.all(low < [1.0, 2.0, 0.69])
     assert np.all(high > [1.0, 2.0, 0.82])
 
 
 def test_what_is_tall_has_its_own_space_up_to_its_top_and_not_beside_it():
-    seen = ObjectObservation(0.0, Thing("extinguisher"), (1.0, 2.0, 0.9), (0.09, 0.09, 0.4), 0.0, 1.0)
+    seen = ObjectObservation(0.0, ObjectKind("extinguisher"), (1.0, 2.0, 0.9), (0.09, 0.09, 0.4), 0.0, 1.0)
     about, own = space_about(seen)
     assert about[1][2] < 1.1 < own[1][2] < 1.16
     assert own[1][0] < 1.1 < about[1][0]

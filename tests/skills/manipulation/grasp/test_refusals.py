@@ -5,7 +5,7 @@ import pytest
 from scripted_robot import MODEL, ScriptedRobot, context_of, failed
 
 from plant.robots.spot.kind import spot_capabilities
-from skills.api import Cause, ObjectObservation, Thing
+from skills.api import Cause, ObjectKind, ObjectObservation
 from skills.manipulation.grasp.candidates import Target, grasp_candidates
 from skills.manipulation.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
@@ -21,7 +21,7 @@ def _target(length, width, height, *, is_round=False):
 
 
 def seen(name, size_m):
-    return ObjectObservation(0.0, Thing(name), (0.9, 0.0, 0.26), size_m, 0.0, 1.0, "floor")
+    return ObjectObservation(0.0, ObjectKind(name), (0.9, 0.0, 0.26), size_m, 0.0, 1.0, "floor")
 
 
 def test_a_large_extinguisher_is_refused_before_the_arm_moves():

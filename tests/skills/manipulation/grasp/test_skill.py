@@ -3,12 +3,14 @@
 import numpy as np
 from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
 
-from skills.api import Cause, Failed, ObjectObservation, PlanningError, Running, Succeeded, Thing
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation, PlanningError, Running, Succeeded
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
 from skills.robot import CommandState, CommandStatus
 
-SEEN = GraspInputs(ObjectObservation(0.0, Thing("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "table"))
-BEER = ObjectObservation(0.0, Thing("beer"), (0.8, 0.0, 0.8), (0.066, 0.066, 0.2), 0.0, 1.0, "table")
+SEEN = GraspInputs(
+    ObjectObservation(0.0, ObjectKind("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
+)
+BEER = ObjectObservation(0.0, ObjectKind("beer"), (0.8, 0.0, 0.8), (0.066, 0.066, 0.2), 0.0, 1.0, "table")
 
 
 def test_a_full_gripper_is_a_failed_precondition():
@@ -40,7 +42,7 @@ def test_a_second_attempt_starts_anew():
 
 def test_after_a_failure_the_body_stands_at_its_usual_height():
     robot = ScriptedRobot()
-    high = GraspInputs(ObjectObservation(0.0, Thing("coke"), (0.9, 0.0, 0.96), (0.066, 0.066, 0.115), 0.0, 1.0))
+    high = GraspInputs(ObjectObservation(0.0, ObjectKind("coke"), (0.9, 0.0, 0.96), (0.066, 0.066, 0.115), 0.0, 1.0))
     heights = []
     stand = robot.stand
     robot.stand = lambda height_m, *args, **kwargs: heights.append(height_m) or stand(height_m, *args, **kwargs)
@@ -57,7 +59,7 @@ class Heavy(Grasp):
         self._mass_kg = mass_kg
 
     def run(self, inputs):
-        yield from self._refuse_heavy(self._mass_kg, np.array([0.0, 0.0, 0.1]), str(inputs.observation.thing))
+        yield from self._refuse_heavy(self._mass_kg, np.array([0.0, 0.0, 0.1]), str(inputs.observation.kind))
         return Succeeded("lifted")
 
 

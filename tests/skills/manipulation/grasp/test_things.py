@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RigidTransform
 from table_scene import GREEN, TABLE, Can, scene
 
-from skills.api import LocalisationEstimate, ObjectObservation, Thing
+from skills.api import LocalisationEstimate, ObjectKind, ObjectObservation
 from skills.manipulation.grasp.close_view import examine
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
@@ -13,7 +13,7 @@ ONE, OTHER = Can(1.0, 0.0, 0.033, 0.115, GREEN), Can(1.0, 0.067, 0.033, 0.115, G
 
 
 def examined(things, at, p_WB=(0.0, 0.0, 0.0)):
-    seen = ObjectObservation(0.0, Thing("thing"), (at.x, at.y, 0.81), (0.066, 0.066, 0.115), 0.0, 0.7, "table")
+    seen = ObjectObservation(0.0, ObjectKind("thing"), (at.x, at.y, 0.81), (0.066, 0.066, 0.115), 0.0, 0.7, "table")
     return examine(scene(things), RigidTransform(p_WB), TABLE, seen, PLACE, (), 0.12)
 
 
@@ -24,7 +24,7 @@ def test_of_two_that_touch_the_one_that_was_seen_is_taken_and_the_other_is_in_th
     assert view.target.width_m == pytest.approx(0.066, abs=0.012)
     assert len(view.boxes) == 2  # the table and the other can
     (other,) = view.others
-    assert (str(other.seen.thing), other.seen.surface, len(other.boxes)) == ("thing", "table", 1)
+    assert (str(other.seen.kind), other.seen.surface, len(other.boxes)) == ("thing", "table", 1)
 
 
 def test_what_stands_beside_is_known_by_its_place_in_the_world_and_its_size():

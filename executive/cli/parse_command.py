@@ -56,7 +56,7 @@ def parse(
         if trace is None or not trace.tokens:
             raise InputError("there are no words to draw", hint="give a sentence in English words", file=svg)
         with writing(svg):
-            svg.write_text(arcs_svg(explain(trace).tokens), encoding="utf-8")
+            svg.write_text(arcs_svg(trace.tokens), encoding="utf-8")
     for meaning in meanings:
         _show(meaning, as_json, explained)
     if as_json:
@@ -68,14 +68,14 @@ def parse(
 
 def _values(meaning: Understanding, explained: bool) -> dict[str, object]:
     """The answer as JSON values, with its steps where those are asked for."""
-    steps = None if meaning.trace is None else explain(meaning.trace).to_json()
+    steps = None if meaning.trace is None else explain(meaning.trace)
     return {**meaning.to_json(), "steps": steps} if explained else meaning.to_json()
 
 
 def _show(meaning: Understanding, as_json: bool, explained: bool) -> None:
     """The commands on standard output, with the steps before them, or the reason on standard error."""
     if explained and meaning.trace is not None:
-        _echo(explanation_lines(explain(meaning.trace)), as_json)
+        _echo(explanation_lines(meaning.trace), as_json)
     elif meaning.steps:
         _echo(steps_to_yaml(meaning.steps), as_json)
     elif meaning.commands:

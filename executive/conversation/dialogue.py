@@ -34,7 +34,7 @@ from executive.language.followups import (
     remark_of,
     without_fetching,
 )
-from executive.language.questions import ClarifyingQuestion, with_answer
+from executive.language.questions import with_answer
 from executive.language.reference import Memory
 from executive.language.understand import Status, Understanding
 from executive.run.control import Control
@@ -177,7 +177,7 @@ class Conversation(RunVisitor):
         if text.strip(" .,!?").lower() in _NONE_OF_THEM:
             return confirmation(NEVER_MIND)
         whole = with_answer(waiting.sentence, waiting.question, text)
-        reply = self._said(whole, now_s)
+        reply = self._follow_up(whole, now_s) or self._request(whole, now_s)
         if reply.kind is not ReplyKind.REFUSED:
             return reply
         if follow_up_of(text) is not None or self._understood(text, now_s).status is Status.OK:
@@ -188,14 +188,7 @@ class Conversation(RunVisitor):
     def _waiting(self, now_s: float) -> Waiting | None:
         return self._open if self._open is not None and now_s <= self._open.until_s else None
 
-    def _ask(self, question: ClarifyingQuestion, sentence: str, now_s: float) -> Reply:
-        self._open = Waiting(question, sentence, now_s + REMEMBERED_S)
-        return Reply(ReplyKind.QUESTION, question.text, question=question)
-
     # -- requests ----------------------------------------------------------------------------------------------------
-
-    def _said(self, text: str, now_s: float) -> Reply:
-        return self._follow_up(text, now_s) or self._request(text, now_s)
 
     def _remembered(self, now_s: float) -> _Spoken | None:
         """The last request, while it is remembered."""
@@ -226,7 +219,8 @@ class Conversation(RunVisitor):
 
     def _not_ok(self, meant: Understanding, text: str, now_s: float) -> Reply:
         if meant.question is not None:
-            return self._ask(meant.question, text, now_s)
+            self._open = Waiting(meant.question, text, now_s + REMEMBERED_S)
+            return Reply(ReplyKind.QUESTION, meant.question.text, question=meant.question)
         return refusal(meant.reason or "I did not understand")
 
     def _follow_up(self, text: str, now_s: float) -> Reply | None:
@@ -306,7 +300,9 @@ class Conversation(RunVisitor):
             tree = self._speech.compile(whole, self._names)
         except InputError as error:
             return refusal(str(error))
-        give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, self._replace)
+        before = None if self._last is None else self._last.mission
+        instead = partial(self._control.replace, instead_of=before)
+        give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, instead)
         mode = state.robots.get(self._speech.robot_name, state).mode
         still = "; I stand still until you say 'go on'" if mode in (Mode.PAUSED, Mode.STOPPED) else ""
         told = "; ".join("; ".join(map(str, step.commands)) or step.words for step in whole)
@@ -316,9 +312,6 @@ class Conversation(RunVisitor):
             self._names |= {tree.mission_name}
             self._last = _Spoken(tuple(commands), memory, now_s, tree.mission_name, steps)
         return reply
-
-    def _replace(self, tree: CompiledTree) -> None:
-        self._control.replace(tree, None if self._last is None else self._last.mission)
 
     def _tried(self, act: Callable[[], None], text: str, commands: tuple[Command, ...] = ()) -> Reply:
         try:

@@ -14,7 +14,7 @@ from executive.language.grounding import known_line
 from executive.run.control import Control
 from executive.run.control_state import ControlState, Mode, RobotMode
 from executive.run.visitor import Progress
-from executive.tree.node import NodeState, Snapshot
+from executive.tree.node import Snapshot
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import distance_m
 from skills.robot import Pose2D
@@ -138,16 +138,10 @@ def _step(states: Snapshot) -> str:
 
 def _last_failure(states: Snapshot) -> str:
     """The last skill that failed, with its cause and message."""
-    failed = [(path_id, node) for path_id, node in states.items() if _has_failed(node)]
-    if not failed:
-        return ""
-    path_id, node = failed[-1]
-    assert node.cause is not None
-    return f"{_name(path_id)} failed ({node.cause.value}: {node.message})"
-
-
-def _has_failed(node: NodeState) -> bool:
-    return node.status is Status.FAILURE and node.cause is not None and bool(node.message)
+    for path_id, node in reversed([*states.items()]):
+        if node.status is Status.FAILURE and node.cause is not None and node.message:
+            return f"{_name(path_id)} failed ({node.cause.value}: {node.message})"
+    return ""
 
 
 def _name(path_id: str) -> str:

@@ -78,7 +78,10 @@ def read_actions(
     anew = False
     for clause in requested_predicates(clauses):
         before = [each for each in (clause.subject, clause.verb) if each is not None]
-        gives = recipient is not None and not _says_to_whom(clause)
+        chunks = [item for item in clause.items if isinstance(item, Chunk)]
+        named = any(one.role in (PrepositionRole.GOAL, PrepositionRole.FOR) for one in chunks)
+        named = named or any(one.role is None and (one.phrase.speaker or one.phrase.person) for one in chunks)
+        gives = recipient is not None and not (named or any(isinstance(item, Adverb) for item in clause.items))
         for action in _actions(clause):
             goal = recipient if gives and action.verb.partition(" ")[0] in _GIVING else action.goal
             action = replace(action, said=spoken_words([*before, *clause.items]), anew=anew, goal=goal)
@@ -90,22 +93,9 @@ def read_actions(
         end = takewhile(lambda item: isinstance(item, Separator), reversed(clause.items))
         anew = any(isinstance(item, Separator) and item.word in _THEN for item in end)
     last = [replace(action, unknown=(action.said,)) if action.departs else action for action in found[-1:]]
-    return (*(action for action in found[:-1] if not _goes_nowhere(action)), *last)
-
-
-def _says_to_whom(clause: Predicate) -> bool:
-    chunks = [item for item in clause.items if isinstance(item, Chunk)]
-    whom = any(
-        one.role in (PrepositionRole.GOAL, PrepositionRole.FOR)
-        or (one.role is None and (one.phrase.speaker or one.phrase.person))
-        for one in chunks
-    )
-    return whom or any(isinstance(item, Adverb) for item in clause.items)
-
-
-def _goes_nowhere(action: Action) -> bool:
-    """Returns whether it is the "go" of "go and find", which says nothing of its own."""
-    return action.kind is VerbKind.GO and action.goal is None and action.unknown == (action.verb,)
+    # The "go" of "go and find" is left out.
+    bare = [one for one in found[:-1] if one.kind is VerbKind.GO and one.goal is None and one.unknown == (one.verb,)]
+    return (*(action for action in found[:-1] if action not in bare), *last)
 
 
 def _actions(clause: Predicate) -> Iterator[Action]:
@@ -127,8 +117,10 @@ def _being(clause: Predicate, being: Being) -> Action:
         named = subject is not None and not (subject.speaker or subject.pronoun)
         return Action(None, being.text, (subject,) if named and subject is not None else ())
     roles = read_roles(clause.items, describes=False)
-    if subject is not None and subject.speaker and not being.asked:
-        return _lacking(being, roles)
+    if subject is not None and subject.speaker and not being.asked:  # we are out of napkins, I am in the hall
+        lacked = tuple(place.phrase for place in roles.sources if place.phrase is not None)
+        unknown = (*roles.unknown, *(phrase.spoken for phrase in roles.objects))
+        return Action(None, being.text, lacked, next(iter(roles.ats), None), unknown=unknown)
     objects = [*([subject] if subject is not None else []), *roles.objects]
     if subject and not being.asked and roles.recipient is not None and len(objects) == 1 and not roles.unknown:
         return Action(None, being.text, tuple(objects), teller=roles.recipient.phrase)
@@ -153,13 +145,6 @@ def _narrated(clause: Predicate, being: Being) -> Action:
     named = tuple(phrase for phrase in things if not (phrase.pronoun or phrase.speaker or phrase.person))
     place = next(iter([*roles.ats, *roles.goals]), None)
     return Action(None, being.text, named[:1], place, teller=being.teller)
-
-
-def _lacking(being: Being, roles: Roles) -> Action:
-    """What the speaker lacks ("we are out of napkins"), or where they are ("I am in the hall")."""
-    lacked = tuple(place.phrase for place in roles.sources if place.phrase is not None)
-    unknown = (*roles.unknown, *(phrase.spoken for phrase in roles.objects))
-    return Action(None, being.text, lacked, next(iter(roles.ats), None), unknown=unknown)
 
 
 def _is_state(clause: Predicate, being: Being) -> bool:

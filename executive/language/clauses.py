@@ -102,10 +102,15 @@ def split(text: str, robots: tuple[str, ...] = ()) -> Split:
 
 def cut(text: str) -> tuple[Clause, ...]:
     """The clauses of a text for one addressee as it stands, by the words that join them and their cues."""
-    cuts = list(_cuts(text))
-    ends = [*(start for start, _ in cuts[1:]), len(text)]
-    found = [_clause(text, joint, end) for joint, end in zip(cuts, ends, strict=True)]
-    return tuple(clause for clause in found if clause.text or clause.cue)
+    cuts, found = list(_cuts(text)), []
+    for (start, begin), end in zip(cuts, (*(start for start, _ in cuts[1:]), len(text)), strict=True):
+        clause = Clause(text[start:begin], text[begin:end].strip(" ,;.!?:"))
+        if (kind := _kind(clause.text)) is not None:
+            rest = clause.text[len(kind[1]) :].strip(" ,;:")
+            rest = re.sub(r"^then\s+", "", rest, flags=re.IGNORECASE)
+            clause = replace(clause, kind=kind[0], cue=kind[1], text=rest)
+        found += [clause] if clause.text or clause.cue else []
+    return tuple(found)
 
 
 def _cuts(text: str) -> Iterator[tuple[int, int]]:
@@ -121,16 +126,6 @@ def _cuts(text: str) -> Iterator[tuple[int, int]]:
         word = re.match(r"[\w']+", rest := text[match.end() :])
         if joined and (sentence or (word and (word[0].lower() in _verbs() or _kind(rest) is not None))):
             yield match.span()
-
-
-def _clause(text: str, joint: tuple[int, int], end: int) -> Clause:
-    start = joint[1]
-    clause = Clause(text[joint[0] : start], text[start:end].strip(" ,;.!?:"))
-    kind = _kind(clause.text)
-    if kind is None:
-        return clause
-    rest = clause.text[len(kind[1]) :].strip(" ,;:")
-    return replace(clause, kind=kind[0], cue=kind[1], text=re.sub(r"^then\s+", "", rest, flags=re.IGNORECASE))
 
 
 def _kind(text: str) -> tuple[Cue, str] | None:

@@ -45,7 +45,10 @@ def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
     """
     frames: list[CommandFrame] = []
     held: Phrase | None = None
-    joined = _set_down(_one_by_one(_join_going(_without_wishes(actions))))
+    # A wish is left out where the next words say how to meet it: "I would like a tea, can you get me one".
+    followed = zip_longest(actions, actions[1:])
+    asked = tuple(action for action, after in followed if after is None or not _meets(after, action))
+    joined = _set_down(_one_by_one(_join_going(asked)))
     for index, action in enumerate(joined):
         verb, target, puts = action.verb, action.target, action.kind is VerbKind.PLACE
         after = joined[index + 1] if index + 1 < len(joined) else None
@@ -129,12 +132,6 @@ def _join_going(actions: Sequence[Action]) -> tuple[Action, ...]:
             action = replace(action, source=before.goal) if takes_source else replace(action, goal=before.goal)
         joined.append(action)
     return tuple(joined)
-
-
-def _without_wishes(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Leaves out a wish when the next words say how it is to be met: "I would like a tea, can you get me one"."""
-    followed = zip_longest(actions, actions[1:])
-    return tuple(action for action, after in followed if after is None or not _meets(after, action))
 
 
 def _meets(action: Action, wish: Action) -> bool:

@@ -64,7 +64,7 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
     if done and isinstance(done[-1], Being):
         first = None
     if isinstance(first, Verb):
-        end = _clause_end(ahead)
+        end = next((n for n in range(1, len(ahead)) if isinstance(ahead[n], Verb | Being | Correction)), len(ahead))
         clause, rest = ahead[1:end], ahead[end:]
         turns = (n for n, item in enumerate(clause) if isinstance(item, Separator) and item.word == "but")
         turn = next(turns, len(clause))
@@ -92,12 +92,6 @@ def _forbidden(mark: Negation, ahead: Sequence[Item]) -> RefusalError:
     """The refusal of what the speaker does not want, and which is no part of a command."""
     said = spoken_words([mark, *ahead]).replace(" n't", "n't")
     return RefusalError(f"I cannot keep to {said!r}; say only what I am to do", [said])
-
-
-def _clause_end(ahead: Sequence[Item]) -> int:
-    """Where the clause of the verb that stands first ends."""
-    ends = (n for n, item in enumerate(ahead) if n and isinstance(item, Verb | Being | Correction))
-    return next(ends, len(ahead))
 
 
 def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> bool:

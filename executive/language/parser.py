@@ -69,12 +69,26 @@ class DependencyParser:
 
     def parse(self, text: str) -> tuple[Token, ...]:
         """The words of `text`, in order; never raises on text. Texts that were parsed last are not parsed again."""
-        from executive.language.tokens import corrected_parse
+        from executive.language.tokens import Token, corrected_parse
 
         if text not in self._parsed:
             if len(self._parsed) > _KEPT_TEXTS:
                 self._parsed.clear()
-            words = (_token(token, self._kind(token)) for token in self._pipeline(text) if not token.is_space)
+            words = (
+                Token(
+                    index=token.i,
+                    start=token.idx,
+                    text=token.text,
+                    lemma=token.lemma_.lower(),
+                    pos=token.pos_,
+                    tag=token.tag_,
+                    head=token.head.i,
+                    relation=_RELATIONS.get(token.dep_, token.dep_),
+                    kind=self._kind(token),
+                )
+                for token in self._pipeline(text)
+                if not token.is_space
+            )
             self._parsed[text] = corrected_parse(words)
         return self._parsed[text]
 
@@ -125,22 +139,6 @@ def load_parser() -> DependencyParser:
     return DependencyParser(folders[-1])
 
 
-def _token(token: SpacyToken, kind: NounKind | None) -> Token:
-    from executive.language.tokens import Token
-
-    return Token(
-        index=token.i,
-        start=token.idx,
-        text=token.text,
-        lemma=token.lemma_.lower(),
-        pos=token.pos_,
-        tag=token.tag_,
-        head=token.head.i,
-        relation=_RELATIONS.get(token.dep_, token.dep_),
-        kind=kind,
-    )
-
-
 _UNUSED_PIPES: Final = ("senter", "ner")
 _FRAMEWORKS: Final = ("torch", "cupy")  # spaCy imports them where they are installed; the model needs neither
 _YAML_OF_SPACY: Final = ("read_yaml", "write_yaml", "yaml_dumps", "yaml_loads", "is_yaml_serializable")
@@ -178,11 +176,7 @@ def load_english(folder: Path) -> tuple[Language, WordRows]:
 def _affix(find: Callable[[re.Pattern[str], str], Any], pattern: str, nothing: Any = None) -> Callable[[str], Any]:
     """Finds a pattern, which is compiled once a word needs it: in letters, or a blank, there is nothing to find."""
     compiled = cache(lambda: re.compile(pattern))
-    return lambda word: nothing if _is_plain(word) else find(compiled(), word)
-
-
-def _is_plain(word: str) -> bool:
-    return word.isascii() and (word.isalpha() or word == " ")
+    return lambda word: nothing if word.isascii() and (word.isalpha() or word == " ") else find(compiled(), word)
 
 
 class RuleTokenizer:

@@ -17,7 +17,7 @@ from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase, noun_phrases
 from executive.language.questions import ABLE, RefusalError, RefusalKind, Slot, which_question
-from executive.language.reading import split_items
+from executive.language.reading import Reader
 from executive.language.reference import Memory, resolve
 from executive.language.roles import Location
 from executive.language.tokens import Affirmed, Token, affirmation, name_table, parse_with_names, rephrase
@@ -104,7 +104,7 @@ class Pipeline:
     def _read(self, trace: Trace) -> Trace:
         there = any(isinstance(item, Being) and item.existential for item in trace.lead)
         said = affirmation(trace.tokens, there=there) if trace.asked else Affirmed(trace.tokens)
-        items = split_items(said.tokens, noun_phrases(said.tokens), lead=trace.lead, silent=said.silent)
+        items = Reader(said.tokens, noun_phrases(said.tokens), silent=set(said.silent)).read(trace.lead)
         read = replace(trace, tokens=said.tokens, affirmed=said)
         return replace(read, items=repair_disfluencies(items), unwanted=unwanted_things(items))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -38,11 +38,11 @@ _OF_ALL: Final = re.compile(r"all|none|(?:any|every|no)(?:where|one|body|thing)"
 """Behind these "but" means "except"."""
 
 
-class _Reader(Row):
-    """Reads the row from left to right."""
+class Reader(Row):
+    """Reads the words of a sentence from left to right."""
 
-    def read(self, lead: Sequence[Item] = ()) -> Iterable[Item]:
-        """The items of the row in order, behind `lead`; the first way of reading that fits takes its words."""
+    def read(self, lead: Sequence[Item] = ()) -> tuple[Item, ...]:
+        """Reads the words as items behind `lead`: every word but the silent ones is in one of them."""
         steps: tuple[Callable[[list[Item]], Item | None], ...] = (
             self._mark,
             *(partial(step, self) for step in INDIRECT),
@@ -59,7 +59,7 @@ class _Reader(Row):
                 continue
             item = next((found for step in steps if (found := step(items)) is not None), None)
             items.append(item if item is not None else Unknown(self.take(1)))
-        return items
+        return tuple(items)
 
     def _mark(self, items: list[Item]) -> Item | None:
         """What takes something back: "not", "no, the hammer"; "no milk" does not."""
@@ -231,7 +231,9 @@ class _Reader(Row):
         if before and behind and behind[0].word in ("here", "there"):
             self.at += 1
             return Separator("")
-        if token.word == "inside" and self._first_told(items):
+        chunks = [item for item in items if isinstance(item, Chunk)]
+        named = bool(chunks) and not chunks[-1].phrase.pronoun and all(chunk.role is None for chunk in chunks)
+        if token.word == "inside" and named and not any(isinstance(item, Being) for item in items):  # the house itself
             self.at += 1
             return _place(token, PrepositionRole.GOAL)
         if token.word in lexicon().here or token.word in lexicon().there:
@@ -258,12 +260,6 @@ class _Reader(Row):
         if purpose and token.tag == "TO" and isinstance(last, Verb) and VerbKind.GO in last.kinds:
             return True  # go to take the broom
         return not items and token.word in ("after", "upon", "by") and bool(behind) and behind[0].tag == "VBG"
-
-    def _first_told(self, items: Sequence[Item]) -> bool:
-        """Returns whether "inside" is the house itself: no place was spoken of, and the thing was said by its name."""
-        chunks = [item for item in items if isinstance(item, Chunk)]
-        named = bool(chunks) and not chunks[-1].phrase.pronoun
-        return named and all(chunk.role is None for chunk in chunks) and not any(isinstance(i, Being) for i in items)
 
     def _points(self, items: Sequence[Item]) -> bool:
         """Returns whether "over there" only goes with a "that", as in "that clamp over there"."""
@@ -297,10 +293,3 @@ class _Reader(Row):
 def _place(token: Token, role: PrepositionRole) -> Chunk:
     """A word as a place."""
     return Chunk(Phrase((replace(token, pos="NOUN", tag="NN", kind=NounKind.PLACE),)), "", role)
-
-
-def split_items(
-    tokens: Sequence[Token], phrases: Mapping[int, Phrase], *, lead: Sequence[Item] = (), silent: Collection[int] = ()
-) -> tuple[Item, ...]:
-    """The sentence as items, in order; every word is in one of them, but those in `silent`. `lead` comes before it."""
-    return tuple(_Reader(tokens, phrases, silent=set(silent)).read(lead))

@@ -168,7 +168,9 @@ def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) ->
         row.append(one)
     roles.goals += [HERE if item.here else THERE for item in items if isinstance(item, Adverb)]
     first = roles.objects[0] if roles.objects else None
-    if first is not None and (first.speaker or (len(roles.objects) > 1 and _receives(first, roles))):
+    them = first is not None and (first.stands_for_somebody or _somebody(first) or first.kind is NounKind.PERSON)
+    receives = first is not None and len(roles.objects) > 1 and (first.person or (them and not roles.listed))
+    if first is not None and (first.speaker or receives):
         roles.objects.pop(0)  # give Robin a coke, bring me a coke
         roles.recipient = HERE if first.speaker else Location(first, within=roles.first_at)
     elif roles.first_at is not None:
@@ -242,9 +244,3 @@ def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
             break
         first -= 1
     return [one.chunk.phrase for one in row[first:]]
-
-
-def _receives(first: Phrase, roles: Roles) -> bool:
-    """Returns whether the first of several bare phrases is given the others: somebody, or an animal."""
-    them = first.stands_for_somebody or first.head.word in _EVERYONE or first.kind is NounKind.PERSON
-    return first.person or (them and not roles.listed)

@@ -155,7 +155,9 @@ class _Reader:
                 break
         if part.behind is None or part.behind == part.who:
             return
-        found = [n for n, other in enumerate(before) if _share(other.part.who, part.behind)]
+        behind = part.behind if isinstance(part.behind, tuple) else None
+        whose = ((n, one.part.who) for n, one in enumerate(before) if one.part.who is not None)
+        found = [n for n, who in whose if behind is None or not isinstance(who, tuple) or {*who} & {*behind}]
         if not found:
             who = self._named(part.behind if isinstance(part.behind, tuple) else self.robots)
             raise RefusalError(f"nothing was said that {who} is to do before", [who])
@@ -217,13 +219,6 @@ class _Reader:
     def _named(self, who: Who | None) -> str:
         names = who if isinstance(who, tuple) else self.robots
         return listing(map(display_name, names), last="and" if who is not None else "or")
-
-
-def _share(one: Who | None, other: Who) -> bool:
-    """Returns whether robots are among others."""
-    if isinstance(one, tuple) and isinstance(other, tuple):
-        return bool(set(one) & set(other))
-    return one is not None
 
 
 def _moved(before: Understanding, meant: Understanding) -> Location | None:

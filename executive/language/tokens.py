@@ -279,10 +279,6 @@ def _rules(family: str | None = None) -> tuple[_Rule, ...]:
     )
 
 
-def _full(match: re.Match[str]) -> str:
-    return lexicon().short_forms[match[0].lower()]
-
-
 def _all(match: re.Match[str]) -> str:
     """Each of a kind, one after the other, is all of that kind."""
     what = match["what"].strip()
@@ -295,7 +291,7 @@ def _break(match: re.Match[str]) -> str:
 
 
 _FUNCTIONS: Final[Mapping[str, Callable[[re.Match[str]], str]]] = {
-    "$full": _full,
+    "$full": lambda match: lexicon().short_forms[match[0].lower()],
     "$all": _all,
     "$break": _break,
 }

@@ -67,12 +67,8 @@ def values_in_json(text: bytes) -> dict[str, Any]:
     if wrong is not None:
         hint = "give each name a text, a number, true or false"
         raise InputError(f"'{wrong[:60]}' is not a name with a value", hint=hint)
-    return {name: _guarded(name, value) for name, value in values.items()}
-
-
-def _guarded(name: str, value: Any) -> Any:
-    """The value, a text guarded as all texts from outside. Raises InputError."""
-    return plain_text(value, what=f"the value of '{name}'") if isinstance(value, str) else value
+    texts = {name: value for name, value in values.items() if isinstance(value, str)}
+    return {**values, **{name: plain_text(text, what=f"the value of '{name}'") for name, text in texts.items()}}
 
 
 def _can_be_given(name: str, value: Any) -> bool:
@@ -170,15 +166,9 @@ def _declared(source: YamlSource) -> dict[str, Parameter]:
         if default is not None and not isinstance(default, _SCALARS):
             hint = "give it a text, a number, true or false, or {type: .., default: ..}"
             raise source.error((DECLARED, name), f"parameter '{name}' cannot hold {shown(default)}", hint)
-        found[name] = Parameter.model_construct(type=_kind(default), default=default)
+        fitting = (kind for kind in ("truth", "number", "text") if isinstance(default, _TYPES[kind]))
+        found[name] = Parameter.model_construct(type=next(fitting, None), default=default)
     return found
-
-
-def _kind(default: Any) -> str | None:
-    """The type of a parameter with this default."""
-    if default is None:
-        return None
-    return "truth" if isinstance(default, bool) else "number" if isinstance(default, int | float) else "text"
 
 
 def _put_in(

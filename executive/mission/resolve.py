@@ -153,7 +153,8 @@ class _Resolver:
             case CallSkill():
                 return step
             case Say():
-                return self._said(step)
+                meant = self._meaning(step.error, ("say",), step.say)
+                return _group(step, meant.steps, step.say) if meant.steps else step.with_commands(meant.commands)
             case Do():
                 return step.with_command(self._command(step.error, step))
             case ForEach():
@@ -260,11 +261,6 @@ class _Resolver:
         all_doors = listing(" and ".join(door.between) for door in facts.doors)
         hint = f"known are the doors of {all_doors}" if facts.doors else "add it under 'doors' in the knowledge file"
         raise error(path, f"no door of {told} is known", hint)
-
-    def _said(self, step: Say) -> Step:
-        """The step of a sentence: its commands, or a group of what it decides or repeats."""
-        meant = self._meaning(step.error, ("say",), step.say)
-        return _group(step, meant.steps, step.say) if meant.steps else step.with_commands(meant.commands)
 
     def _meaning(self, error: _Error, path: KeyPath, sentence: str) -> Understanding:
         """What a sentence means; one that stands there again means the same. Raises InputError: not understood."""

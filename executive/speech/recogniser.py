@@ -84,13 +84,9 @@ class Vocabulary:
             f"{call[0]} you bring me two? {call[1]} you go there. {call[2]} it back. "
             f"{call[3]} pick it up, move it and put it there."
         )
-        return f"{', '.join(_longest(self.names))}. {turns}" if self.names else turns
-
-
-def _longest(names: Sequence[str]) -> list[str]:
-    """The names that stand in no other one: what is said in a longer name is expected alone as well."""
-    spaced = [f" {name.lower()} " for name in names]
-    return [name for name in names if sum(f" {name.lower()} " in other for other in spaced) == 1]
+        spaced = [f" {name.lower()} " for name in self.names]  # a name within a longer one is expected with that
+        longest = [name for name in self.names if sum(f" {name.lower()} " in other for other in spaced) == 1]
+        return f"{', '.join(longest)}. {turns}" if self.names else turns
 
 
 def vocabulary_of_world(knowledge: Knowledge, *, called: bool) -> Vocabulary:

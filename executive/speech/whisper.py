@@ -50,17 +50,12 @@ def load_whisper() -> WhisperRecogniser:
     Raises:
         InputError: the extra `speech` is not installed, or its weights are not those that were meant.
     """
-    whisper = speech_module("faster_whisper").WhisperModel(
-        "whisper-base", device="cpu", compute_type="int8", cpu_threads=_THREADS, files=_weights()
-    )
-    return WhisperRecogniser(whisper, speech_module("ctranslate2"), speech_module("faster_whisper.tokenizer"))
-
-
-def _weights() -> dict[str, Any]:
-    """The files of the model by name, its weights changed by the adapter."""
     model, small = base_weights()
     packaged_adapter(base=BASE_SHA256).add_to(read_model_file(model.getbuffer()))
-    return {"model.bin": model, **small}
+    whisper = speech_module("faster_whisper").WhisperModel(
+        "whisper-base", device="cpu", compute_type="int8", cpu_threads=_THREADS, files={"model.bin": model, **small}
+    )
+    return WhisperRecogniser(whisper, speech_module("ctranslate2"), speech_module("faster_whisper.tokenizer"))
 
 
 def base_weights() -> tuple[io.BytesIO, dict[str, bytes]]:

@@ -135,7 +135,12 @@ class Template:
 
     def filled(self, values: Mapping[str, Value]) -> str:
         """The text with the values put in. Raises ExpressionError."""
-        return "".join(piece if isinstance(piece, str) else _shown(piece.value(values)) for piece in _pieces(self.text))
+        texts = []
+        for piece in _pieces(self.text):
+            value = piece if isinstance(piece, str) else piece.value(values)
+            yes_or_no = ("no", "yes")[value] if isinstance(value, bool) else str(value)
+            texts.append(f"{value:g}" if isinstance(value, float) else yes_or_no)
+        return "".join(texts)
 
     def could_be(self, text: str) -> bool:
         """Returns whether a text is this one with some values put in, but for its spaces."""
@@ -162,13 +167,6 @@ def _pieces(text: str) -> tuple[str | Expression, ...]:
             raise ExpressionError(f"a brace '{found}' stands alone", "write an expression in {braces}, or {{")
         pieces.append(found[0] if found in ("{{", "}}") else Expression(match[1]))
     return tuple(piece for piece in (*pieces, text[last:]) if piece != "")
-
-
-def _shown(value: Value) -> str:
-    """A value as a person reads it."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 @functools.lru_cache(maxsize=4096)
@@ -321,11 +319,8 @@ def _text_hint(node: ast.Compare) -> str:
     if any(isinstance(each, ast.Name) and each.id == CLOCK for each in sides):
         return 'a time of day is written as "08:30"'
     texts = [each.value for each in sides if isinstance(each, ast.Constant) and isinstance(each.value, str)]
-    return next((hint for text in texts if (hint := slip_hint(text) or _quoted_hint(text))), "")
-
-
-def _quoted_hint(text: str) -> str:
-    return f"write {text}, without quotes" if re.fullmatch(r"-?\d+(?:\.\d+)?", text) else ""
+    numbers = (f"write {text}, without quotes" for text in texts if re.fullmatch(r"-?\d+(?:\.\d+)?", text))
+    return next((hint for text in texts if (hint := slip_hint(text))), next(numbers, ""))
 
 
 def _call(node: ast.expr, function: _Function, kinds: list[Kind]) -> Kind:

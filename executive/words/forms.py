@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,13 +66,9 @@ class Forms:
             if key in own or not users:
                 continue
             if data[key] is not None:
-                raise ValueError(f"'{key}' goes with {_either(users)}")
+                raise ValueError(f"'{key}' goes with {listing(map(repr, users), last='or')}")
             del fitting[key]
         for key, name in own.items():
             if model.model_fields[name].is_required() and data.get(key) is None:
                 raise ValueError(f"'{told}' needs '{key}' beside it")
         return fitting
-
-
-def _either(keys: Iterable[str]) -> str:
-    return listing(map(repr, keys), last="or")

@@ -136,7 +136,11 @@ def parse_robots(text: str, kinds: Collection[str]) -> tuple[RobotConfig, ...]:
         if (double := same_name(name, robots)) is not None:
             raise double
         checked_kind(kind.strip(), kinds)
-        robots[name] = RobotConfig(display_name(name), kind.strip(), _start(name, start) if at else None)
+        try:
+            pose = pose_in(start.split(",")) if at else None
+        except QuantityError as error:
+            raise InputError(f"'{start[:60]}' is no start for {name}: {error.what}", hint=error.hint) from None
+        robots[name] = RobotConfig(display_name(name), kind.strip(), pose)
     return tuple(robots.values())
 
 
@@ -200,10 +204,3 @@ def _entries(text: str) -> Iterator[str]:
         if not piece.strip():
             raise InputError(f"'{text[:60]}' has a comma too many", hint=_FORM)
     yield entry
-
-
-def _start(name: str, text: str) -> Pose2D:
-    try:
-        return pose_in(text.split(","))
-    except QuantityError as error:
-        raise InputError(f"'{text[:60]}' is no start for {name}: {error.what}", hint=error.hint) from None

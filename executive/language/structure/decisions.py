@@ -11,15 +11,16 @@ from executive.language.clauses import ACTS, CLAUSES, Clause, Cue, cut, text_of,
 from executive.language.items import verb
 from executive.language.questions import RefusalError
 from executive.language.structure.conditions import suppose
-from executive.language.structure.plain import State, Supposed, contrary
-from executive.language.structure.requests import speech_in, template, wait
+from executive.language.structure.plain import PlainReader, PlainReading, State, Supposed, contrary
+from executive.language.structure.requests import Done, speech_in, template, wait
 from executive.language.structure.row import (
-    Base,
     LookedAt,
     Rounds,
     Row,
+    checked_statement,
     contrary_of,
     end_of,
+    looked_at_by,
     nothing_said,
     one_errand,
     same,
@@ -32,13 +33,65 @@ from executive.language.structure.row import (
 )
 from executive.words.command import Task
 from executive.words.condition import ValueIs
-from executive.words.leaf_steps import Awaited, Do, Speak, Wait
+from executive.words.leaf_steps import Awaited, Do, Speak, Wait, steps_of_commands
 from executive.words.policy import OnFailure
+from executive.words.step import Step
 from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, Try
 
 
-class Branches(Base):
-    """Decides and repeats. Its methods raise RefusalError."""
+class DecisionBuilder:
+    """Builder of steps that decide and repeat. Its methods raise RefusalError.
+
+    `told` is what "tell Robin" tells, `verb` the last verb by which something was to be brought, `notes` say what was
+    taken for what; `special` says that it is more than a list of commands, also where it has no block.
+    """
+
+    def __init__(self, reader: PlainReader, told: str | None = None, verb: str | None = None) -> None:
+        self.reader, self.told, self.verb = reader, told, verb
+        self.notes: list[str] = []
+        self.special = False
+
+    def sequence(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
+        """The steps of clauses, one after the other."""
+        raise NotImplementedError
+
+    def nested(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
+        """The same of clauses within others."""
+        return self.sequence([replace(clauses[0], joint=""), *clauses[1:]], state)
+
+    def flush(self, row: Row) -> None:
+        """Understands the clauses that are still to be understood."""
+        if not row.plain:
+            return
+        last = row.plain[-1].text
+        reading, row.plain = self.read_together(row.plain, row.state), []
+        self.add(row, reading)
+        if row.asked is not None and row.asked.looked:
+            there = re.sub(r"^(?:is|are) there ", "there is ", last, flags=re.IGNORECASE)
+            said = checked_statement(last) or (there if there != last else "")
+            row.asked = replace(row.asked, supposed=replace(row.asked.supposed, said=said))
+
+    def read_together(self, clauses: Sequence[Clause], state: State) -> PlainReading:
+        """What clauses that are plain commands ask for together."""
+        return self.reader.commands_of(text_of([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead)
+
+    def add(self, row: Row, reading: PlainReading) -> None:
+        """Puts what a plain part asks for."""
+        self.notes += reading.trace.notes
+        row.steps += steps_of_commands(reading.commands)
+        before, row.state = row.state, reading.state
+        row.asked = looked_at_by(reading, before, self.reader)
+
+    def put(self, row: Row, block: Step, state: State) -> None:
+        """Puts a block; `state` is what is known behind it."""
+        self.put_done(row, ((block,), state, ()))
+
+    def put_done(self, row: Row, done: Done) -> None:
+        """Puts steps with what is known behind them, and notes."""
+        steps, row.state, notes = done
+        row.steps += steps
+        row.asked = None
+        self.notes += notes
 
     def always(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
         """What is done at the end, whatever happens."""
@@ -221,7 +274,10 @@ class Branches(Base):
     def repeat_of(self, row: Row, rounds: Rounds, body: Sequence[Clause]) -> None:
         """Puts rounds of what the clauses ask for."""
         steps, state = self.nested(body, replace(rounds.state, goal=None, at=None))
-        if rounds.loop.times is None and rounds.loop.every_s is None and not _worth_repeating(steps):
+        commands = [command for step in steps for each in step.walk() for command in each.commands]
+        stays = len(commands) == 1 and commands[0].item is None and commands[0].task in (None, Task.CHARGE)
+        idle = stays and all(isinstance(step, Do) for step in steps)  # only goes to one place, or charges
+        if rounds.loop.times is None and rounds.loop.every_s is None and idle:
             raise RefusalError("I do not see what is to be repeated; say 'wait there until ...'", [text_of(body)])
         self.put(row, _one_repeat(Repeat(loop=rounds.loop, steps=_done(steps, text_of(body)))), state)
 
@@ -363,13 +419,6 @@ def _done(steps: Steps, said: str) -> Steps:
     if not steps:
         raise RefusalError(f"'{said}' is nothing to do; leave it out", [said])
     return steps
-
-
-def _worth_repeating(steps: Steps) -> bool:
-    """Returns whether it is more than to go to one place, or to charge."""
-    commands = [command for step in steps for each in step.walk() for command in each.commands]
-    stays = len(commands) == 1 and commands[0].item is None and commands[0].task in (None, Task.CHARGE)
-    return not stays or not all(isinstance(step, Do) for step in steps)
 
 
 def _one_repeat(block: Repeat) -> Repeat:

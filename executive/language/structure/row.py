@@ -7,15 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from executive.language.amounts import seconds_of, times_of
-from executive.language.clauses import ACTS, CLAUSES, Clause, Cue, text_of
+from executive.language.clauses import ACTS, CLAUSES, Clause, Cue
 from executive.language.lexicon import VerbKind
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE
 from executive.language.structure.plain import PlainReader, PlainReading, State, Supposed, contrary
-from executive.language.structure.requests import Done
 from executive.words.command import Command, Task
 from executive.words.condition import Condition, Look, Not
-from executive.words.leaf_steps import steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Loop, Steps
 
@@ -157,61 +155,6 @@ def unclear(found: Clause) -> RefusalError:
 def nothing_said(cue: str, text: str = "") -> RefusalError:
     """The refusal of a condition behind which it is not said what is to be done."""
     return RefusalError(f"what am I to do {f'{cue.lower()} {text}'.strip()}?", [f"{cue} {text}".strip()])
-
-
-class Base:
-    """Puts the steps of one sentence together. Its methods raise RefusalError.
-
-    `told` is what "tell Robin" tells, `verb` the last verb by which something was to be brought, `notes` say what was
-    taken for what; `special` says that it is more than a list of commands, also where it has no block.
-    """
-
-    def __init__(self, reader: PlainReader, told: str | None = None, verb: str | None = None) -> None:
-        self.reader, self.told, self.verb = reader, told, verb
-        self.notes: list[str] = []
-        self.special = False
-
-    def sequence(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
-        """The steps of clauses, one after the other."""
-        raise NotImplementedError
-
-    def nested(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
-        """The same of clauses within others."""
-        return self.sequence([replace(clauses[0], joint=""), *clauses[1:]], state)
-
-    def flush(self, row: Row) -> None:
-        """Understands the clauses that are still to be understood."""
-        if not row.plain:
-            return
-        last = row.plain[-1].text
-        reading, row.plain = self.read_together(row.plain, row.state), []
-        self.add(row, reading)
-        if row.asked is not None and row.asked.looked:
-            there = re.sub(r"^(?:is|are) there ", "there is ", last, flags=re.IGNORECASE)
-            said = checked_statement(last) or (there if there != last else "")
-            row.asked = replace(row.asked, supposed=replace(row.asked.supposed, said=said))
-
-    def read_together(self, clauses: Sequence[Clause], state: State) -> PlainReading:
-        """What clauses that are plain commands ask for together."""
-        return self.reader.commands_of(text_of([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead)
-
-    def add(self, row: Row, reading: PlainReading) -> None:
-        """Puts what a plain part asks for."""
-        self.notes += reading.trace.notes
-        row.steps += steps_of_commands(reading.commands)
-        before, row.state = row.state, reading.state
-        row.asked = looked_at_by(reading, before, self.reader)
-
-    def put(self, row: Row, block: Step, state: State) -> None:
-        """Puts a block; `state` is what is known behind it."""
-        self.put_done(row, ((block,), state, ()))
-
-    def put_done(self, row: Row, done: Done) -> None:
-        """Puts steps with what is known behind them, and notes."""
-        steps, row.state, notes = done
-        row.steps += steps
-        row.asked = None
-        self.notes += notes
 
 
 def seconds_of_cue(cue: str) -> float:

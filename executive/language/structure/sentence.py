@@ -18,7 +18,7 @@ from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.structure.conditions import suppose
-from executive.language.structure.decisions import Branches
+from executive.language.structure.decisions import DecisionBuilder
 from executive.language.structure.plain import PlainReader, State, at_start, behind_preposition, phrase_of_name
 from executive.language.structure.requests import (
     Asked,
@@ -49,8 +49,8 @@ from executive.words.steps import Ask, Choose, Repeat, Steps, Together, Try
 from skills.files.schema_errors import first_error
 
 
-class Builder(Branches):
-    """Puts the steps of one sentence together. Its methods raise RefusalError."""
+class SentenceBuilder(DecisionBuilder):
+    """Builder of the steps of one sentence. Its methods raise RefusalError."""
 
     def sequence(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
         """The steps of clauses, one after the other."""
@@ -332,7 +332,7 @@ def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, mem
     if len(clauses) > MOST_CLAUSES:
         raise RefusalError(f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most")
     assert pipeline.knowledge is not None
-    builder = Builder(PlainReader(pipeline, pipeline.knowledge))
+    builder = SentenceBuilder(PlainReader(pipeline, pipeline.knowledge))
     steps, state = builder.sequence(clauses, at_start(pipeline.knowledge, memory))
     if all(isinstance(step, Do) for step in steps) and not builder.special:
         return plain

@@ -3,12 +3,12 @@ import pytest
 from executive.language.disfluency import repair_disfluencies
 from executive.language.items import spoken_words
 from executive.language.phrases import noun_phrases
-from executive.language.reading import split_items
+from executive.language.reading import Reader
 
 
 def hint(parser, text):
     tokens = parser.parse(text)
-    return spoken_words(repair_disfluencies(split_items(tokens, noun_phrases(tokens))))
+    return spoken_words(repair_disfluencies(Reader(tokens, noun_phrases(tokens)).read()))
 
 
 @pytest.mark.parametrize(

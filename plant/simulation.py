@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 
-from executive.words.variation import NO_VARIATION, Variation, light_called
+from executive.words.variation import NO_VARIATION, Variation, parse_light
 from plant.diagram import LooseModel, build_diagram
 from plant.engine import Engine
 from plant.events import Moves
@@ -74,7 +74,7 @@ class Simulation:
             doors=world.doors,
             visuals=visuals,
             locomotion=locomotion,
-            renderer_parameters=render_parameters(light_called(variation.light)),
+            renderer_parameters=render_parameters(parse_light(variation.light)),
             friction=variation.friction,
         )
         self.engine = Engine(

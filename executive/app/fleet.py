@@ -146,7 +146,7 @@ def charging_missions(world: World, knowledge: Knowledge, robots: Mapping[str, P
     setting = Setting(Request(commands=(str(charge),), world_name=world.name), world, _patient(knowledge), robots)
     steps = steps_of_commands([charge])
     return {
-        name: setting.for_robot(name).compile(Mission.of_steps(steps, world=world.name, robot=name))
+        name: setting.for_robot(name).compile(Mission.from_steps(steps, world=world.name, robot=name))
         for name, robot in robots.items()
         if robot.dock is not None
     }

@@ -192,7 +192,7 @@ def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str
 
 def _is_text(heard: str, text: str | Template | Expression | None) -> bool:
     """Returns whether the robot said the text of a step, with any values in it."""
-    return text.could_be(heard) if isinstance(text, Template) else not isinstance(text, str) or heard == text
+    return text.matches(heard) if isinstance(text, Template) else not isinstance(text, str) or heard == text
 
 
 def _joined(*sentences: str) -> str:

@@ -14,7 +14,7 @@ from executive.app.prepare import prepare
 from executive.app.prepared import Prepared
 from executive.app.talk import Talk, load_ahead
 from executive.conversation import ReplyKind
-from executive.mission.parameters import given_values
+from executive.mission.parameters import parse_values
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.run.control import Control
@@ -142,7 +142,7 @@ def queueing(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], s
         world = before.world or before.world_name
         asked = Request(text, world=world, seed=before.seed, out=out, robots=before.robots)
         if named in shipped_missions():
-            asked = replace(asked, sentence=None, file=Path(named), given=given_values(settings))
+            asked = replace(asked, sentence=None, file=Path(named), given=parse_values(settings))
         prepared = prepare(asked)
         refuse_impossible(prepared)
         request = prepared.request.from_anywhere()

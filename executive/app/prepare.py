@@ -14,14 +14,20 @@ from executive.app.robots import PlacedRobot, knowledge_for, only_robot, placed_
 from executive.app.worlds import knowledge_of, open_world, with_map
 from executive.language.parser import load_parser
 from executive.language.questions import Answerer, ClarifyingQuestion, answer_by
-from executive.mission.load import for_robot, import_folders, load_mission, overridden, routes_in
+from executive.mission.load import (
+    import_folders,
+    knowledge_of_mission,
+    load_mission,
+    mission_of_robot,
+    routes_of_people,
+)
 from executive.mission.request import Request
 from executive.mission.resolve import mission_from_file
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge, Pose
 from executive.words.mission import DEFAULT_WORLD, Mission, MissionPart, QuestionPolicy
-from executive.words.robot_config import RobotConfig, robot_called, robots_in
+from executive.words.robot_config import RobotConfig, find_robot, robots_of_file
 from executive.words.yaml_steps import steps_from_lines
 from plant.worlds.world import ObjectRule, World, WorldError
 from skills.files.errors import InputError, Problems, listing, suggestion
@@ -127,7 +133,7 @@ class Setting:
         """What one robot is to do: all that was meant for it, from where it stands. Raises InputError: it cannot be."""
         steps = tuple(step for meant in meanings for step in meant.all_steps)
         notes = tuple(note for meant in meanings for note in meant.notes)
-        mission = Mission.of_steps(steps, world=self.world.name, robot=name)
+        mission = Mission.from_steps(steps, world=self.world.name, robot=name)
         return self.for_robot(name).compile(mission.with_notes(notes))
 
     def mission_of_commands(self) -> Mission:
@@ -137,12 +143,12 @@ class Setting:
             steps = steps_from_lines(request.commands)
         except ValueError as error:
             raise InputError(f"the mission '{request.name}' cannot be read: {error}", hint="give it again") from error
-        mission = Mission.of_steps(steps, world=self.world.name, robot=request.robot)
+        mission = Mission.from_steps(steps, world=self.world.name, robot=request.robot)
         return mission.model_copy(update={"name": request.name})
 
     def for_file(self, loaded: Mission) -> Prepared:
         """What a mission file asks of the robot that stands in this world. Raises InputError."""
-        knowledge = overridden(loaded, self.knowledge)
+        knowledge = knowledge_of_mission(loaded, self.knowledge)
         answer = self.answerer(self.request.questions or loaded.questions)
         mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
         world = _with_people(loaded, _with_objects(loaded, self.world, knowledge), knowledge)
@@ -194,7 +200,7 @@ def _named_robots(loaded: Mission | None, world: World, knowledge: Knowledge) ->
     from plant.robots.robot_kind import robot_kinds
 
     own = read_yaml(world.knowledge_path) if loaded is None or loaded.robots is None else loaded.document
-    return robots_in(named, robot_kinds(), own)
+    return robots_of_file(named, robot_kinds(), own)
 
 
 def _standing(request: Request, world: World, knowledge: Knowledge, ask: Answerer | None) -> Setting:
@@ -216,7 +222,7 @@ def _for_the_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
     if request.sentence is None:
         return setting.compile(setting.mission_of_commands())
     meant = setting.understand()
-    mission = Mission.of_steps(meant.all_steps, world=setting.world.name, robot=robot.name).with_notes(meant.notes)
+    mission = Mission.from_steps(meant.all_steps, world=setting.world.name, robot=robot.name).with_notes(meant.notes)
     asked = replace(request, sentence=meant.text, require_wake=setting.require_wake)
     return replace(setting, request=asked).compile(mission, meant)
 
@@ -225,7 +231,7 @@ def _for_whom_it_calls(setting: Setting) -> Prepared:
     """What each robot is to do that a sentence calls, or that commands are for. Raises InputError."""
     request, robots = setting.request, setting.robots
     if request.sentence is None:
-        name = robot_called(request.robot, robots) or next(iter(robots))
+        name = find_robot(request.robot, robots) or next(iter(robots))
         return setting.for_robot(name).compile(setting.mission_of_commands().model_copy(update={"robot": name}))
     meant = setting.understand()
     setting = replace(setting, request=replace(request, sentence=meant.text))
@@ -279,7 +285,7 @@ def _for_one_robot(setting: Setting, loaded: Mission) -> Prepared:
     names = tuple(robots) if loaded.robot is None else (_robot_in(loaded, ("robot",), loaded.robot, robots),)
 
     def for_file(name: str) -> Prepared:
-        return setting.for_robot(name).for_file(for_robot(loaded, name))
+        return setting.for_robot(name).for_file(mission_of_robot(loaded, name))
 
     return for_file(names[0]) if len(names) == 1 else _soonest(names, for_file)[1]
 
@@ -303,7 +309,7 @@ def _in_parts(setting: Setting, loaded: Mission, parts: Mapping[str, MissionPart
     problems, made = Problems(), list[Prepared]()
     for name in (name for name in robots if name in written):
         with problems:
-            own = for_robot(loaded, name, written[name])
+            own = mission_of_robot(loaded, name, written[name])
             made.append(replace(setting.for_robot(name).for_file(own), after=waits[name]))
     problems.raise_any()
     return together(made)
@@ -311,7 +317,7 @@ def _in_parts(setting: Setting, loaded: Mission, parts: Mapping[str, MissionPart
 
 def _robot_in(loaded: Mission, at: KeyPath, said: str, robots: Collection[str]) -> str:
     """The robot that a file names. Raises InputError: it is none of those that it could be."""
-    name = robot_called(said, robots)
+    name = find_robot(said, robots)
     if name is None:
         what = "has no part to wait for" if at[-1] == "after" else "is no robot of this run"
         raise loaded.error(at, f"'{said[:60]}' {what}", suggestion(said, robots))
@@ -347,7 +353,7 @@ def _speaker_W(part: Part, robots: Mapping[str, PlacedRobot]) -> Pose2D | None:
 
 def _with_people(loaded: Mission, world: World, knowledge: Knowledge) -> World:
     """The world with the people who walk in a mission's file. Raises InputError."""
-    routes = routes_in(loaded, knowledge)
+    routes = routes_of_people(loaded, knowledge)
     try:
         return world.with_routes(routes) if routes else world
     except WorldError as error:

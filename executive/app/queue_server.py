@@ -20,7 +20,7 @@ from typing import Any, Final, Protocol
 from executive.app.feasibility import refuse_impossible
 from executive.app.prepare import prepare
 from executive.app.runs import Ended, Runner, broken_off, next_queued, run_in_turn
-from executive.mission.parameters import values_in_json
+from executive.mission.parameters import parse_json_values
 from executive.mission.request import Request
 from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore, StoredMission
@@ -312,7 +312,7 @@ class TriggerCalls:
 def _request(standing: StandingMission, body: bytes) -> Request:
     """The request of a standing mission, checked with the values in a body. Raises CallError, InputError."""
     try:
-        values = values_in_json(body)
+        values = parse_json_values(body)
         if not values:
             return standing.request
         prepared = prepare(replace(standing.request, given={**standing.request.given, **values}))

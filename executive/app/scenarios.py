@@ -47,7 +47,7 @@ def with_scenario(request: Request, world: World, knowledge: Knowledge) -> Reque
         twice = read.moving & scenario.moving
         if twice:
             raise InputError(f"another scenario has an event of {min(twice)}", hint="keep one of them", file=path)
-        scenario = scenario.and_also(_with_doorways(read, world))
+        scenario = scenario.merge(_with_doorways(read, world))
     drawn = random_faults(scenario.random, request.seed, cameras)
     return replace(request, scenario=scenario.with_drawn(drawn), scenario_files=())
 

@@ -104,7 +104,7 @@ def conversation_of(prepared: Prepared, control: Control) -> Conversation:
 
 def _compiled(steps: Sequence[Step], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
     """The tree of a mission of these steps, under a name that is not taken. Raises InputError, as `check` does."""
-    mission = Mission.of_steps(steps, world=prepared.world.name, robot=prepared.mission.robot_name)
+    mission = Mission.from_steps(steps, world=prepared.world.name, robot=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)
     own = replace(prepared, others=()).with_mission(mission.model_copy(update={"name": name}))

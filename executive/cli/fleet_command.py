@@ -15,7 +15,7 @@ from executive.mission.request import Request
 from executive.store.assignments import GivenMissions
 from executive.store.missions import STORE as STORE_NAME
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.words.robot_config import robot_called
+from executive.words.robot_config import find_robot
 from skills.files.errors import InputError
 from skills.files.outside import is_folder
 
@@ -158,7 +158,7 @@ def _faults(words: Sequence[str], robots: Sequence[str]) -> Mapping[str, Sequenc
     faults: dict[str, list[str]] = {name: [] for name in robots}
     for each in words:
         head, _, rest = each.partition(":")
-        named = robot_called(head, robots) if rest else None
+        named = find_robot(head, robots) if rest else None
         said = rest.strip() if named is not None else each
         try:
             parse_fault(said)

@@ -20,7 +20,7 @@ from executive.language.parser import load_parser
 from executive.language.understand import Status, Understanding
 from executive.mission.request import Request
 from executive.speech.activity import load_detector
-from executive.speech.hearing import Reader, refuse_alike, spoken_phrases
+from executive.speech.hearing import Reader, refuse_similar_names, spoken_phrases
 from executive.speech.listener import HeardUtterance, Hearing, Listener, Recording, follow, microphone_blocks
 from executive.speech.recogniser import Vocabulary, read_vocabulary, vocabulary_of_world
 from executive.speech.voice import Voice, installed_voice
@@ -94,7 +94,7 @@ def listener_for(
         InputError: the extra `speech` is not installed, the vocabulary cannot be read, or robots cannot be told apart.
     """
     names = tuple(robots) or (robot_name or knowledge.robot.name,)
-    refuse_alike(robots)
+    refuse_similar_names(robots)
     plain = vocabulary_of_world(knowledge, called=False) if vocabulary is None else read_vocabulary(vocabulary, None)
     called = (names[0], names[1:]) if require_wake else (None, ())
     words = Vocabulary((*plain.names, *(names if require_wake or robots else ())), *called)
@@ -122,7 +122,7 @@ def hear_request(wav: Path, request: Request, *, console: Console) -> str:
     knowledge = knowledge_of(open_world(request.world or DEFAULT_WORLD))
     robots = called_robots(request.robots, knowledge)
     listener = listener_for(knowledge, require_wake=request.require_wake is not False, robots=robots)
-    recording = listener.file(wav)
+    recording = listener.hear_file(wav)
     if not recording.heard:
         raise InputError(recording.reason or "", hint="speak louder, or nearer to the microphone", file=wav)
     sentence = " ".join(one.meant.text for one in recording.decisive)
@@ -175,7 +175,7 @@ def _follow_microphone(listener: Listener) -> None:
 def _answer(listener: Listener, file: Path, *, jsonl: bool) -> Recording | None:
     """Shows what was heard in a file; None when it could not be listened to."""
     try:
-        recording = listener.file(file)
+        recording = listener.hear_file(file)
     except InputError as error:
         typer.echo(f"errand: {error}", err=True)
         if jsonl:

@@ -18,7 +18,7 @@ import typer
 from typer.core import TyperCommand
 
 from executive.cli.number_options import quantity_option
-from executive.mission.request import Request, start_in
+from executive.mission.request import Request, parse_start
 from executive.words.option import Option
 from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
@@ -141,7 +141,7 @@ def _typed_fields(model: Any = Request, part: str = "") -> Iterator[_Typed]:
 
 def start_pose(text: str | None) -> Pose2D | None:
     """The pose in `X Y YAW`; None where none is said. Raises InputError."""
-    start = None if text is None else start_in(text)
+    start = None if text is None else parse_start(text)
     return start if isinstance(start, Pose2D) else None
 
 

@@ -23,7 +23,7 @@ from executive.cli.number_options import quantity_option
 from executive.cli.options import START
 from executive.cli.output import console_for
 from executive.cli.run_keys import keys_pressed
-from executive.mission.request import start_in
+from executive.mission.request import parse_start
 from executive.run.worker import LockStepWorker
 from executive.view.feed import Feed
 from executive.view.page_control import Action, RefusedError
@@ -62,7 +62,7 @@ def teleop(
         if not _NAME.fullmatch(robot):
             raise InputError(f"'{robot[:60]}' is no name for a robot", hint="use letters and digits, as in Alice")
         opened = open_world(world)
-        placed = only_robot(robot, opened, seed=seed, start=None if start is None else start_in(start))
+        placed = only_robot(robot, opened, seed=seed, start=None if start is None else parse_start(start))
         if start is not None:
             refuse_blocked(opened, placed.start)
         from executive.app.simulated import compile_first

@@ -48,14 +48,14 @@ from skills.api import ObjectKind
 from skills.files.errors import InputError
 
 REMEMBERED_S: Final = 60.0
-"""How long (robot's clock) what was spoken of is remembered, and a question waits for its answer."""
+"""Time (robot's clock) for which the last request is remembered, and a question waits for its answer."""
 
 
 @dataclass(frozen=True)
 class _Spoken:
-    """A request: its commands, what it spoke of, when (s), and the mission that it became.
+    """Request: its commands, its memory, its time (s), and the name of its mission.
 
-    `steps` is the whole of it, where that decides, repeats, waits or the like.
+    `steps` is the whole mission, where the request decides, repeats, waits or the like.
     """
 
     commands: tuple[Command, ...]
@@ -66,7 +66,7 @@ class _Spoken:
 
 
 class _When(enum.Enum):
-    """When a mission is done, in a word for the reply."""
+    """Time at which a mission runs, in a word for the reply."""
 
     FIRST = "first"
     INSTEAD = "instead"
@@ -105,14 +105,14 @@ class Conversation(RunVisitor):
             self._last = _Spoken(tree.commands, memory, now_s, tree.mission_name, steps)
 
     def tick(self, progress: Progress) -> None:
-        """Sees how far the run is."""
+        """Stores the progress of the run."""
         self._progress = self._remarks.progress = progress
         tree = progress.trees.get(self._speech.robot_name)
         if tree is not None:
             self._seen |= {tree.mission_name}
 
     def hear(self, text: str, now_s: float | None = None) -> Reply:
-        """Carries out a sentence; the reply. `now_s` is the robot's clock, by default that of the run.
+        """Carries out a sentence and returns the reply. `now_s` is the robot's clock, by default that of the run.
 
         Never raises on text.
         """
@@ -129,7 +129,7 @@ class Conversation(RunVisitor):
     # -- to whom -----------------------------------------------------------------------------------------------------
 
     def _addressed(self, text: str, now_s: float) -> tuple[str, Reply | None]:
-        """The text without the wake phrase, and a reply if it is not for this robot."""
+        """Text without the wake phrase, and a reply if it is not for this robot."""
         name = self._speech.robot_name
         short = text[:_MOST_LETTERS]
         if not self._require_wake:
@@ -160,7 +160,7 @@ class Conversation(RunVisitor):
     # -- answers -----------------------------------------------------------------------------------------------------
 
     def _answer_mission(self, text: str, now_s: float) -> Reply | None:
-        """An answer to a question that the mission asks."""
+        """Answers a question that the mission asks."""
         said = text.strip(" .,!?").lower()
         for each in self._control.state.questions:
             option = next((o for n, o in enumerate(each.options, 1) if said in (o.lower(), str(n))), None)
@@ -170,7 +170,7 @@ class Conversation(RunVisitor):
         return None
 
     def _answer_own(self, text: str, now_s: float) -> Reply | None:
-        """An answer to the question that the robot asked."""
+        """Answers the open question of the robot."""
         waiting, self._open = self._waiting(now_s), None
         if waiting is None:
             return None
@@ -191,7 +191,7 @@ class Conversation(RunVisitor):
     # -- requests ----------------------------------------------------------------------------------------------------
 
     def _remembered(self, now_s: float) -> _Spoken | None:
-        """The last request, while it is remembered."""
+        """Last request, while it is remembered."""
         return self._last if self._last is not None and now_s - self._last.at_s <= REMEMBERED_S else None
 
     def _understood(self, text: str, now_s: float) -> Understanding:
@@ -199,7 +199,7 @@ class Conversation(RunVisitor):
         return self._speech.understand(text, None if last is None else last.memory or self._memory_of(last.commands))
 
     def _memory_of(self, commands: Sequence[Command]) -> Memory | None:
-        """The memory of a file's commands, as if somebody had said them."""
+        """Memory of a file's commands, as if somebody had said them."""
         thing = next((c.object or c.item for c in commands if c.object or c.item), None)
         goal = next((c.goal for c in reversed(commands) if c.goal not in (None, _START)), None)
         said = f"find the {thing}" if thing is not None else f"go to {goal}" if goal is not None else ""
@@ -247,7 +247,7 @@ class Conversation(RunVisitor):
         return self._begin(changed, when, now_s)
 
     def _named(self, follow_up: FollowUp, now_s: float) -> Amendment | Understanding:
-        """What a few words name, grounded as in a whole sentence, or why that is unclear."""
+        """Grounds the few words of a follow-up as in a whole sentence; an Understanding says why that failed."""
         if follow_up.said.lower() in _COUNTS:
             return Amendment(count=_COUNTS[follow_up.said.lower()])
         said = follow_up.said if re.match(_DETERMINED, follow_up.said, re.IGNORECASE) else f"the {follow_up.said}"
@@ -266,7 +266,7 @@ class Conversation(RunVisitor):
         return next((each for each in both if each.status is Status.QUESTION), both[0])
 
     def _old_name(self, said: str, now_s: float) -> str | None:
-        """The known name that is replaced."""
+        """Known name that the follow-up replaces."""
         if not said:
             return None
         bare = re.sub(r"^(?:the|a|an|my|some)\s+", "", said, flags=re.IGNORECASE)
@@ -305,8 +305,8 @@ class Conversation(RunVisitor):
         give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, instead)
         mode = state.robots.get(self._speech.robot_name, state).mode
         still = "; I stand still until you say 'go on'" if mode in (Mode.PAUSED, Mode.STOPPED) else ""
-        told = "; ".join("; ".join(map(str, step.commands)) or step.words for step in whole)
-        text = "; ".join((*notes, f"{when.value}: {told}{still}"))
+        shown = "; ".join("; ".join(map(str, step.commands)) or step.words for step in whole)
+        text = "; ".join((*notes, f"{when.value}: {shown}{still}"))
         reply = self._tried(partial(give, tree), text, todo)
         if reply.kind is ReplyKind.DONE:
             self._names |= {tree.mission_name}
@@ -330,7 +330,7 @@ class Conversation(RunVisitor):
         return bool({c.object or c.item for c in commands} & {c.object or c.item for c in last} - {None})
 
     def _held(self) -> ObjectKind | None:
-        """The object in the gripper, as far as the last request says."""
+        """Object in the gripper, as far as the last request says."""
         status = None if self._progress is None else self._progress.robots.get(self._speech.robot_name)
         missions = self._control.state.missions.get(self._speech.robot_name, ())
         if status is None or not status.holding or self._last is None or self._last.mission not in missions[-1:]:

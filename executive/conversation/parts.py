@@ -1,4 +1,4 @@
-"""Parts of a conversation: how sentences become missions, and replies."""
+"""Parts of a conversation: understanding of sentences, replies, and open questions."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ NEVER_MIND: Final = "all right, never mind"
 
 @dataclass(frozen=True)
 class Speech:
-    """How sentences become missions of one robot.
+    """Understanding of sentences for one robot.
 
-    `understand` takes a sentence without wake phrase and what was spoken of before; `compile` makes a mission of
-    steps under a name that is none of those given, and raises InputError.
+    `understand` takes a sentence without wake phrase and the memory of earlier ones; `compile` makes a mission of
+    steps, with a name that is none of the given ones, and raises InputError.
     """
 
     knowledge: Knowledge
@@ -45,7 +45,7 @@ class ReplyKind(enum.Enum):
 
 @dataclass(frozen=True)
 class Reply:
-    """A reply in one line, with the commands that the robot starts or the question that it asks."""
+    """Reply in one line, with the commands that the robot starts or the question that it asks."""
 
     kind: ReplyKind
     text: str
@@ -55,7 +55,7 @@ class Reply:
 
 @dataclass(frozen=True)
 class Waiting:
-    """A question of the robot, to what was said, that waits for an answer until `until_s` (robot's clock)."""
+    """Open question of the robot about a sentence, which waits for an answer until `until_s` (robot's clock)."""
 
     question: ClarifyingQuestion
     sentence: str
@@ -63,15 +63,15 @@ class Waiting:
 
 
 def answer(text: str) -> Reply:
-    """A reply that answers a question."""
+    """Reply that answers a question."""
     return Reply(ReplyKind.ANSWER, text)
 
 
 def confirmation(text: str) -> Reply:
-    """A reply that says what the robot does."""
+    """Reply that says what the robot does."""
     return Reply(ReplyKind.DONE, text)
 
 
 def refusal(text: str) -> Reply:
-    """A reply that says why the robot cannot do it."""
+    """Reply that says why the robot refuses."""
     return Reply(ReplyKind.REFUSED, text)

@@ -1,4 +1,4 @@
-"""Answers to remarks about a run: they act at once through its control, or say where the robot is and what it does."""
+"""Answers to remarks about a run: they act at once through its control, or describe the robot's place and work."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from executive.words.outlines import distance_m
 from skills.robot import Pose2D
 
 NEAR_M: Final = 1.3
-"""How near to the edge of a surface the robot stands to be next to it."""
+"""Largest distance (m) from a surface at which the robot stands next to it."""
 IN_THE_ROOM_M: Final = 0.3
-"""How far outside a room's outline it still counts as in it: walls have a thickness."""
-_TOLD_TO_STOP: Final = "told to stop"
+"""Largest distance (m) outside a room's outline that still counts as inside: walls have a thickness."""
+_STOP_REASON: Final = "told to stop"
 _HELD: Final = frozenset({Mode.PAUSED, Mode.STOPPED, Mode.LEASE_LOST})
 
 
 class RemarkAnswers:
-    """Stops, pauses, resumes or cancels the robot, and says where it is and what it does.
+    """Handler of remarks: stops, pauses, resumes or cancels the robot, and describes its place and work.
 
     Of several robots, only the one that is addressed. `progress` is the latest of the run.
     """
@@ -50,14 +50,14 @@ class RemarkAnswers:
         )
 
     def answer_to(self, remark: Remark) -> Reply:
-        """Carries out a remark; its reply."""
+        """Carries out a remark and returns the reply."""
         acts = remark in (Remark.STOP, Remark.WAIT, Remark.GO_ON, Remark.CANCEL)
         if acts and self._control.state.mode is Mode.ENDED:
             return refusal(OVER)
         return self._answers[remark]()
 
     def _stop(self) -> Reply:
-        self._control.stop_button(_TOLD_TO_STOP, robot=self._one)
+        self._control.stop_button(_STOP_REASON, robot=self._one)
         return confirmation("I stand still; say 'go on' when I may move again")
 
     def _wait(self) -> Reply:
@@ -67,7 +67,7 @@ class RemarkAnswers:
     def _go_on(self) -> Reply:
         state, one = self._control.state, self._one
         now = RobotMode(state.mode, state.reason) if one is None else state.robots[one]
-        if now.mode is Mode.STOPPED and now.reason != _TOLD_TO_STOP:
+        if now.mode is Mode.STOPPED and now.reason != _STOP_REASON:
             return refusal(f"{now.reason}; release it where it was pressed")
         held = now.mode in (Mode.STOPPED, Mode.PAUSED)
         self._control.release_stop_button(robot=one)
@@ -82,7 +82,7 @@ class RemarkAnswers:
 
     @property
     def _one(self) -> str | None:
-        """The robot's name if there are several; None for the only one."""
+        """Name of the robot if there are several; None for the only one."""
         return self._speech.robot_name if len(self._control.state.missions) > 1 else None
 
     def _where(self) -> Reply:
@@ -93,7 +93,7 @@ class RemarkAnswers:
 
 
 def place_in_words(pose: Pose2D | None, knowledge: Knowledge) -> str:
-    """The room of a pose (world frame) and the surface next to it. None stands for a robot that is lost."""
+    """Room of a pose (world frame) and the surface next to it, in words. None stands for a robot that is lost."""
     if pose is None:
         return "I do not know where I am; I am looking for my place"
     here = (pose.x_m, pose.y_m)
@@ -109,7 +109,7 @@ def place_in_words(pose: Pose2D | None, knowledge: Knowledge) -> str:
 
 
 def doing_in_words(progress: Progress | None, state: ControlState, robot_name: str) -> str:
-    """The robot's mission, its step, and why it stands still if it does."""
+    """Mission and step of the robot, and why it stands still if it does, in words."""
     if state.mode is Mode.ENDED:
         return "I have nothing to do; the mission is over"
     tree = None if progress is None else progress.trees.get(robot_name)
@@ -127,7 +127,7 @@ def doing_in_words(progress: Progress | None, state: ControlState, robot_name: s
 
 
 def _step(states: Snapshot) -> str:
-    """The deepest running node, with its message."""
+    """Deepest running node, with its message."""
     running = [(path_id, node) for path_id, node in states.items() if node.status is Status.RUNNING]
     if not running:
         return ""
@@ -137,7 +137,7 @@ def _step(states: Snapshot) -> str:
 
 
 def _last_failure(states: Snapshot) -> str:
-    """The last skill that failed, with its cause and message."""
+    """Last skill that failed, with its cause and message."""
     for path_id, node in reversed([*states.items()]):
         if node.status is Status.FAILURE and node.cause is not None and node.message:
             return f"{_name(path_id)} failed ({node.cause.value}: {node.message})"
@@ -145,5 +145,5 @@ def _last_failure(states: Snapshot) -> str:
 
 
 def _name(path_id: str) -> str:
-    """The last part of a path id, as words."""
+    """Last part of a path id, as words."""
     return path_id.rpartition("/")[2].replace("-", " ").replace("_", " ")

@@ -12,7 +12,7 @@ from typing import Final
 from executive.language.cleaning import addressed_to
 from executive.language.lexicon import Patterns, any_of, lexicon, read_table
 from executive.language.questions import RefusalError
-from executive.words.robot_config import display_name, robot_called
+from executive.words.robot_config import display_name, find_robot
 from skills.files.errors import listing
 
 _NUMBERS: Final = {"two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "both": 2}
@@ -104,7 +104,7 @@ class Addressees:
                 raise RefusalError(f"there are {len(self.names)} robots, {known}: which are '{said}'?", [said])
             return Whom.ALL
         found = self.forms.one.findall(said)
-        return tuple(dict.fromkeys(filter(None, (robot_called(name, self.names) for name in found))))
+        return tuple(dict.fromkeys(filter(None, (find_robot(name, self.names) for name in found))))
 
     def called_in_talk(self, text: str) -> tuple[Who, str] | None:
         """Several robots that a text calls first, and the rest of it. Raises RefusalError: see `meant`."""

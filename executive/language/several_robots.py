@@ -20,7 +20,7 @@ from executive.language.spelling import Corrected, correct_spelling
 from executive.language.understand import Part, Status, Understanding, meaning, understand
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
-from executive.words.robot_config import display_name, robot_called
+from executive.words.robot_config import display_name, find_robot
 from skills.files.errors import listing
 
 _IT: Final = r"\b(?:it|them)\b"
@@ -204,13 +204,13 @@ class _Reader:
 
     def _parts(self, read: Sequence[_Read], cut: Split) -> Iterator[Part]:
         """A part for each robot of each part."""
-        by = robot_called(cut.listener[0], self.robots) if isinstance(cut.listener, tuple) else None
+        by = find_robot(cut.listener[0], self.robots) if isinstance(cut.listener, tuple) else None
         numbers: list[tuple[int, ...]] = []
         count = 0
         for one in read:
             who: tuple[str | Whom, ...] = (one.part.who or Whom.ANY,) if not isinstance(one.part.who, tuple) else ()
             if isinstance(one.part.who, tuple):
-                who = tuple(robot_called(name, self.robots) or name for name in one.part.who)
+                who = tuple(find_robot(name, self.robots) or name for name in one.part.who)
             after = tuple(sorted({at for number in one.after for at in numbers[number]}))
             numbers.append(tuple(range(count, count + len(who))))
             count += len(who)

@@ -1,8 +1,8 @@
-"""Conditions that cannot hold or cannot fail, by the ranges of what they read: `battery > 30`, `n > 3 and n < 2`.
+"""Check for conditions that always or never hold, by the ranges of their readings: `battery > 30`, `n > 3 and n < 2`.
 
-A comparison of one value with a number is decided at the points where its answer can change, within the value's range,
-and between them. What else a condition is made of may be true or false. Parameters have been put in before: numbers
-and truths alone say nothing of how a condition is meant.
+A comparison of one value with a number is evaluated at the points where its answer can change, within the value's
+range, and between them. Any other part of a condition may be true or false. Parameters have been replaced before: a
+condition of numbers and truths alone is not checked.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from executive.words.expression import CLOCK, COMPARISONS, TIME_OF_DAY, Expressi
 from skills.quantities import bounds, likely, range_text
 
 Ranges = Mapping[str, Any]
-"""The quantities of names that have one."""
+"""Quantities of the names that have one."""
 Decided = Callable[[Mapping[str, Any]], bool]
-"""The answer of a condition by the values that it reads."""
+"""Answer of a condition by the values that it reads."""
 MOST_CASES: Final = 4096
 _DAY_MIN: Final = 24 * 60
 
 
 def refuse_certain_comparisons(expression: Expression, ranges: Ranges) -> None:
-    """Refuses a comparison whose answer the range of what it reads decides.
+    """Refuses a comparison that the range of its value decides.
 
     Raises:
         ExpressionError: names the comparison, the range and the likely mistake.
@@ -41,15 +41,15 @@ def refuse_certain_comparisons(expression: Expression, ranges: Ranges) -> None:
             answers = {line.holds(point) for point in line.points(ranges)}
             if len(answers) == 1:
                 says = "always holds" if answers == {True} else "cannot hold"
-                told, hint = _range_words(line, ranges)
-                raise ExpressionError(f"'{ast.unparse(pair)}' {says}: {line.name} is {told}", hint)
+                range_, hint = _range_words(line, ranges)
+                raise ExpressionError(f"'{ast.unparse(pair)}' {says}: {line.name} is {range_}", hint)
 
 
 def refuse_certain(condition: Condition, ranges: Ranges) -> None:
-    """Refuses a condition whose parts contradict each other, or leave it no way to fail.
+    """Refuses a condition whose parts contradict each other, or that cannot fail.
 
     Raises:
-        ExpressionError: it cannot hold, or always holds.
+        ExpressionError: the condition cannot hold, or always holds.
     """
     looks = any(not isinstance(part, ValueIs) for part in parts_of(condition))
     cases = _Cases(ranges, apart=looks)
@@ -68,7 +68,7 @@ def refuse_certain(condition: Condition, ranges: Ranges) -> None:
 
 @dataclass(frozen=True)
 class _Line:
-    """A comparison of `slope * name + shift` with zero."""
+    """Comparison of `slope * name + shift` with zero."""
 
     name: str | None
     slope: Fraction
@@ -76,12 +76,12 @@ class _Line:
     compare: ast.cmpop
 
     def holds(self, value: Fraction) -> bool:
-        """The answer at a value of the name."""
+        """Answer at a value of the name."""
         return bool(COMPARISONS[type(self.compare)](self.slope * value + self.shift, 0))
 
     @property
     def turn(self) -> Fraction | None:
-        """The value at which the answer can change; None where it never does."""
+        """Value at which the answer can change; None where it never does."""
         return None if self.slope == 0 else -self.shift / self.slope
 
     def points(self, ranges: Ranges) -> list[Fraction]:
@@ -91,9 +91,9 @@ class _Line:
 
 @dataclass
 class _Cases:
-    """What a condition reads, with the values of each that may decide it otherwise.
+    """Readings of a condition, with the values of each that may change the answer.
 
-    A look takes time: where there is one, each part reads values of its own (`apart`).
+    A look takes time: with a look in the condition, each part reads values of its own (`apart`).
     """
 
     ranges: Ranges
@@ -104,7 +104,7 @@ class _Cases:
     part: int = 0
 
     def of(self, condition: Condition) -> Decided:
-        """The answer of a condition by the values that it reads."""
+        """Answer of a condition by the values that it reads."""
         match condition:
             case AllOf(parts=parts):
                 return _joined(all, [self.of(part) for part in parts])
@@ -132,7 +132,7 @@ class _Cases:
         return self._free()
 
     def _pair(self, pair: ast.Compare) -> Decided:
-        """The answer of one comparison."""
+        """Answer of one comparison."""
         line, words = _line(pair), _words(pair)
         if line is not None and line.name is not None and line.turn is not None:
             turns = self.turns.setdefault(f"{line.name} {self.part}", set())
@@ -145,13 +145,13 @@ class _Cases:
         return self._free()
 
     def _read(self, name: str, values: list[Any], test: Callable[[Any], bool]) -> Decided:
-        """The answer of a test of what is read under a name, which may have any of these values."""
+        """Answer of a test on a reading with these possible values."""
         key = f"{name} {self.part}"
         self.reads, self.points[key] = True, values
         return lambda case: test(case[key])
 
     def _free(self) -> Decided:
-        """What may be true or false."""
+        """Answer that may be true or false."""
         key = f" {len(self.points)}"
         self.points[key] = [False, True]
         return lambda case: bool(case[key])
@@ -162,14 +162,14 @@ def _joined(every: Callable[[Iterator[bool]], bool], parts: Sequence[Decided]) -
 
 
 def _pairs(node: ast.Compare) -> Iterator[ast.Compare]:
-    """The comparisons of a chain: `0 < n < 3` has two."""
+    """Comparisons of a chain: `0 < n < 3` has two."""
     sides = (node.left, *node.comparators)
     for first, op, second in zip(sides, node.ops, sides[1:], strict=False):
         yield ast.Compare(first, [op], [second])
 
 
 def _line(pair: ast.Compare) -> _Line | None:
-    """A comparison as one of a line with zero; None where it is no such."""
+    """Comparison as one of a line with zero; None where it is not linear."""
     if isinstance(pair.left, ast.Constant) and not isinstance(pair.comparators[0], ast.Constant):
         turned = {ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE}
         swapped = turned.get(type(pair.ops[0]), type(pair.ops[0]))()
@@ -188,7 +188,7 @@ def _line(pair: ast.Compare) -> _Line | None:
 
 
 def _affine(node: ast.expr) -> tuple[str | None, Fraction, Fraction] | None:
-    """The name, slope and shift of a line; None where it is no line, or none of numbers."""
+    """Name, slope and shift of a linear term; None for other terms."""
     match node:
         case ast.Constant(bool()):
             return None
@@ -233,7 +233,7 @@ def _scaled(line: _Affine | None, factor: Fraction) -> _Affine | None:
 
 
 def _words(pair: ast.Compare) -> tuple[str, str, bool] | None:
-    """The name, the text and whether they are to be equal, of a comparison of a name with a text."""
+    """Name, text and whether they must be equal, of a comparison of a name with a text."""
     sides = (pair.left, pair.comparators[0])
     names = [each.id for each in sides if isinstance(each, ast.Name) and each.id != CLOCK]
     texts = [each.value for each in sides if isinstance(each, ast.Constant) and isinstance(each.value, str)]
@@ -243,7 +243,7 @@ def _words(pair: ast.Compare) -> tuple[str, str, bool] | None:
 
 
 def _limits(name: str | None, ranges: Ranges) -> tuple[Fraction | None, Fraction | None]:
-    """The least and the greatest value of a name; None: there is no such."""
+    """Least and greatest value of a name; None where there is none."""
     if name == CLOCK:
         return Fraction(0), Fraction(_DAY_MIN - 1)
     if name is not None and "(" in name:
@@ -254,7 +254,7 @@ def _limits(name: str | None, ranges: Ranges) -> tuple[Fraction | None, Fraction
 
 
 def _samples(turns: Sequence[Fraction] | set[Fraction], low: Fraction | None, high: Fraction | None) -> list[Fraction]:
-    """The turns within a range, its ends, and values between and beyond them."""
+    """Turns within a range, its ends, and values between and beyond them."""
     inside = {turn for turn in turns if (low is None or turn >= low) and (high is None or turn <= high)}
     known = sorted(inside | {end for end in (low, high) if end is not None})
     between = [(first + second) / 2 for first, second in itertools.pairwise(known)]
@@ -264,7 +264,7 @@ def _samples(turns: Sequence[Fraction] | set[Fraction], low: Fraction | None, hi
 
 
 def _range_words(line: _Line, ranges: Ranges) -> tuple[str, str]:
-    """The range of what a comparison reads, and what to write."""
+    """Range of the value in a comparison, and a hint."""
     if line.name == CLOCK:
         return "from 00:00 to 23:59", "write a time after midnight and before 23:59"
     if line.name is None or line.name not in ranges:

@@ -1,4 +1,4 @@
-"""What the gripper holds as a mission goes on, when all goes well."""
+"""Object in the gripper during a mission, if all commands succeed."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from skills.api import ObjectKind
 
 @dataclass(frozen=True)
 class InGripper:
-    """What is held; `item` is None where only that something is held is known; not even that unless `sure`.
+    """Object in the gripper.
 
-    `perhaps` are the things of which one may be held, where they are known.
+    `kind` is None where only its presence is known, and not even that unless `sure`. `perhaps` are the candidates,
+    where they are known.
     """
 
     kind: ObjectKind | None = None
@@ -27,11 +28,11 @@ class InGripper:
 
 UNNAMED: Final = InGripper()
 UNSURE: Final = InGripper(sure=False)
-"""After a branch that may have been taken or not."""
+"""Gripper behind a branch that may have been taken or not."""
 
 
-def either(*held: InGripper | None) -> InGripper:
-    """What is held where nobody knows which of these it is, nor whether it is anything."""
+def held_after_either(*held: InGripper | None) -> InGripper:
+    """Object in the gripper where any of these may be in it, or none."""
     kinds: list[ObjectKind] = []
     for each in held:
         if each is not None and each.kind is None and not each.perhaps:
@@ -40,26 +41,26 @@ def either(*held: InGripper | None) -> InGripper:
     return InGripper(sure=False, perhaps=tuple(dict.fromkeys(kinds)))
 
 
-def after_command(command: Command, held: InGripper | None, knowledge: Knowledge) -> InGripper | None:
-    """What is held after a command that went well; None for nothing."""
+def held_after(command: Command, held: InGripper | None, knowledge: Knowledge) -> InGripper | None:
+    """Object in the gripper after a command that succeeded; None for none."""
     if command.task is Task.GRASP:
         return held if is_same(held, command.object, knowledge) else InGripper(command.object)
     return held if _carried(command) is None else None
 
 
 def is_same(held: InGripper | None, item: ObjectKind | None, knowledge: Knowledge) -> bool:
-    """Returns whether what is held, or whatever of several it is, is what `item` asks for."""
+    """Returns whether the held object, or each candidate, is one that `item` asks for."""
     if held is None:
         return False
     return all(_fits(one, item, knowledge) for one in map(InGripper, held.perhaps or (held.kind,)))
 
 
 def objection(command: Command, held: InGripper | None, knowledge: Knowledge) -> tuple[str, str] | None:
-    """Why a command cannot be carried out with what is held, and a hint; None when it can."""
+    """Reason why a command is impossible with the held object, and a hint; None when it is possible."""
     if command.task is Task.GRASP:
         if held is None or not held.sure or is_same(held, command.object, knowledge):
             return None
-        return cannot_take(held, f"the {command.object}")
+        return grasp_objection(held, f"the {command.object}")
     carried = _carried(command)
     if carried is None:
         return None
@@ -70,18 +71,18 @@ def objection(command: Command, held: InGripper | None, knowledge: Knowledge) ->
     return None
 
 
-def cannot_take(held: InGripper, what: str) -> tuple[str, str]:
-    """Why nothing can be grasped while something is held, and a hint."""
+def grasp_objection(held: InGripper, what: str) -> tuple[str, str]:
+    """Reason why nothing can be grasped while an object is held, and a hint."""
     return f"{what} cannot be grasped: the gripper holds {held} then", f"put {held} down before"
 
 
 def _carried(command: Command) -> ObjectKind | None:
-    """What a command carries."""
+    """Object that a command carries."""
     return command.object if command.task is Task.PLACE and command.item is None else command.item
 
 
 def _fits(held: InGripper, item: ObjectKind | None, knowledge: Knowledge) -> bool:
-    """Returns whether what is held is surely what `item` names; an object that is not known may be anything."""
+    """Returns whether the held object surely is an `item`; an unknown object may be any."""
     if held.kind is None or item is None:
         return True
     of_held, asked = (set(knowledge.classes(knowledge.object_name(one.name) or one.name)) for one in (held.kind, item))

@@ -1,4 +1,4 @@
-"""The JSON Schema of mission files, for editors."""
+"""JSON Schema of mission files, for editors."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _NO_SKILLS: Final[Mapping[str, type]] = MappingProxyType({})
 
 
 def mission_json_schema(inputs: Mapping[str, type] = _NO_SKILLS) -> dict[str, Any]:
-    """The JSON Schema of mission files. What is no text may also be a parameter, "${name}".
+    """Makes the JSON Schema of mission files. A value that is no text may also be a parameter, "${name}".
 
-    `inputs` are the `Inputs` of skills by name: where a step names one of them, its numbers keep the ports' ranges.
+    `inputs` are the `Inputs` of skills by name: the numbers of a step with such a skill have the ranges of its ports.
     """
     schema = Mission.model_json_schema(by_alias=True)
     described: dict[str, Any] = _open_to_parameters(schema)
@@ -36,9 +36,9 @@ def mission_json_schema(inputs: Mapping[str, type] = _NO_SKILLS) -> dict[str, An
 
 
 def _ports(record: type) -> Iterator[tuple[str, Any]]:
-    """The schemas of a skill's numbers that have a range, by all names that a file may give them.
+    """Yields the schemas of a skill's numbers with a range, by all names that a file may use.
 
-    A number may also be a parameter, or what an earlier step gave; the fields of a pose may stand by themselves.
+    A number may also be a parameter, or an output of an earlier step; the fields of a pose may stand by themselves.
     """
     for name, hint in get_type_hints(record, include_extras=True).items():
         limits = {_KEYWORDS[bound]: limit for bound, limit in bounds(hint).items()}
@@ -57,7 +57,7 @@ _KEYWORDS: Final = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveM
 
 
 def _open_to_parameters(node: Any) -> Any:
-    """The schema with a parameter allowed wherever a number, a truth value or one of some words is wanted."""
+    """Allows a parameter in place of a number, a truth value or one of some words."""
     if isinstance(node, list):
         return [_open_to_parameters(part) for part in node]
     if not isinstance(node, dict):

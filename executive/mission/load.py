@@ -1,4 +1,4 @@
-"""Mission files: read, their parameters put in, and each step with its place in the file."""
+"""Reading of mission files: parameters are replaced, and each step gets its place in the file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ROBOTS: Final = "robots"
 
 
 def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN, text: str | None = None) -> Mission:
-    """Reads a mission file, or the `text` that it had, and puts its parameters in.
+    """Reads a mission file, or its `text`, and replaces its parameters.
 
     Raises:
         InputError: with file, line and hint, for broken YAML, unknown keys, wrong values and unknown parameters.
@@ -36,7 +36,7 @@ def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN, text: str | 
 
 
 def locate(value: Any, document: YamlSource, path: KeyPath) -> None:
-    """Tells each step in what was just read from `path` of a document its place there."""
+    """Sets the place of each step in a value that was read from `path` of a document."""
     if isinstance(value, Step):
         value._place = Place(document, path)
     if isinstance(value, BaseModel):
@@ -50,8 +50,8 @@ def locate(value: Any, document: YamlSource, path: KeyPath) -> None:
             locate(part, document, (*path, key))
 
 
-def for_robot(mission: Mission, robot: str, part: str | None = None) -> Mission:
-    """What a mission has for one robot of several: the part that stands under the name `part`, or all its steps."""
+def mission_of_robot(mission: Mission, robot: str, part: str | None = None) -> Mission:
+    """Mission of one robot of several: the part named `part`, or all steps."""
     own = None if part is None or mission.parts is None else mission.parts[part]
     laid_over = {} if own is None else {key: getattr(own, key) for key in own.model_fields_set - {"after"}}
     alone = mission.model_copy(update={**laid_over, "robot": robot, "robots": None, "parts": None})
@@ -62,13 +62,13 @@ def for_robot(mission: Mission, robot: str, part: str | None = None) -> Mission:
 
 
 def import_folders(mission: Mission) -> tuple[Path, ...]:
-    """The folders of a mission's imports."""
+    """Folders of a mission's imports."""
     folder = Path() if mission.document is None else mission.document.path.parent
     return tuple(folder / each for each in mission.imports or ())
 
 
-def routes_in(mission: Mission, knowledge: Knowledge) -> dict[str, Route]:
-    """The routes of a mission's people by name, in which every place is a point.
+def routes_of_people(mission: Mission, knowledge: Knowledge) -> dict[str, Route]:
+    """Routes of a mission's people by name, with a point for every place.
 
     Raises:
         InputError: a place is not known; with the line in the file.
@@ -97,8 +97,8 @@ def _point(mission: Mission, path: tuple[str | int, ...], at: Corner | str, know
     return pose.x, pose.y
 
 
-def overridden(mission: Mission, knowledge: Knowledge) -> Knowledge:
-    """The world's knowledge with the mission's own laid over it.
+def knowledge_of_mission(mission: Mission, knowledge: Knowledge) -> Knowledge:
+    """Merges a mission's own knowledge into that of its world.
 
     Mappings are merged key by key; lists and single values are replaced.
 

@@ -1,9 +1,9 @@
-"""Parameters of mission files: `${name}` in a value stands for what the parameter holds; `$${` is a plain `${`.
+"""Parameters of mission files: `${name}` in a value stands for the parameter's value; `$${` is a plain `${`.
 
-A parameter is declared by its default, whose type it keeps, or as {type: .., default: .., choices: [..]}.
+A file declares a parameter by its default, whose type it has, or as {type: .., default: .., choices: [..]}.
 
-A value that is nothing but `${name}` takes the parameter's own type, so that `timeout: ${limit}` can be a number;
-within a longer text the parameter's text is put in.
+A value that is only `${name}` takes the parameter's own type, so that `timeout: ${limit}` can be a number; within a
+longer text the parameter's text is inserted.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ _TEXTS: Final = frozenset(name for name, kinds in _TYPES.items() if str in kinds
 Given = Mapping[str, Any]
 
 
-def given_values(settings: Iterable[str]) -> dict[str, Any]:
-    """Values in the form NAME=VALUE, each as YAML has it: `2.5` is a number. Raises InputError."""
+def parse_values(settings: Iterable[str]) -> dict[str, Any]:
+    """Parses values in the form NAME=VALUE, each as in YAML: `2.5` is a number. Raises InputError."""
     values: dict[str, Any] = {}
     for setting in settings:
         name, equals, text = setting.partition("=")
@@ -59,8 +59,8 @@ def given_values(settings: Iterable[str]) -> dict[str, Any]:
     return values
 
 
-def values_in_json(text: bytes) -> dict[str, Any]:
-    """Values in a JSON object, each as `given_values` takes them; none in an empty text. Raises InputError."""
+def parse_json_values(text: bytes) -> dict[str, Any]:
+    """Parses values in a JSON object; an empty text has none. Raises InputError."""
     hint = 'give one such as {"room": "kitchen"}, or nothing'
     values = json_object(text, what="the values", hint=hint)
     wrong = next((name for name, value in values.items() if not _can_be_given(name, value)), None)
@@ -77,10 +77,10 @@ def _can_be_given(name: str, value: Any) -> bool:
 
 
 def with_parameters(source: YamlSource, given: Given) -> YamlSource:
-    """The document with its parameters put in: those that are given, else their defaults.
+    """Replaces the parameters of a document by the given values, or else by their defaults.
 
     Raises:
-        InputError: a name that is no word, a parameter without a value, or `${name}` of one that is not declared.
+        InputError: a name is no word, a parameter has no value, or `${name}` is not declared.
     """
     if not isinstance(source.data, dict):
         return source
@@ -110,7 +110,7 @@ def with_parameters(source: YamlSource, given: Given) -> YamlSource:
 
 
 def _fitting(parameter: Parameter, value: Any, name: str, source: YamlSource, *, is_given: bool) -> Any:
-    """The value as the parameter's type. Raises InputError: it is of another type, or none of the choices."""
+    """Converts a value to the parameter's type. Raises InputError when it does not fit, or is none of the choices."""
     if value is None:
         return None
     if parameter.type in _TEXTS and isinstance(value, int | float) and not isinstance(value, bool):
@@ -128,7 +128,7 @@ def _fitting(parameter: Parameter, value: Any, name: str, source: YamlSource, *,
 
 
 def _number_hint(value: Any) -> str:
-    """What to write in place of a value that is no number."""
+    """Hint for a value that is no number."""
     try:
         number_of(value, Number)
     except QuantityError as error:
@@ -137,16 +137,16 @@ def _number_hint(value: Any) -> str:
 
 
 def round_source(source: YamlSource, steps: KeyPath, data: Any, name: str, value: Value) -> YamlSource:
-    """The steps `data` of a `for_each`, which stand at a path, with a round's value put in, as a list of their own.
+    """Makes a document of the steps `data` of a `for_each`, at a path, with a round's value inserted.
 
-    Raises InputError: `${..}` of a name that is neither the round's nor that of a `for_each` within.
+    Raises InputError when `${..}` names neither the round's value nor that of a `for_each` within.
     """
     below = source.below(steps[:-1], {steps[-1]: data})
     return replace(below, data=_put_in(below.data, {name: value}, below, ()))
 
 
 def _declared(source: YamlSource) -> dict[str, Parameter]:
-    """The parameters; one has no type where any plain value will do. What is no mapping is left to the schema."""
+    """Declared parameters; one without a type takes any plain value. The schema checks entries of another form."""
     declared = source.data.get(DECLARED)
     if not isinstance(declared, dict):
         return {}
@@ -174,7 +174,7 @@ def _declared(source: YamlSource) -> dict[str, Parameter]:
 def _put_in(
     value: Any, values: Mapping[str, Any], source: YamlSource, path: KeyPath, rounds: frozenset[str] = frozenset()
 ) -> Any:
-    """`rounds` are the names of the `for_each` around it: what reads them is left for their rounds."""
+    """Replaces parameters in a value. `rounds` are names of the `for_each` blocks around it, which stay."""
     if isinstance(value, str):
         return _text(value, values, source, path, rounds)
     if isinstance(value, dict):
@@ -189,7 +189,7 @@ def _put_in(
 
 
 def _rounds_name(step: Mapping[str, Any]) -> frozenset[str]:
-    """The name that a `for_each` gives to the value of each round."""
+    """Name that a `for_each` gives to the value of each round."""
     repeat = step.get("repeat")
     name = repeat.get("as") if isinstance(repeat, Mapping) and "for_each" in repeat else None
     return frozenset({name}) if isinstance(name, str) else frozenset()

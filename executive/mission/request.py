@@ -1,4 +1,4 @@
-"""A user's request and how it is run: one form, from the command line to the store and back."""
+"""Request of a user with all options of its run, in one form for the command line, the store and the queue."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pydantic.dataclasses import dataclass
 from executive.mission.scenario import NO_SCENARIO, Scenario
 from executive.words.mission import QuestionPolicy
 from executive.words.option import Option
-from executive.words.robot_config import RobotConfig, parse_robots, pose_in
+from executive.words.robot_config import RobotConfig, parse_pose, parse_robots
 from executive.words.variation import NO_VARIATION, Variation
 from skills.files.errors import InputError
 from skills.files.outside import is_there
@@ -24,21 +24,21 @@ from skills.quantities import LongDuration, QuantityError, Seed, clock_text
 from skills.robot import Pose2D
 
 Start = Pose2D | Literal["unknown"]
-"""Where the robot really stands: a pose (world frame), or a free one that the seed chooses and that nobody tells it."""
+"""True pose of the robot (world frame), or "unknown": a free pose that the seed chooses and the robot does not know."""
 
 
-def start_in(text: str) -> Start:
-    """The start in a text such as "1.5 2 0" (m, m, rad) or "unknown". Raises InputError."""
+def parse_start(text: str) -> Start:
+    """Parses a start such as "1.5 2 0" (m, m, rad) or "unknown". Raises InputError."""
     if text == "unknown":
         return "unknown"
     try:
-        return pose_in(text.split())
+        return parse_pose(text.split())
     except QuantityError as error:
         raise InputError(f"--start {text[:60]}: {error.what}", hint=error.hint) from None
 
 
 def _time_of_day(text: str) -> str:
-    """A time of day as "08:30". Raises InputError: it is none."""
+    """Parses a time of day such as "08:30". Raises InputError."""
     try:
         return clock_text(text)
     except QuantityError as error:
@@ -46,10 +46,10 @@ def _time_of_day(text: str) -> str:
 
 
 def _given(settings: list[str]) -> Mapping[str, Any]:
-    """The values of parameters in texts such as "speed=0.5". Raises InputError."""
-    from executive.mission.parameters import given_values
+    """Parses parameter values such as "speed=0.5". Raises InputError."""
+    from executive.mission.parameters import parse_values
 
-    return given_values(settings)
+    return parse_values(settings)
 
 
 def _stack_file(path: Path) -> Path:
@@ -59,29 +59,27 @@ def _stack_file(path: Path) -> Path:
 
 
 def _robots(text: str) -> tuple[RobotConfig, ...]:
-    """The robots in a text such as "alice=spot,bob=fetch". Raises InputError."""
+    """Parses robots such as "alice=spot,bob=fetch". Raises InputError."""
     return parse_robots(text, [kind.name for kind in installed_plugins("errand.robots")])
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", defer_build=True))
 class Request:
-    """A sentence, or a mission file, or neither where a conversation left only commands.
+    """Request of a user: a sentence, a mission file, or only commands after a conversation.
 
-    A field with an `Option` is typed at the command line: commands take their options from here. `world` is as it was
-    said, if it was; `require_wake` tells whether the robot's name must be said (None: the world decides); `answers` are
-    to the questions that it leaves open, in their order, and `questions` says what becomes of further ones. `given` are
-    values for a file's parameters; the robot stands at `start`, where the world's own is not meant. `out` is the folder
-    for the run's files, `stack` the file that says what the robot uses, `map` the folder of the map that it has in
-    place of the world's own. `scenario` is what goes wrong and happens meanwhile, and `scenario_files` hold more of it;
-    `variation` is how the world differs from what its files say.
+    A field with an `Option` is an option of the command line. `world` is the typed name; `require_wake` says whether
+    the sentence must begin with the robot's name (None: the world decides); `answers` answer the questions that the
+    request leaves open, in order, and `questions` is the policy for further ones. `given` are values of a file's
+    parameters; the robot stands at `start`, by default at the world's. `out` is the folder for the run's files, `stack`
+    the file of the robot's components, `map` the folder of a map that replaces the world's own. `scenario` has faults
+    and events, `scenario_files` add more; `variation` changes the world.
 
-    `robots` are those of a run with several, or with one of another kind or start than the world's.
+    `robots` are the robots of a run with several, or with another kind or start than the world's.
 
-    The run begins at `time_of_day` ("14:30"; None: what it is) and is ended after `time_limit_s` (None: as usual).
+    The run begins at `time_of_day` ("14:30"; None: now) and ends after `time_limit_s` (None: the default).
 
-    The fields below `robots` are filled once the request is understood. Then another process can run it: a sentence
-    has the answers in their places, `text` is that of the file, and `scenario` holds all that its files say and the
-    seed draws.
+    The fields below `robots` are set once the request is understood. Then another process can run it: the sentence
+    contains the answers, `text` is the file's text, and `scenario` holds the content of its files and the drawn faults.
     """
 
     sentence: Annotated[str | None, Option('What is said, as in "Hey Alice, fetch me a drink".', "--say")] = None
@@ -127,7 +125,7 @@ class Request:
         Option(
             "Where the robot stands (m, rad); 'unknown' puts it anywhere, and it finds out where.",
             metavar="X Y YAW",
-            read=start_in,
+            read=parse_start,
         ),
     ] = None
     scenario: Scenario = NO_SCENARIO
@@ -172,20 +170,20 @@ class Request:
 
     @property
     def only_commands(self) -> bool:
-        """True where there is neither a sentence nor a file."""
+        """Returns whether there is neither a sentence nor a file."""
         return self.sentence is None and self.file is None and bool(self.commands)
 
     def to_json(self) -> str:
-        """The JSON form, which `from_json` reads; what is not said is left out."""
+        """Returns the JSON form, which `from_json` reads; default values are left out."""
         return _form().dump_json(self, exclude_defaults=True).decode()
 
     @staticmethod
     def from_json(text: str | bytes) -> Request:
-        """The request that `to_json` wrote. Raises ValueError."""
+        """Reads the JSON form of a request. Raises ValueError."""
         return _form().validate_json(text)
 
     def from_anywhere(self) -> Request:
-        """The same with whole paths, for a process that works in another folder."""
+        """Copies it with absolute paths, for a process in another folder."""
         world = self.world if self.world is None or not is_there(Path(self.world)) else str(Path(self.world).resolve())
         return replace(
             self,

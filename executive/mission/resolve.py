@@ -1,4 +1,4 @@
-"""From a mission that was read to one that can be compiled: sentences understood, names checked against the world."""
+"""Resolution of a mission: sentences are understood, and names are checked against the world."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ def mission_from_file(
     knowledge: Knowledge,
     answer: Answerer | None = None,
 ) -> Mission:
-    """The mission of a file, its sentences understood and its names checked against `knowledge`.
+    """Resolves the mission of a file: understands its sentences and checks its names against `knowledge`.
 
-    What the file lays over the world's knowledge is in `knowledge` already (`overridden`). `answer` is asked where a
-    sentence could mean several things; unless given, the file's own policy decides.
+    `knowledge` includes the file's own (`knowledge_of_mission`). `answer` answers the questions of ambiguous sentences;
+    by default the file's policy decides.
 
     Raises:
         InputError: with file, line and hint, also for a sentence that is not understood, for unknown names, and for
-            used files that are wrong or use each other in a circle; all that was found stands in `others`.
+            used files that are wrong or use each other in a circle; `others` has all further errors.
     """
     loaded = file if isinstance(file, Mission) else load_mission(file)
     chain = () if loaded.document is None else (loaded.document.path.resolve(),)
@@ -69,19 +69,19 @@ def mission_from_file(
 
 @dataclass(frozen=True)
 class _Scope:
-    """The file of the steps that are resolved, and the files that led there, this one the last."""
+    """File of the steps that are resolved, and the chain of files that led to it, itself the last."""
 
     file: Mission
     chain: tuple[Path, ...] = ()
 
     @property
     def folder(self) -> Path:
-        """The folder of the file."""
+        """Folder of the file."""
         return Path() if self.file.document is None else self.file.document.path.parent
 
 
 class _Round(Strict):
-    """The steps of one round of a `for_each`."""
+    """Steps of one round of a `for_each`."""
 
     steps: Steps
 
@@ -91,7 +91,7 @@ _Error = Callable[[KeyPath, str, str], InputError]
 
 @dataclass
 class _Resolver:
-    """Resolves a file and all that it uses, for one robot in one world."""
+    """Resolver of a file and all files that it uses, for one robot in one world."""
 
     parser: DependencyParser
     knowledge: Knowledge
@@ -103,7 +103,7 @@ class _Resolver:
     understood: dict[str, Understanding] = field(default_factory=dict)
 
     def mission(self, file: Mission, chain: tuple[Path, ...]) -> Mission:
-        """The mission of a file that the files of `chain` led to, itself the last."""
+        """Resolves the mission of a file; `chain` are the files that led to it, itself the last."""
         if file.parts is not None:
             what = "its parts are for several robots, and this is for one"
             hint = "run the file by `errand run`, and name them: 'robots: {alice: spot, bob: fetch}', or --robots"
@@ -128,7 +128,7 @@ class _Resolver:
         return file.model_copy(update=resolved).with_notes(tuple(notes))
 
     def _steps(self, scope: _Scope, steps: Steps) -> Steps:
-        """Steps in a row. Raises InputError: all that is wrong with them."""
+        """Resolves steps in order. Raises InputError with all their errors."""
         if self.depth == MAX_NESTING:
             what = f"steps hold steps more than {MAX_NESTING} deep"
             raise steps[0].error((), what, "write some of them one after the other")
@@ -165,7 +165,7 @@ class _Resolver:
         return step.model_copy(update=self._parts(scope, step.error, step, ()))
 
     def _parts(self, scope: _Scope, error: _Error, model: BaseModel, path: KeyPath) -> dict[str, Any]:
-        """The fields of a model in which steps or conditions were resolved."""
+        """Resolves the steps and conditions in the fields of a model."""
         found = {}
         for name, facts in type(model).model_fields.items():
             if name not in Policy.model_fields:
@@ -174,7 +174,7 @@ class _Resolver:
         return found
 
     def _part(self, scope: _Scope, error: _Error, value: Any, path: KeyPath) -> Any:
-        """A value that stands at a path below a step or the file, with the steps and conditions in it resolved."""
+        """Resolves the steps and conditions in a value at a path below a step or the file."""
         if isinstance(value, CONDITIONS):
             return self._condition(scope, error, value, path)
         match value:
@@ -189,10 +189,10 @@ class _Resolver:
         return value
 
     def _condition(self, scope: _Scope, error: _Error, condition: Condition, path: KeyPath) -> Condition:
-        """A condition in the world's own names.
+        """Resolves a condition to the world's own names.
 
         Raises:
-            InputError: an unknown name, no question, or a condition that cannot hold or cannot fail.
+            InputError: for an unknown name, a sentence that is no question, or a condition that always or never holds.
         """
         resolved = self._named(scope, error, condition, path)
         try:
@@ -210,21 +210,21 @@ class _Resolver:
                 if len(commands) != 1 or commands[0].task is not Task.FIND:
                     hint = "ask one thing, as in 'is there a hammer in the workshop'"
                     raise error((*path, "look"), f"'{question}' is not one question that a look answers", hint)
-                return Look.of(commands[0], condition.max_age_s)
+                return Look.from_command(commands[0], condition.max_age_s)
             case Look():
-                return Look.of(self._command(error, condition, path), condition.max_age_s)
+                return Look.from_command(self._command(error, condition, path), condition.max_age_s)
             case LookFor(person=person):
                 look = Look(object=self._person(error, person, (*path, "person")), at=condition.at)
-                return Look.of(self._command(error, look, path), condition.max_age_s)
+                return Look.from_command(self._command(error, look, path), condition.max_age_s)
             case DoorOpen():
                 return condition.model_copy(update={"door": self._door(error, condition.door, (*path, "door"))})
         return condition.model_copy(update=self._parts(scope, error, condition, path))
 
     def _command(self, error: _Error, of: Do | Look, path: KeyPath = ()) -> Command:
-        """The command of a step or of a look in the world's own names.
+        """Resolves the command of a step or of a look to the world's own names.
 
         Raises:
-            InputError: a part that is no name, or names that the world does not have.
+            InputError: a part is no name, or the world does not have it.
         """
         try:
             command = of.command
@@ -237,7 +237,7 @@ class _Resolver:
         return _in_world_names(command, self.knowledge)
 
     def _person(self, error: _Error, name: str, path: KeyPath) -> str:
-        """The person who is meant, perhaps anybody."""
+        """Own name of the person, perhaps anybody."""
         known = self.knowledge.somebody(ANYBODY if name.strip().lower() == "anybody" else name)
         if known is None:
             hint = suggestion(name, ("anybody", *self.knowledge.people))
@@ -245,7 +245,7 @@ class _Resolver:
         return known
 
     def _door(self, error: _Error, rooms: tuple[str, ...], path: KeyPath) -> tuple[str, str]:
-        """The rooms of the door that is meant, as the knowledge file has it."""
+        """Rooms of the door in the order of the knowledge file."""
         facts, named = self.knowledge, list[str]()
         for n, room in enumerate(rooms):
             known = facts.place(room)
@@ -255,15 +255,15 @@ class _Resolver:
         doors = [door.between for door in facts.doors if set(named) <= set(door.between)]
         if len(doors) == 1:
             return doors[0]
-        told = " and ".join(named)
+        rooms_text = " and ".join(named)
         if doors:
-            raise error(path, f"there are {len(doors)} doors of {told}", "name the two rooms that it joins")
+            raise error(path, f"there are {len(doors)} doors of {rooms_text}", "name the two rooms that it joins")
         all_doors = listing(" and ".join(door.between) for door in facts.doors)
         hint = f"known are the doors of {all_doors}" if facts.doors else "add it under 'doors' in the knowledge file"
-        raise error(path, f"no door of {told} is known", hint)
+        raise error(path, f"no door of {rooms_text} is known", hint)
 
     def _meaning(self, error: _Error, path: KeyPath, sentence: str) -> Understanding:
-        """What a sentence means; one that stands there again means the same. Raises InputError: not understood."""
+        """Understands a sentence, once for all its occurrences. Raises InputError when it is not understood."""
         from executive.language.understand import Status, ask_until_clear, understand
 
         if sentence not in self.understood:
@@ -283,7 +283,7 @@ class _Resolver:
         return meant
 
     def _rounds(self, scope: _Scope, step: ForEach) -> Steps:
-        """One group for each value. Raises InputError."""
+        """Makes one group for each value of a `for_each`. Raises InputError."""
         place, name = step.place, step.loop.name
         assert place is not None and name is not None
         made = []
@@ -295,7 +295,7 @@ class _Resolver:
         return tuple(made)
 
     def _round_values(self, step: ForEach) -> Sequence[Value]:
-        """The values of the rounds. Raises InputError: no values, too many, or one that is no plain value."""
+        """Values of the rounds. Raises InputError when there are none or too many, or one is no plain value."""
         at, listed = ("repeat", "for_each"), step.loop.for_each
         if isinstance(listed, str):
             values = list[Value](self._known_values(step.error, listed, at))
@@ -310,7 +310,7 @@ class _Resolver:
         return values
 
     def _known_values(self, error: _Error, of: str, path: KeyPath) -> tuple[str, ...]:
-        """The rooms, people or surfaces of a world, perhaps those in one room."""
+        """Rooms, people or surfaces of a world, perhaps only those in one room."""
         facts, (kind, _, room) = self.knowledge, of.partition(" in ")
         if kind not in ("rooms", "people", "surfaces") or (kind == "rooms" and room):
             hint = "write a list, or one of rooms, people, people in ROOM and surfaces in ROOM"
@@ -327,7 +327,7 @@ class _Resolver:
         return tuple(name for name, who in people if place is None or inside & {who.at, facts.room(who.at)})
 
     def _refuse_unknown(self, file: Mission, name: str, parameter: Parameter) -> None:
-        """Refuses a parameter that names no place, object or person of the world."""
+        """Refuses a parameter whose default is no place, object or person of the world."""
         known = {
             "place": (self.knowledge.place, self.knowledge.place_names()),
             "object": (self.knowledge.object_name, self.knowledge.object_names()),
@@ -342,7 +342,7 @@ class _Resolver:
                 raise file.error(("parameters", name), what, hint)
 
     def _used(self, scope: _Scope, step: UseMission) -> Mission:
-        """The mission of the file that a step uses."""
+        """Resolves the mission of the file that a step uses."""
         used_path, chain = _found(scope, step), scope.chain
         if used_path.resolve() in chain:
             names = [one.name for one in (*chain[chain.index(used_path.resolve()) :], used_path)]
@@ -361,13 +361,13 @@ class _Resolver:
 
 
 def _group(step: Step, steps: Steps, name: str) -> Group:
-    """Steps in a row in the place of a step, under its policy. Any text may be their name."""
+    """Makes a group of steps in place of a step, with its policy. Any text may be its name."""
     policy = {key: getattr(step, key) for key in Policy.model_fields}
     return Group.model_construct(steps=steps, name=name, **policy).with_place(step.place)
 
 
 def _refuse_decided(error: _Error, expression: str | Expression, path: KeyPath) -> None:
-    """Refuses an expression that cannot be read, or compares what it reads with a value out of its range."""
+    """Refuses an expression that cannot be parsed, or compares a reading with a value out of its range."""
     try:
         read = Expression(expression) if isinstance(expression, str) else expression
         refuse_certain_comparisons(read, RANGES)
@@ -376,9 +376,9 @@ def _refuse_decided(error: _Error, expression: str | Expression, path: KeyPath) 
 
 
 def _found(scope: _Scope, step: UseMission) -> Path:
-    """The file that a step uses, as seen from the folder of the file in which the step stands.
+    """Finds the file that a step uses, from the folder of the file with the step.
 
-    Raises InputError: there is none, or it lies outside of the folder of the first file.
+    Raises InputError when there is none, or it lies outside the folder of the first file.
     """
     use, found = step.use, scope.folder / step.use
     home = scope.chain[0].parent if scope.chain else scope.folder.resolve()
@@ -394,7 +394,7 @@ def _found(scope: _Scope, step: UseMission) -> Path:
 
 
 def _refuse_top_keys(used: Mission, user: Mission) -> None:
-    """What is for a whole run cannot be set by a file that is a part of it, unless it says the same."""
+    """Refuses keys for a whole run in a used file, unless the using file has the same value."""
     for key in _ONLY_AT_THE_TOP:
         said = getattr(used, key)
         if key in used.model_fields_set and said is not None and said != getattr(user, key):
@@ -403,7 +403,7 @@ def _refuse_top_keys(used: Mission, user: Mission) -> None:
 
 
 def _unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
-    """The names that a world does not have: the key, a sentence and a hint for each."""
+    """Yields the names that a world does not have: the key, a sentence and a hint for each."""
 
     def unknown(kind: str, name: str, known: Sequence[str]) -> tuple[str, str]:
         return f"unknown {kind} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
@@ -421,7 +421,7 @@ def _unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str
 
 
 def _in_world_names(command: Command, knowledge: Knowledge) -> Command:
-    """The command in the world's own names."""
+    """Replaces the names of a command by the world's own names."""
 
     def named(item: ObjectKind | None) -> ObjectKind | None:
         known = item and (knowledge.object_name(item.name) or knowledge.somebody(item.name))

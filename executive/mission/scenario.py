@@ -10,15 +10,15 @@ from executive.words.option import Option
 from skills.quantities import Quantity
 
 RandomFaults = Annotated[int, Quantity(ge=0, le=100)]
-"""How many faults a seed draws."""
+"""Number of faults that a seed draws."""
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """Faults by their words, the number that the seed draws, and events as plain data.
+    """Scenario of a run: faults in their text form, the number of random faults, and events as plain data.
 
     `people` are routes by name, `doors` doorways with the times at which they close and open, `moves` objects with the
-    time at which they are moved and where to; all points are in the world frame, in metres.
+    time and destination of their move; all points are in the world frame, in metres.
     """
 
     faults: Annotated[
@@ -37,11 +37,11 @@ class Scenario:
 
     @property
     def moving(self) -> set[str]:
-        """The people and doors that it moves, by name; in one run, only one scenario may move each."""
+        """Names of the people and doors that it moves; in one run, only one scenario may move each."""
         return {*self.people, *(door["name"] for door in self.doors)}
 
-    def and_also(self, other: Scenario) -> Scenario:
-        """Both together."""
+    def merge(self, other: Scenario) -> Scenario:
+        """Merges two scenarios."""
         return Scenario(
             (*self.faults, *other.faults),
             self.random + other.random,
@@ -51,11 +51,11 @@ class Scenario:
         )
 
     def with_drawn(self, faults: tuple[str, ...]) -> Scenario:
-        """The same with the random faults drawn."""
+        """Copies it, with drawn faults in place of the random ones."""
         return replace(self, faults=(*self.faults, *faults), random=0)
 
     def lines(self) -> tuple[str, ...]:
-        """The faults and events, one line each."""
+        """One line for each fault and event."""
         people = (f"{name} sets off at {route['start']:g} s" for name, route in self.people.items())
         doors = (f"the {door['name']} {_times(door)}" for door in self.doors)
         moves = (f"somebody moves the {_moved(move)} at {move['at']:g} s" for move in self.moves)
@@ -63,16 +63,16 @@ class Scenario:
 
 
 NO_SCENARIO: Final = Scenario()
-"""Nothing goes wrong, and nothing happens but what the robot does."""
+"""Scenario without faults and events."""
 
 
 def _times(door: Mapping[str, Any]) -> str:
-    """The times at which a door closes and opens, in order."""
-    told = sorted((door[verb], verb) for verb in ("closes", "opens") if door[verb] is not None)
-    return " and ".join(f"{verb} at {at_s:g} s" for at_s, verb in told)
+    """Times at which a door closes and opens, in order."""
+    times = sorted((door[verb], verb) for verb in ("closes", "opens") if door[verb] is not None)
+    return " and ".join(f"{verb} at {at_s:g} s" for at_s, verb in times)
 
 
 def _moved(move: Mapping[str, Any]) -> str:
-    """The object that is moved, and its destination."""
+    """Moved object and its destination."""
     to = move["to"]
     return f"{move['name']} to {f'the {to}' if isinstance(to, str) else '({:g}, {:g}, {:g})'.format(*to)}"

@@ -1,4 +1,4 @@
-"""Stack files: the components of a robot and their options, read with file and line."""
+"""Stack files: components of a robot and their options, read with file and line."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from skills.stack import DEFAULT_FILE, RobotStack, StackError, default_stack, st
 
 
 def stack_file(given: Path) -> Path:
-    """A stack file as it was given, or the one of that name that comes with Errand."""
+    """Path of a stack file: the given one, or the shipped file of that name."""
     own = DEFAULT_FILE.with_name(f"{given.name}_stack.yaml")
     return own if given == Path(given.name) and not is_there(given) and is_file(own) else given
 
 
 def load_stack(path: Path | None) -> RobotStack:
-    """The stack of a file, or the one that comes with Errand. Raises InputError with file and line."""
+    """Reads the stack of a file, or the default one. Raises InputError with file and line."""
     if path is None:
         return default_stack()
     source = read_yaml(path)

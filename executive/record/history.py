@@ -34,7 +34,7 @@ from executive.record.schemas import (
 )
 from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, logged_view
-from executive.words.robot_config import robot_called
+from executive.words.robot_config import find_robot
 from skills.api import Cause, ObjectKind, ObjectObservation
 from skills.detect.words import told_apart
 from skills.files.errors import InputError
@@ -104,7 +104,7 @@ class History:
 
     def of_robot(self, name: str) -> History:
         """The events of one robot, and those of no robot. Raises InputError if the log has no such robot."""
-        known = robot_called(name, self.robots)
+        known = find_robot(name, self.robots)
         if known is None:
             hint = f"there are: {', '.join(self.robots)}" if self.robots else "no robot's messages are in it"
             raise InputError(f"the log has no robot '{name[:60]}'", hint=hint, file=self.file)

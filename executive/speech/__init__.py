@@ -1,1 +1,1 @@
-"""Speech: from sound to the words that were said."""
+"""Speech: from sound to words."""

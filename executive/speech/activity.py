@@ -1,4 +1,4 @@
-"""When somebody speaks: the probability of speech in every frame of 32 ms, and utterances set apart by pauses."""
+"""Voice activity detection: the probability of speech in frames of 32 ms, and utterances between pauses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from executive.speech.recogniser import speech_module
-from executive.speech.sound import RATE_HZ, Samples, joined
+from executive.speech.sound import RATE_HZ, Samples, concatenate
 
 FRAME: Final = 512
 """Samples of one frame: 32 ms."""
@@ -18,19 +18,19 @@ _FRAME_S: Final = FRAME / RATE_HZ
 
 
 class SpeechDetector(Protocol):
-    """Hears frame by frame whether somebody speaks."""
+    """Detector of speech in successive frames."""
 
     def probability(self, frame: Samples) -> float:
-        """How probable speech is (0 to 1) in the next FRAME samples."""
+        """Probability of speech (0 to 1) in the next FRAME samples."""
 
 
 @dataclass(frozen=True)
 class PauseRules:
-    """When an utterance begins and ends; all times in seconds.
+    """Thresholds for the begin and the end of an utterance; all times in seconds.
 
-    It begins with `start` frames in a row that are speech with at least `begin_at`, and ends once all frames for
-    `pause_s` stay below `end_at`. Pauses inside are cut down to `kept_pause_s`, `margin_s` stays at both ends, shorter
-    sounds than `least_s` are no speech, and at `most_s` it is cut off.
+    An utterance begins with a frame whose probability of speech is at least `begin_at`, and ends once all frames for
+    `pause_s` stay below `end_at`. Pauses inside are cut down to `kept_pause_s`, `margin_s` stays at both ends, sounds
+    shorter than `least_s` are no speech, and an utterance is cut off at `most_s`.
     """
 
     begin_at: float = 0.5
@@ -44,7 +44,7 @@ class PauseRules:
 
 @dataclass(frozen=True)
 class Utterance:
-    """What was said without a long pause: its samples at RATE_HZ, and when it began and ended in the sound (s)."""
+    """Speech without a long pause: its samples at RATE_HZ, and its begin and end in the sound (s)."""
 
     samples: Samples
     start_s: float
@@ -52,12 +52,12 @@ class Utterance:
 
     @property
     def length_s(self) -> float:
-        """The length of its samples, with the pauses inside cut down."""
+        """Length of the samples (s), with the pauses inside cut down."""
         return len(self.samples) / RATE_HZ
 
 
 class Endpointer:
-    """Cuts a stream of sound into utterances. Holds no more than the longest utterance."""
+    """Splitter of a stream of sound into utterances. Stores no more than the longest utterance."""
 
     def __init__(self, detector: SpeechDetector, rules: PauseRules | None = None) -> None:
         self._detector, self._rules = detector, rules or PauseRules()
@@ -71,12 +71,12 @@ class Endpointer:
         """Returns whether an utterance has begun and not ended."""
         return bool(self._kept)
 
-    def so_far(self) -> Samples:
-        """The sound of the utterance that has begun."""
-        return joined(self._kept)
+    def current_sound(self) -> Samples:
+        """Samples of the utterance that has begun."""
+        return concatenate(self._kept)
 
     def push(self, block: Samples) -> Iterator[Utterance]:
-        """Hears the next block; yields the utterances that end in it."""
+        """Adds the next block; yields the utterances that end in it."""
         sound = np.concatenate([self._rest, block])
         whole = len(sound) - len(sound) % FRAME
         self._rest = sound[whole:]
@@ -84,7 +84,7 @@ class Endpointer:
             yield from self._hear(sound[start : start + FRAME])
 
     def flush(self) -> Iterator[Utterance]:
-        """The sound has ended; yields the utterance that was under way."""
+        """Ends the sound; yields the utterance that was under way."""
         if self._rest.size:
             last = np.zeros(FRAME, np.float32)
             last[: self._rest.size] = self._rest
@@ -107,7 +107,7 @@ class Endpointer:
             yield from self._end()
 
     def _wait(self, frame: Samples, probability: float) -> None:
-        """Nobody speaks yet; keep what may be the soft beginning of a word."""
+        """Stores frames before speech, which may hold the soft beginning of a word."""
         self._before.append(frame)
         if probability >= self._rules.begin_at:
             self._kept = list(self._before)
@@ -123,7 +123,7 @@ class Endpointer:
         held = min(quiet, self._frames(self._rules.kept_pause_s))
         tail = max(held - self._frames(self._rules.margin_s), 0)
         end = self._frames_seen - quiet + held - tail
-        yield Utterance(joined(kept[: len(kept) - tail]), self._began_at * _FRAME_S, end * _FRAME_S)
+        yield Utterance(concatenate(kept[: len(kept) - tail]), self._began_at * _FRAME_S, end * _FRAME_S)
 
     @staticmethod
     def _frames(seconds: float) -> int:
@@ -131,9 +131,9 @@ class Endpointer:
 
 
 class SileroDetector:
-    """The network of Silero (github.com/snakers4/silero-vad, version 6), through ONNX Runtime on one thread.
+    """Silero's network (github.com/snakers4/silero-vad, version 6), through ONNX Runtime on one thread.
 
-    Frames without any sound are taken for silence unheard.
+    Frames without any sound count as silence and skip the network.
     """
 
     _SILENT: Final = 1e-4
@@ -142,14 +142,14 @@ class SileroDetector:
         self._model = model
 
     def probability(self, frame: Samples) -> float:
-        """How probable speech is (0 to 1) in the next FRAME samples."""
+        """Probability of speech (0 to 1) in the next FRAME samples."""
         if float(np.abs(frame).max()) < self._SILENT:
             return 0.0
         return float(np.asarray(self._model(frame, RATE_HZ)).item())
 
 
 def load_detector() -> SpeechDetector:
-    """A detector that has heard nothing yet.
+    """Loads a detector in its initial state.
 
     Raises:
         InputError: the extra `speech` is not installed.

@@ -1,13 +1,13 @@
-"""What the recogniser learned about noise: low-rank changes to matrices of its weights, added when it is loaded.
+"""Adapter of the recogniser to noise: low-rank changes of its weight matrices, added when it is loaded.
 
 W becomes W + B A (Hu and others, "LoRA: low-rank adaptation of large language models", 2021). The file is of numpy's
-npz kind, with `NAME.up` (B) and `NAME.down` (A) in 16 bits for each matrix, and `base`, the sha256 of the weights that
-it belongs to; `errand_train` makes it.
+npz kind, with `NAME.up` (B) and `NAME.down` (A) in 16 bits for each matrix, and `base`, the sha256 of the weights to
+which it belongs; `errand_train` makes it.
 
-The weights stand in CTranslate2's `model.bin`, and are changed where they stand. Its layout is that of
-`ModelSpec._serialize` in CTranslate2's converter, binary version 6: version, name of the specification, revision, the
-variables (name, shape, type, bytes), and at last other names for some of them. All numbers are little-endian; texts
-have their length before them and a zero behind.
+The weights are in CTranslate2's `model.bin`, and are changed in place. Its layout is that of `ModelSpec._serialize` in
+CTranslate2's converter, binary version 6: version, name of the specification, revision, the variables (name, shape,
+type, bytes), and at last other names for some of them. All numbers are little-endian; texts have their length before
+them and a zero behind.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _HINT: Final = f"make a new one: python -m errand_train.speech --out executive/s
 
 @dataclass(frozen=True)
 class LowRank:
-    """A change to a matrix: `up` (outputs, rank) times `down` (rank, inputs)."""
+    """Change of a matrix: `up` (outputs, rank) times `down` (rank, inputs)."""
 
     up: Matrix
     down: Matrix
@@ -47,22 +47,22 @@ class LowRank:
         return (self.up.shape[0], self.down.shape[1]) if fits else (0, 0)
 
     def change(self) -> npt.NDArray[np.float32]:
-        """The change as a whole matrix (outputs, inputs)."""
+        """Change as a full matrix (outputs, inputs)."""
         product: npt.NDArray[np.float32] = self.up.astype(np.float32) @ self.down.astype(np.float32)
         return product
 
 
 @dataclass(frozen=True)
 class Adapter:
-    """The changes by the names of the matrices in the model's file; a convolution is one, (outputs, inputs x width)."""
+    """Changes by the names of the matrices in the model's file; a convolution is one, (outputs, inputs x width)."""
 
     changes: Mapping[str, LowRank]
 
     def add_to(self, weights: ModelFile) -> None:
-        """Adds the changes to the weights, where they stand.
+        """Adds the changes to the weights, in place.
 
         Raises:
-            InputError: a matrix is missing or of another shape; then nothing is changed.
+            InputError: a matrix is missing or of another shape; then no weight is changed.
         """
         for name, low_rank in self.changes.items():
             if name not in weights:
@@ -74,14 +74,14 @@ class Adapter:
             before[...] = before + low_rank.change().reshape(before.shape)
 
     def save(self, file: Path, *, base: str) -> None:
-        """Writes it to a file; `base` is the sha256 of the weights that it belongs to."""
+        """Writes it to a file; `base` is the sha256 of the weights to which it belongs."""
         parts = {f"{name}{_UP}": low.up for name, low in self.changes.items()}
         parts |= {f"{name}{_DOWN}": low.down for name, low in self.changes.items()}
         np.savez(file, base=np.array(base), **parts)  # type: ignore[arg-type]
 
 
 def packaged_adapter(*, base: str) -> Adapter:
-    """The adapter that comes with this package, for the weights with the sha256 `base`.
+    """Reads the shipped adapter for the weights with the sha256 `base`.
 
     Raises:
         InputError: it is missing or damaged, or belongs to other weights.
@@ -94,7 +94,7 @@ def packaged_adapter(*, base: str) -> Adapter:
 
 
 def read_adapter(content: bytes, *, base: str) -> Adapter:
-    """The adapter in the content of a file.
+    """Reads an adapter from the content of a file.
 
     Raises:
         InputError: it is damaged, or belongs to other weights than those with the sha256 `base`.
@@ -125,7 +125,7 @@ _TYPES: Final = {0: "<f4", 1: "<i1", 2: "<i2", 3: "<i4", 4: "<f2"}
 
 @dataclass(frozen=True)
 class Variable:
-    """Where the numbers of a variable begin in the file (bytes), their shape, and their type as numpy calls it."""
+    """Variable of a model file: the position of its numbers (bytes), their shape, and their numpy type."""
 
     start: int
     shape: tuple[int, ...]
@@ -133,14 +133,14 @@ class Variable:
 
 
 class ModelFile:
-    """The content of a `model.bin`. Nothing is copied: where the content can be written, so can the weights."""
+    """Content of a `model.bin`. Nothing is copied: where the content is writable, so are the weights."""
 
     def __init__(self, content: Content, variables: Mapping[str, Variable]) -> None:
         self._content, self._variables = content, variables
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of all variables, in the order of the file."""
+        """Names of all variables, in the order of the file."""
         return tuple(self._variables)
 
     def __getitem__(self, name: str) -> Weights:
@@ -153,10 +153,10 @@ class ModelFile:
 
 
 def read_model_file(content: Content) -> ModelFile:
-    """The variables of a `model.bin`.
+    """Parses the variables of a `model.bin`.
 
     Raises:
-        InputError: it is of another version, cut off, or has numbers of a kind that is not known.
+        InputError: it is of another version, cut off, or has numbers of an unknown type.
     """
     try:
         return ModelFile(content, _variables(_Reader(content)))
@@ -165,7 +165,7 @@ def read_model_file(content: Content) -> ModelFile:
 
 
 class _Reader:
-    """Reads numbers and texts one after another."""
+    """Reader of successive numbers and texts."""
 
     def __init__(self, content: Content) -> None:
         self.content, self.at = content, 0

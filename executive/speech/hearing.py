@@ -1,4 +1,4 @@
-"""From recognised sound to commands: who is called, what is asked for, and which words were misheard."""
+"""Understanding of recognised speech: the robot that is called, the commands, and misheard words."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ _UNRESOLVED: Final = frozenset({"her", "him"})
 
 @dataclass(frozen=True)
 class Reader:
-    """Reads heard sentences for one robot, or for several: one, some or all of them may be called.
+    """Reader of heard sentences for one robot, or for several, of which the speaker may call one, some or all.
 
-    `knowledge` None, for one robot, keeps names as spoken; then names outside the vocabulary, where there is one, do
-    not fit. `other_robots` are called as well, and do not listen.
+    With `knowledge` None, for one robot, names stay as spoken; then only names of the vocabulary, where there is one,
+    fit. `other_robots` may be called as well, and do not listen.
     """
 
     parser: DependencyParser
@@ -44,10 +44,10 @@ class Reader:
     other_robots: tuple[str, ...] = ()
 
     def read(self, text: str) -> Reading[Understanding]:
-        """What `text` means; it fits when it becomes commands in known names.
+        """Understands `text`; the reading fits when it becomes commands with known names.
 
-        The text of the meaning is the sentence with the name of the robot that it calls spelled right, so that it can
-        be typed instead.
+        The text of the meaning has the name of the called robot in its right spelling, so that a user can type it
+        instead.
         """
         called, alone = self._called(text), len(self.robots) == 1
         typed = called.text if called.name is None else f"Hey {called.name}, {called.text}"
@@ -72,11 +72,11 @@ class Reader:
         return Reading(meant, fits=not strange, suspects=strange)
 
     def calls(self, text: str) -> bool:
-        """Returns whether a robot is called in `text`."""
+        """Returns whether `text` calls a robot."""
         return self.read(text).meaning.addressed
 
     def _called(self, text: str) -> Address:
-        """Which robot is called in `text`, its name perhaps misspelled, and the rest of the text."""
+        """Finds the robot that `text` calls, its name perhaps misspelled, and the rest of the text."""
         for name in self.robots:
             text = _with_pause(text, name)
         others = {name: {*self.robots, *self.other_robots} - {name} for name in self.robots}
@@ -84,8 +84,8 @@ class Reader:
         return next((one for one in heard if one.name is not None), Address(None, text))
 
 
-def refuse_alike(robots: Sequence[str]) -> None:
-    """Raises InputError where robots cannot be told apart by voice, or a name cannot be said."""
+def refuse_similar_names(robots: Sequence[str]) -> None:
+    """Raises InputError when two names sound alike, or a name cannot be spoken."""
     for number, name in enumerate(robots):
         if not re.fullmatch(r"[^\W\d_]+(?:[ '-][^\W\d_]+)*", name):
             hint = "give it a name of letters, or write what it is to do"
@@ -97,35 +97,45 @@ def refuse_alike(robots: Sequence[str]) -> None:
 
 
 def spoken_phrases(vocabulary: Vocabulary) -> SoundAlikes:
-    """All that a misheard word may have been: the names, also in the plural, and the words of requests."""
+    """Phrases that a misheard word may stand for: the names, also in the plural, and the words of requests."""
     words = lexicon()
     verbs = [" ".join(verb) for verb in words.verbs]
     prepositions = [" ".join(preposition) for preposition in words.prepositions]
     called = (*vocabulary.robots, *(_EVERYBODY if vocabulary.other_robots else ()))
     calls = [f"{greeting} {name}" for name in called for greeting in _GREETINGS]
     names = [form for name in vocabulary.names for form in (name, f"{name}s")]
-    told = [f"{being} {where}" for being in _BEINGS for where in ("at", "by", "in", "on")]
+    statements = [f"{being} {where}" for being in _BEINGS for where in ("at", "by", "in", "on")]
     goals = [f"to {name}" for name in vocabulary.names]
-    small = [*goals, *told, *_BEINGS, *words.pronouns, *words.here, *words.there, *words.speaker, *_ARTICLES, *_NUMBERS]
+    small = [
+        *goals,
+        *statements,
+        *_BEINGS,
+        *words.pronouns,
+        *words.here,
+        *words.there,
+        *words.speaker,
+        *_ARTICLES,
+        *_NUMBERS,
+    ]
     return SoundAlikes(names, [*calls, *verbs, *prepositions, *words.openers, *words.requests, *small])
 
 
 def _with_pause(text: str, name: str) -> str:
-    """The text with a comma between the name at its beginning and a verb that asks: a pause is not always heard."""
+    """Adds a comma between the name at the beginning and a verb, since pauses are not always heard."""
     call = re.match(rf"({re.escape(name)})\s+(\w+)", text, re.IGNORECASE)
     asks = call is not None and any(verb[0] == call.group(2).lower() for verb in lexicon().verbs)
     return f"{name}, {text[len(name) :].lstrip()}" if asks else text
 
 
 def _names(command: Command) -> Iterator[str]:
-    """The names in a command, with the adjectives before them."""
+    """Names in a command, with their adjectives."""
     things = (" ".join((*thing.attributes, thing.name)) for thing in (command.item, command.object) if thing)
     goals = (goal for goal in (command.goal, command.goal_at) if goal is not None and goal != HERE.name)
     yield from (*things, *goals)
 
 
 def _knows(known: Collection[str], name: str) -> bool:
-    """Returns whether a name is known as a whole, or without the adjectives before it, or is a word for a person.
+    """Returns whether a name is known, with or without its adjectives, or is a word for a person.
 
     Pronouns that stand for nobody are no names.
     """
@@ -137,5 +147,5 @@ def _knows(known: Collection[str], name: str) -> bool:
 
 
 def _plain(name: str) -> str:
-    """A name by which singular and plural are the same, without case and signs."""
+    """Name in a form without case and signs, equal for singular and plural."""
     return re.sub(r"(?:(?<=[sxz])es|(?<=ch)es|(?<=sh)es|(?<!s)s)$", "", re.sub(r"[^\w ]", "", name.lower()))

@@ -1,11 +1,12 @@
-"""Which of the readings of a sound was meant: the likeliest that makes sense, else one corrected by sound.
+"""Choice among the readings of a sound: the likeliest that makes sense, otherwise a reading corrected by sound.
 
-Words that fit nowhere become known words that sound alike ("ranch" -> wrench). The search goes from the transcripts
-outwards, the change that is least to the ear first, and only changes words that the reader of the sentence found fault
-with, or their neighbours. The sound itself decides which of the sentences that then make sense was meant, if any.
+Words that fit nowhere become known words of similar sound ("ranch" -> wrench). The search begins at the transcripts,
+tries the least audible change first, and changes only words that the sentence reader rejects, or their neighbours. The
+likelihood of the sound decides among the sentences that then make sense, and may reject all.
 
-The recogniser is told the robot's name, and hears it readily for that ("Hey Oliver" -> Hey Alice). What it hears
-without being told anything is another witness."""
+The recogniser expects the robot's name, and therefore hears it easily ("Hey Oliver" -> Hey Alice). Recognition without
+any expected name serves as a second opinion.
+"""
 
 from __future__ import annotations
 
@@ -24,17 +25,17 @@ Meaning = TypeVar("Meaning")
 
 
 _OTHER_READING: Final = 6.0
-"""How many times e less likely another of the recogniser's own readings may be than the first."""
+"""Largest log likelihood by which another reading of the recogniser may be behind the first."""
 _CORRECTED_READING: Final = 8.0
-"""The same for a reading corrected by sound; these are compared without telling the recogniser what to expect."""
+"""The same for a reading corrected by sound, where the recogniser expects no names."""
 _MOST_CORRECTED: Final = 4
 _PER_SOUND: Final = 3.0
-"""How much log likelihood a changed sound is worth."""
+"""Log likelihood of one changed sound."""
 
 
 @dataclass(frozen=True)
 class Interpretation(Generic[Meaning]):
-    """What was heard in the end and what it means, and what the recogniser had made of it at first."""
+    """Chosen reading and its meaning, and the recogniser's first reading."""
 
     text: str
     meaning: Meaning
@@ -44,15 +45,15 @@ class Interpretation(Generic[Meaning]):
 def interpret(
     recognition: Recognition, read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes
 ) -> Interpretation[Meaning] | None:
-    """The likeliest reading that fits, or else the likeliest; None when nothing was said.
+    """Chooses the likeliest reading that fits, otherwise the likeliest; None when nothing was said.
 
-    Where the likeliest had better be left as it is (the robot was not called), no other is looked for.
+    When the likeliest reading is better left as it is (the robot was not called), no other is tried.
     """
     transcripts = recognition.transcripts
     if not transcripts:
         return None
     first = transcripts[0]
-    text = smoothed(first.text)
+    text = remove_repetitions(first.text)
     heard = [Candidate(text, 0.0, read(text))]
     if not heard[0].reading.correctable or heard[0].reading.fits:
         return Interpretation(text, heard[0].reading.meaning, first.text)
@@ -67,7 +68,7 @@ def _fitting(
     read: Callable[[str], Reading[Meaning]],
     alikes: SoundAlikes,
 ) -> list[Candidate[Meaning]]:
-    """The readings that fit: of the first search, or else of those after it, or else what is corrected by sound."""
+    """Readings that fit: those of the first search, otherwise of further ones, otherwise those corrected by sound."""
     likeliest = recognition.transcripts[0].likelihood
     heard = _read(recognition.transcripts, likeliest, heard, read)
     searches = recognition.more()
@@ -82,9 +83,9 @@ def _likeliest(
     first: Candidate[Meaning],
     fitting: list[Candidate[Meaning]],
 ) -> Candidate[Meaning] | None:
-    """The one that is likeliest given the sound, if it is not much less likely than the first reading.
+    """Likeliest candidate given the sound, unless it is much less likely than the first reading.
 
-    The recogniser's own readings stand in their order.
+    The recogniser's own readings keep their order.
     """
     if not fitting or not fitting[0].changes:
         return fitting[0] if fitting else None
@@ -100,10 +101,10 @@ def _read(
     heard: list[Candidate[Meaning]],
     read: Callable[[str], Reading[Meaning]],
 ) -> list[Candidate[Meaning]]:
-    """Those heard and, read in order, those that are not much less likely than the best."""
+    """Reads the transcripts that are not much less likely than the best, in order."""
     heard = [*heard]
     for transcript in transcripts:
-        text, behind = smoothed(transcript.text), max(best - transcript.likelihood, 0.0)
+        text, behind = remove_repetitions(transcript.text), max(best - transcript.likelihood, 0.0)
         same = [text.rstrip(" .?!").lower() == other.text.rstrip(" .?!").lower() for other in heard]
         if behind > _OTHER_READING or any(same):
             continue
@@ -111,21 +112,21 @@ def _read(
     return heard
 
 
-def smoothed(text: str) -> str:
-    """The text as it was meant to be said.
+def remove_repetitions(text: str) -> str:
+    """Removes repetitions from a text.
 
-    What a speaker said twice on starting anew stands once ("grab the, grab the cup"), and no pronoun repeats a
+    Words that the speaker repeats after a restart stand once ("grab the, grab the cup"), and no pronoun repeats a
     relative one ("Robin, which he is in the hall").
     """
-    anew = re.sub(r"\b(\w+(?:[ ']\w+){1,9})[ ,.;]+(?=\1\b)", "", text, flags=re.IGNORECASE)
-    return re.sub(r",?\s+(?:which|who|that)\s+(?:he|she|they)\s+(is|are)\b", r" who \1", anew, flags=re.IGNORECASE)
+    once = re.sub(r"\b(\w+(?:[ ']\w+){1,9})[ ,.;]+(?=\1\b)", "", text, flags=re.IGNORECASE)
+    return re.sub(r",?\s+(?:which|who|that)\s+(?:he|she|they)\s+(is|are)\b", r" who \1", once, flags=re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Reading(Generic[Meaning]):
-    """What a sentence means, whether that fits, and else the words that are to blame (none: any may be).
+    """Meaning of a sentence, whether it fits, and otherwise the suspect words (none: any word).
 
-    One that is not `correctable` is better left as it was heard.
+    A reading that is not `correctable` is better left as it is.
     """
 
     meaning: Meaning
@@ -136,9 +137,9 @@ class Reading(Generic[Meaning]):
 
 @dataclass(frozen=True)
 class Candidate(Generic[Meaning]):
-    """A sentence, what it means, and how far it sounds from what was heard (0 the same, about 1 a changed sound).
+    """Sentence with its meaning and its distance in sound from the transcript (0 the same, about 1 a changed sound).
 
-    `changes` counts the groups of words that were changed.
+    `changes` counts the changed groups of words.
     """
 
     text: str
@@ -150,7 +151,7 @@ class Candidate(Generic[Meaning]):
 def corrections(
     heard: Sequence[Candidate[Meaning]], read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes, *, most: int = 3
 ) -> list[Candidate[Meaning]]:
-    """At most so many sentences that fit and sound like one of those that were heard, the likest first."""
+    """Searches for at most `most` sentences that fit and sound like one of those heard, the most similar first."""
     order = count()
     known = {candidate.text: candidate.reading for candidate in heard}
     queue = [(candidate.cost, next(order), 0, tuple(candidate.text.split())) for candidate in heard]
@@ -175,7 +176,7 @@ def corrections(
 def _changed(
     words: tuple[str, ...], suspects: Sequence[str], alikes: SoundAlikes
 ) -> Iterator[tuple[float, tuple[str, ...]]]:
-    """The sentences with one group of words changed, and the cost of that."""
+    """Sentences with one group of words changed, and the cost of the change."""
     for start, end in _spans(len(words), _blamed(words, suspects)):
         known = sum(alikes.knows(_bare(word)) for word in words[start:end])
         for alike, other in _replaced(words, start, end, alikes):
@@ -185,7 +186,7 @@ def _changed(
 def _replaced(
     words: tuple[str, ...], start: int, end: int, alikes: SoundAlikes
 ) -> Iterator[tuple[Alike, tuple[str, ...]]]:
-    """The sentences with a known phrase of like sound in the place of those words."""
+    """Sentences with a known phrase of similar sound in place of some words."""
     tail = re.sub(r".*[\w']", "", words[end - 1])
     for alike in alikes.of(" ".join(map(_bare, words[start:end]))):
         before = words[:start]
@@ -197,9 +198,9 @@ def _replaced(
 
 
 def _blamed(words: Sequence[str], suspects: Sequence[str]) -> set[int]:
-    """The positions of the words to blame, articles between them included; all when none is named.
+    """Positions of the suspect words, articles between them included; all positions when there is no suspect.
 
-    Where the words of a suspect do not stand together, each is to blame for itself.
+    When the words of a suspect do not stand together, each is suspect by itself.
     """
     bare = [(at, _bare(word).lower()) for at, word in enumerate(words)]
     plain = [(at, word) for at, word in bare if word not in _ARTICLES]
@@ -212,7 +213,7 @@ def _blamed(words: Sequence[str], suspects: Sequence[str]) -> set[int]:
 
 
 def _together(plain: Sequence[tuple[int, str]], parts: Sequence[str]) -> set[int]:
-    """All positions from the first to the last of the parts, wherever they stand one after another."""
+    """Positions from the first to the last part, wherever the parts stand one after another."""
     places = set[int]()
     for first in range(len(plain) - len(parts) + 1):
         found = plain[first : first + len(parts)]
@@ -222,7 +223,7 @@ def _together(plain: Sequence[tuple[int, str]], parts: Sequence[str]) -> set[int
 
 
 def _spans(count: int, blamed: set[int]) -> Iterator[tuple[int, int]]:
-    """Groups of one to three of so many words, at least one of them to blame."""
+    """Groups of one to three successive words, at least one of them suspect."""
     for length in range(1, _MOST_WORDS + 1):
         for start in range(count - length + 1):
             if blamed & set(range(start, start + length)):
@@ -245,17 +246,17 @@ _BEFORE_NAMES: Final = _ARTICLES | {"my", "two", "three", "four", "five"}
 
 
 _OTHER_OPENING: Final = 7.0
-"""How many times e likelier another opening must be than the one with the name, neither being expected."""
+"""Log likelihood by which another opening must exceed the one with the name, when no names are expected."""
 _OTHER_WHOLE: Final = 10.0
-"""The same for all that was said."""
+"""The same for the whole text."""
 _OPENING_WORDS: Final = 4
 
 
-def opening_as_heard(recognition: Recognition, text: str, names: Collection[str], calls: Callable[[str], bool]) -> str:
-    """The text, or what is heard when no names are expected, where that is much likelier and calls nobody.
+def choose_opening(recognition: Recognition, text: str, names: Collection[str], calls: Callable[[str], bool]) -> str:
+    """Replaces the robot's name when the opening is much likelier without expected names and then calls nobody.
 
-    `calls` tells of a text whether it calls one of the robots `names`. First only the opening is exchanged, since the
-    names behind it are better heard when they are expected. A text without any name among its first words stays.
+    `calls` returns whether a text calls one of the robots `names`. The opening is replaced first, since the names
+    behind it are recognised better when they are expected. A text without a name among its first words stays as it is.
     """
     words = text.split()
     bare = [re.sub(r"\W", "", word).lower() for word in words[:_OPENING_WORDS]]
@@ -263,7 +264,7 @@ def opening_as_heard(recognition: Recognition, text: str, names: Collection[str]
     at = next((number for number, word in enumerate(bare) if word in called), None)
     if at is None:
         return text
-    unprompted = recognition.unprompted()
+    unprompted = recognition.unprompted_text()
     if not unprompted or calls(unprompted):
         return text
     behind = at + 1

@@ -1,4 +1,4 @@
-"""Listens to a whole recording or to a microphone: utterances, recognised and understood one after another."""
+"""Listener to a recording or a microphone: recognises and understands one utterance after another."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from executive.language.spelling import SoundAlikes
 from executive.language.understand import Part, Status, Understanding
 from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Utterance
 from executive.speech.hearing import Reader
-from executive.speech.interpret import interpret, opening_as_heard
+from executive.speech.interpret import choose_opening, interpret
 from executive.speech.recogniser import Recogniser, Vocabulary
-from executive.speech.sound import RATE_HZ, Loudness, Samples, joined, level_db, read_wav
+from executive.speech.sound import RATE_HZ, Loudness, Samples, concatenate, level_db, read_wav
 from executive.words.command import Command
 from skills.files.errors import InputError
 
@@ -28,7 +28,7 @@ CLIPPED: Final = "the recording is clipped (too loud for its scale): words may b
 
 @dataclass(frozen=True)
 class HeardUtterance:
-    """What was said between two pauses (s from the beginning of the sound), and what it means."""
+    """Speech between two pauses (s from the beginning of the sound), and its meaning."""
 
     start_s: float
     end_s: float
@@ -38,7 +38,7 @@ class HeardUtterance:
 
 @dataclass(frozen=True)
 class Listener:
-    """All that it takes to turn sound into commands. `new_detector` gives a detector that has heard nothing yet."""
+    """Converter of sound to commands. `new_detector` makes a speech detector in its initial state."""
 
     recogniser: Recogniser
     new_detector: Callable[[], SpeechDetector]
@@ -48,11 +48,11 @@ class Listener:
 
     @property
     def vocabulary(self) -> Vocabulary:
-        """The names that are listened for."""
+        """Names that the recogniser expects."""
         return self.reader.vocabulary
 
-    def file(self, wav: Path) -> Recording:
-        """Listens to a recording of any length; only seconds of it are in memory.
+    def hear_file(self, wav: Path) -> Recording:
+        """Listens to a recording of any length, of which only seconds are in memory.
 
         Raises:
             InputError: see `read_wav`.
@@ -65,34 +65,34 @@ class Listener:
                 loudness = loudness.with_block(block)
                 yield block
 
-        heard = tuple(filter(None, map(self.hear, together(self.utterances(measured()), self.rules.most_s))))
+        heard = tuple(filter(None, map(self.hear, join_utterances(self.utterances(measured()), self.rules.most_s))))
         if not loudness.count:
             raise InputError("it holds no sound", hint="record again", file=wav)
         return Recording(str(wav), heard, loudness)
 
     def utterances(self, blocks: Iterable[Samples]) -> Iterator[Utterance]:
-        """The utterances in a stream of sound."""
+        """Yields the utterances in a stream of sound."""
         endpointer = Endpointer(self.new_detector(), self.rules)
         for block in blocks:
             yield from endpointer.push(block)
         yield from endpointer.flush()
 
     def hear(self, utterance: Utterance) -> HeardUtterance | None:
-        """Recognises and understands what was said; None when it was no speech after all."""
+        """Recognises and understands an utterance; None when it is no speech."""
         recognition = self.recogniser.transcribe(utterance.samples, self.vocabulary)
         best = interpret(recognition, self.reader.read, self.alikes)
         if best is None:
             return None
         text, meant = best.text, best.meaning
         if meant.addressed:
-            text = opening_as_heard(recognition, text, self.reader.robots, self.reader.calls)
+            text = choose_opening(recognition, text, self.reader.robots, self.reader.calls)
             meant = meant if text == best.text else self.reader.read(text).meaning
         return HeardUtterance(utterance.start_s, utterance.end_s, text, meant)
 
 
 @dataclass(frozen=True)
 class Recording:
-    """What was heard in a recording."""
+    """Content of a recording."""
 
     file: str
     heard: tuple[HeardUtterance, ...]
@@ -100,7 +100,7 @@ class Recording:
 
     @property
     def transcript(self) -> str:
-        """All that was said."""
+        """Text of all utterances."""
         return " ".join(one.text for one in self.heard)
 
     @property
@@ -110,43 +110,43 @@ class Recording:
 
     @property
     def decisive(self) -> tuple[HeardUtterance, ...]:
-        """The utterances that count: those to the robot, or all when none is."""
-        told = tuple(o for o in self.heard if o.meant.status is not Status.NOT_ADDRESSED)
-        return told or self.heard[:1]
+        """Utterances that count: those for the robot, or the first when there is none."""
+        addressed = tuple(one for one in self.heard if one.meant.status is not Status.NOT_ADDRESSED)
+        return addressed or self.heard[:1]
 
     @property
     def status(self) -> Status:
-        """OK when all that was said to the robot is, else what became of the first that is not."""
+        """OK when all utterances for the robot are, otherwise the status of the first that is not."""
         states = [one.meant.status for one in self.decisive]
         return next((state for state in states if state is not Status.OK), Status.OK if states else Status.REFUSED)
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """What is to be done; nothing when any part of it was not understood."""
+        """Commands of all utterances; empty when any of them was not understood."""
         if self.status is not Status.OK:
             return ()
         return tuple(command for one in self.decisive for command in one.meant.commands)
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """What each of several robots is to do; nothing when any part of it was not understood."""
+        """Part of each of several robots; empty when any utterance was not understood."""
         return tuple(part for one in self.decisive for part in one.meant.parts) if self.status is Status.OK else ()
 
     @property
     def reason(self) -> str | None:
-        """Why there are no commands."""
+        """Reason why there are no commands."""
         if not self.heard:
             return SILENT if self.loudness.silent else NOBODY_SPOKE
         return next(filter(None, (one.meant.reason for one in self.decisive)), None)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What may be wrong with the sound, and which name was taken for which."""
+        """Notes on the quality of the sound, and on names that were taken for known ones."""
         clipped = (CLIPPED,) if self.loudness.much_clipped else ()
         return (*clipped, *(note for one in self.decisive for note in one.meant.notes))
 
     def to_json(self) -> dict[str, Any]:
-        """The answer as JSON values."""
+        """Returns the answer as JSON values."""
         return {
             "file": self.file,
             "transcript": self.transcript,
@@ -162,10 +162,10 @@ class Recording:
         }
 
 
-def together(utterances: Iterable[Utterance], most_s: float) -> Iterator[Utterance]:
-    """The utterances as one when all of them last no longer than `most_s`: a request with pauses for thought.
+def join_utterances(utterances: Iterable[Utterance], most_s: float) -> Iterator[Utterance]:
+    """Joins utterances that together last no longer than `most_s`: a request with pauses for thought.
 
-    In a longer recording each stands for itself.
+    In a longer recording each stays an utterance of its own.
     """
     held = list[Utterance]()
     length_s = 0.0
@@ -178,7 +178,7 @@ def together(utterances: Iterable[Utterance], most_s: float) -> Iterator[Utteran
             yield from rest
             return
     if held:
-        yield Utterance(joined(one.samples for one in held), held[0].start_s, held[-1].end_s)
+        yield Utterance(concatenate(one.samples for one in held), held[0].start_s, held[-1].end_s)
 
 
 BLOCK_S: Final = 0.1
@@ -187,7 +187,7 @@ _HINT: Final = "install alsa-utils, or record to a wav file and give that"
 
 @dataclass(frozen=True)
 class Hearing:
-    """The state after one block of sound: the time (s), its level (dB below full scale), and what is being said.
+    """State after one block of sound: the time (s), its level (dB below full scale), and whether somebody speaks.
 
     `partial` is a first reading of the sentence under way, `finished` a sentence that has just ended.
     """
@@ -200,7 +200,7 @@ class Hearing:
 
 
 def follow(blocks: Iterable[Samples], listener: Listener, *, partial_every_s: float = 1.0) -> Iterator[Hearing]:
-    """What is heard, block by block; all times are those of the sound, so that any source will do."""
+    """Listens block by block; all times are those of the sound, so that any source will do."""
     endpointer = Endpointer(listener.new_detector(), listener.rules)
     time_s, read_s, partial = 0.0, 0.0, ""
     for block in blocks:
@@ -209,7 +209,10 @@ def follow(blocks: Iterable[Samples], listener: Listener, *, partial_every_s: fl
         if not endpointer.speaking:
             partial, read_s = "", time_s
         elif time_s - read_s >= partial_every_s:
-            partial, read_s = listener.recogniser.draft(endpointer.so_far(), listener.vocabulary), time_s
+            partial, read_s = (
+                listener.recogniser.partial_transcript(endpointer.current_sound(), listener.vocabulary),
+                time_s,
+            )
         yield from (Hearing(time_s, level_db(block), False, finished=one) for one in ended if one is not None)
         yield Hearing(time_s, level_db(block), endpointer.speaking, partial)
     for utterance in endpointer.flush():
@@ -218,7 +221,7 @@ def follow(blocks: Iterable[Samples], listener: Listener, *, partial_every_s: fl
 
 
 def microphone_blocks(*, which: Callable[[str], str | None] = shutil.which) -> Generator[Samples, None, None]:
-    """The sound of the default microphone in blocks of 0.1 s, until it is closed; recorded by ALSA's `arecord`.
+    """Records the default microphone in blocks of 0.1 s until it is closed, with ALSA's `arecord`.
 
     Raises:
         InputError: `arecord` is not installed, or there is no microphone.
@@ -233,7 +236,7 @@ def microphone_blocks(*, which: Callable[[str], str | None] = shutil.which) -> G
             size = round(BLOCK_S * RATE_HZ) * 2
             while len(raw := recorder.stdout.read(size)) == size:
                 yield np.frombuffer(raw, "<i2").astype(np.float32) / 32768.0
-            told = " ".join(recorder.stderr.read().decode(errors="replace").split())
-            raise InputError(f"the microphone is not heard ({told})", hint="plug one in, or give a wav file")
+            errors = " ".join(recorder.stderr.read().decode(errors="replace").split())
+            raise InputError(f"the microphone is not heard ({errors})", hint="plug one in, or give a wav file")
         finally:
             recorder.terminate()

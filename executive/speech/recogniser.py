@@ -1,4 +1,4 @@
-"""What a recogniser of speech is to the rest: sound and the names that may be said go in, readings come out."""
+"""Interface of a speech recogniser: from sound and expected names to transcripts."""
 
 from __future__ import annotations
 
@@ -18,40 +18,40 @@ from skills.files.outside import read_text
 
 @dataclass(frozen=True)
 class Transcript:
-    """What may have been said, and its log likelihood given the sound (natural logarithm, of the whole text)."""
+    """Possible text of a sound, and its log likelihood given the sound (natural logarithm, of the whole text)."""
 
     text: str
     likelihood: float
 
 
 class Recognition(Protocol):
-    """One sound as it was recognised."""
+    """Recognition of one sound."""
 
     @property
     def transcripts(self) -> Sequence[Transcript]:
-        """The readings, likeliest first; none when nothing was said."""
+        """Readings, likeliest first; none when nothing was said."""
 
     def more(self) -> Iterator[Sequence[Transcript]]:
-        """The readings of further searches, each slower than the one before; each set has its likeliest first."""
+        """Yields the readings of further searches, each slower than the one before, with its likeliest first."""
 
-    def unprompted(self) -> str:
-        """What is heard when no names are expected, by a quick search; empty for nothing."""
+    def unprompted_text(self) -> str:
+        """Text of a quick search that expects no names; empty for no speech."""
 
     def likelihoods(self, texts: Sequence[str]) -> Sequence[float]:
-        """The log likelihood of each text given the sound, when no names are expected.
+        """Log likelihood of each text given the sound, when no names are expected.
 
         They can be compared with each other, not with those of `transcripts`.
         """
 
 
 class Recogniser(Protocol):
-    """Turns sound into text; the same sound and vocabulary give the same text."""
+    """Recogniser of speech; the same sound and vocabulary give the same text."""
 
     def transcribe(self, sound: Samples, vocabulary: Vocabulary) -> Recognition:
         """Recognises at most 30 s of sound at RATE_HZ."""
 
-    def draft(self, sound: Samples, vocabulary: Vocabulary) -> str:
-        """A quick first reading of a sentence that is still being spoken."""
+    def partial_transcript(self, sound: Samples, vocabulary: Vocabulary) -> str:
+        """Recognises a sentence under way, quickly."""
 
 
 _MOST_NAMES = 5_000
@@ -60,9 +60,9 @@ _MOST_LETTERS = 80
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """Names of things, places and people as they are spoken, the most usual last, and the robot's own name.
+    """Names of objects, places and people as they are spoken, the most usual last, and the robot's own name.
 
-    Without `robot_name` nobody need call the robot; `other_robots` are more that may be called.
+    Without `robot_name` nobody need call the robot; `other_robots` may be called as well.
     """
 
     names: tuple[str, ...] = ()
@@ -76,7 +76,7 @@ class Vocabulary:
 
     @property
     def prompt(self) -> str:
-        """What the recogniser is told was said before: the names, and the turns in which people ask."""
+        """Prompt of the recogniser: the names, and usual forms of requests."""
         call: tuple[str, ...] = _UNCALLED
         if self.robots:
             call = tuple(form.format(name) for form, name in zip(_CALLED, cycle(self.robots), strict=False))
@@ -90,7 +90,7 @@ class Vocabulary:
 
 
 def vocabulary_of_world(knowledge: Knowledge, *, called: bool) -> Vocabulary:
-    """All names of a world; `called` says whether the robot is to be called by its name."""
+    """Collects all names of a world; `called` says whether the speaker calls the robot by its name."""
     groups = (knowledge.surfaces, knowledge.places, knowledge.things, knowledge.people)
     aliases = [alias for group in groups for facts in group.values() for alias in facts.aliases]
     names = [name for group in groups for name in group]
@@ -100,7 +100,7 @@ def vocabulary_of_world(knowledge: Knowledge, *, called: bool) -> Vocabulary:
 
 
 def read_vocabulary(file: Path, robot_name: str | None) -> Vocabulary:
-    """The names in a text file, one on each line; empty lines are left out.
+    """Reads the names in a text file, one on each line; empty lines are ignored.
 
     Raises:
         InputError: it cannot be read, is no text, or holds more than 5000 names or one of more than 80 letters.
@@ -123,7 +123,7 @@ _HINT: Final = "install the extra that listens: pip install 'spot-errand[speech]
 
 
 def speech_module(name: str) -> ModuleType:
-    """The module of that name.
+    """Imports the module of that name.
 
     Raises:
         InputError: the extra `speech` is not installed.

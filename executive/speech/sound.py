@@ -1,4 +1,4 @@
-"""Sound as samples, what can be told of it without understanding it, and wav files of any rate, width and channels."""
+"""Sound as samples, its loudness, and wav files of any rate, width and channels."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _SILENT_LEVEL: Final = 1e-3
 
 @dataclass(frozen=True)
 class Loudness:
-    """How loud a sound is: its length in samples, its greatest sample (1 is full scale), and how many are clipped.
+    """Loudness of a sound: its length in samples, its greatest sample (1 is full scale), and the clipped samples.
 
-    A sample counts as clipped when it stands among at least three neighbours at full scale.
+    A sample counts as clipped when at least three neighbours are at full scale.
     """
 
     count: int = 0
@@ -40,7 +40,7 @@ class Loudness:
     clipped: int = 0
 
     def with_block(self, block: Samples) -> Loudness:
-        """The same for the sound so far and one more block of it, whatever its rate."""
+        """Loudness of the sound and one more block, of any rate."""
         if not block.size:
             return self
         height = np.abs(block)
@@ -50,46 +50,46 @@ class Loudness:
 
     @property
     def silent(self) -> bool:
-        """Returns whether nothing in it is louder than 60 dB below full scale."""
+        """Returns whether no sample is louder than 60 dB below full scale."""
         return self.peak < _SILENT_LEVEL
 
     @property
     def much_clipped(self) -> bool:
-        """Returns whether so many samples (one in 500) were cut off that words may be lost."""
+        """Returns whether so many samples (one in 500) are clipped that words may be lost."""
         return self.clipped > _MUCH_CLIPPED * self.count
 
 
 def level_db(block: Samples) -> float:
-    """The mean power of a block in decibels below full scale (0 is a full square wave), -100 at the least."""
+    """Mean power of a block in decibels below full scale (0 is a full square wave), -100 at the least."""
     power = float(np.mean(np.square(block))) if block.size else 0.0
     return max(10.0 * float(np.log10(max(power, 1e-10))), -100.0)
 
 
-def joined(blocks: Iterable[Samples]) -> Samples:
-    """The blocks one after another."""
+def concatenate(blocks: Iterable[Samples]) -> Samples:
+    """Concatenates blocks."""
     return np.concatenate([np.zeros(0, np.float32), *blocks])
 
 
 def _runs(flags: npt.NDArray[np.bool_]) -> int:
-    """How many flags stand in runs of at least _CLIP_RUN."""
+    """Number of flags in runs of at least _CLIP_RUN."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     lengths = edges[1::2] - edges[::2]
     return int(lengths[lengths >= _CLIP_RUN].sum())
 
 
 _OPEN_END: Final = 0x7FFF_F000
-"""From this size on the head says that its writer did not know it (recorders that write into a pipe)."""
+"""Size from which on the head's writer did not know it (recorders that write into a pipe)."""
 _HEAD_BYTES: Final = 44
 MOST_BYTES: Final = 8_000_000_000
 _RATES_HZ: Final = range(4_000, 384_001)
 _SAMPLE_BYTES: Final = {"PCM_U8": 1, "PCM_16": 2, "PCM_24": 3, "PCM_32": 4, "FLOAT": 4, "DOUBLE": 8}
 _CONTEXT: Final = 16
-"""How many samples at the lower rate a block is told of its neighbours when its rate is changed."""
+"""Samples of the neighbouring blocks, at the lower rate, that resampling of a block needs."""
 _HINT: Final = "save the recording as a plain wav file (PCM or float)"
 
 
 def read_wav(file: Path) -> Iterator[Samples]:
-    """The sound of a wav file at RATE_HZ, its channels averaged, in blocks of one second; the last one is shorter.
+    """Reads a wav file at RATE_HZ, its channels averaged, in blocks of one second; the last one is shorter.
 
     Only a few blocks are in memory at a time.
 
@@ -112,7 +112,7 @@ def read_wav(file: Path) -> Iterator[Samples]:
 
 
 def _blocks(file: Path, head: bytes, sound: SoundFile) -> Iterator[Samples]:
-    """One second after another, at the file's own rate."""
+    """Blocks of one second, at the file's own rate."""
     rate_hz, there_s = sound.samplerate, sound.frames / sound.samplerate
     if rate_hz not in _RATES_HZ:
         raise _error(file, f"{rate_hz} samples per second are not read", "record at 16 kHz in one channel")
@@ -120,8 +120,8 @@ def _blocks(file: Path, head: bytes, sound: SoundFile) -> Iterator[Samples]:
     missing = 0 if size >= _OPEN_END else size + 8 - file.stat().st_size
     if missing > 1:
         missing_s = missing / (rate_hz * sound.channels * _SAMPLE_BYTES.get(sound.subtype, 1))
-        told = f"it ends after {there_s:.1f} s, and its head says {there_s + missing_s:.1f} s"
-        raise _error(file, told, "copy the whole file, or record again")
+        what = f"it ends after {there_s:.1f} s, and its head says {there_s + missing_s:.1f} s"
+        raise _error(file, what, "copy the whole file, or record again")
     if sound.frames == 0:
         raise _error(file, "it holds no sound", "record again")
     for at_s, frames in enumerate(sound.blocks(rate_hz, dtype="float64", always_2d=True)):
@@ -129,12 +129,12 @@ def _blocks(file: Path, head: bytes, sound: SoundFile) -> Iterator[Samples]:
         bad = np.flatnonzero(~np.isfinite(block))
         if bad.size:
             where = at_s + bad[0] / rate_hz
-            raise _error(file, f"the sample at {where:.3f} s is no number", "record again, or export it anew")
+            raise _error(file, f"the sample at {where:.3f} s is no number", "record again, or export it again")
         yield np.asarray(np.clip(block, -1.0, 1.0), np.float32)
 
 
 def _unreadable(head: bytes, reason: str) -> tuple[str, str]:
-    """What is wrong with a file that is no sound, and the hint."""
+    """Message and hint for a file without sound."""
     if not head:
         return "the file is empty", "record again"
     if head[:4] == b"RIFF" and len(head) < _HEAD_BYTES:
@@ -147,7 +147,7 @@ def _error(file: Path, message: str, hint: str) -> InputError:
 
 
 def _resampled(blocks: Iterator[Samples], rate_hz: int) -> Generator[Samples, None, None]:
-    """The blocks of one second at RATE_HZ; each is filtered together with the ends of its neighbours."""
+    """Blocks of one second at RATE_HZ; each is filtered together with the ends of its neighbours."""
     if rate_hz == RATE_HZ:
         yield from blocks
         return

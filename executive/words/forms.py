@@ -1,4 +1,4 @@
-"""Models of mappings in a file, and unions of them that are told apart by their keys."""
+"""Models of mappings in a file, and unions of models that the keys distinguish."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from skills.files.errors import listing
 
 
 class Strict(BaseModel):
-    """A mapping without unknown keys, which never changes; code names its fields, files write their aliases."""
+    """Model of a mapping without unknown keys; immutable. Code uses the names of its fields, files their aliases."""
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True, defer_build=True
@@ -21,48 +21,48 @@ class Strict(BaseModel):
 
 
 def aliases(model: type[BaseModel]) -> dict[str, str]:
-    """The keys that a file gives a model, with the names of their fields."""
+    """Keys of a model in a file, with the names of their fields."""
     return {field.alias or name: name for name, field in model.model_fields.items()}
 
 
 @dataclass(frozen=True)
 class Forms:
-    """Models by the keys that tell them apart; several keys may tell of one model.
+    """Union of models, each distinguished by one or several keys.
 
-    `refused` says what is wrong with a mapping that has these of the keys, of which none or several tell of a model.
+    `refused` returns the message for a mapping whose keys select no model or several.
     """
 
     models: Mapping[str, type[Strict]]
     refused: Callable[[Sequence[str]], str]
 
     def read(self, data: Any) -> Any:
-        """The mapping as the model of its key. Raises ValueError: no key tells, or keys do not go together."""
+        """Reads a mapping as the model of its keys. Raises ValueError when they select none, or do not fit together."""
         kinds = tuple(dict.fromkeys(self.models.values()))
         if isinstance(data, kinds):
             return data
         if not isinstance(data, Mapping):
             return kinds[0].model_validate(data)
-        told = [key for key in self.models if data.get(key) is not None]
-        chosen = {self.models[key] for key in told}
+        found = [key for key in self.models if data.get(key) is not None]
+        chosen = {self.models[key] for key in found}
         if len(chosen) != 1:
             self._refuse_unknown(data)
-            raise ValueError(self.refused(told))
+            raise ValueError(self.refused(found))
         (model,) = chosen
-        return model.model_validate(self._fitting(data, told[0], model), by_alias=True, by_name=False)
+        return model.model_validate(self._fitting(data, found[0], model), by_alias=True, by_name=False)
 
     def _refuse_unknown(self, data: Mapping[Any, Any]) -> None:
-        """Raises ValidationError where some keys are those of no model."""
+        """Raises ValidationError for keys that no model has."""
         known = {key for model in self.models.values() for key in aliases(model)}
         unknown = [key for key in data if key not in known]
         if unknown and not any(key in self.models for key in data):
             faults = [InitErrorDetails(type="extra_forbidden", loc=(key,), input=data[key]) for key in unknown]
             raise ValidationError.from_exception_data("mapping", faults)
 
-    def _fitting(self, data: Mapping[Any, Any], told: str, model: type[Strict]) -> dict[Any, Any]:
-        """The keys without those of other models that have no value. Raises ValueError: keys that do not fit."""
+    def _fitting(self, data: Mapping[Any, Any], form: str, model: type[Strict]) -> dict[Any, Any]:
+        """Drops empty keys of other models. Raises ValueError for keys that do not fit together."""
         own, fitting = aliases(model), dict(data)
         for key in data:
-            users = [form for form, other in self.models.items() if key in aliases(other)]
+            users = [name for name, other in self.models.items() if key in aliases(other)]
             if key in own or not users:
                 continue
             if data[key] is not None:
@@ -70,5 +70,5 @@ class Forms:
             del fitting[key]
         for key, name in own.items():
             if model.model_fields[name].is_required() and data.get(key) is None:
-                raise ValueError(f"'{told}' needs '{key}' beside it")
+                raise ValueError(f"'{form}' needs '{key}' beside it")
         return fitting

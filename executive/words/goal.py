@@ -10,7 +10,7 @@ from executive.words.outlines import inside
 
 
 class GoalKind(enum.Enum):
-    """What must hold."""
+    """Kind of a goal condition."""
 
     GRASPED = "grasped"  # taken from a source region and lifted, and still held
     HANDED_OVER = "handed over"  # on the tray of a person, let go
@@ -22,7 +22,7 @@ class GoalKind(enum.Enum):
 
 
 class When(enum.Enum):
-    """At which times a condition must hold. The step ran from `began_s` to `ended_s`."""
+    """Times at which a goal condition must hold. The step ran from `began_s` to `ended_s`."""
 
     SOME_TIME = "at some time"  # once while the step ran
     END_OF_STEP = "at the end of the step"
@@ -32,10 +32,10 @@ class When(enum.Enum):
 
 @dataclass(frozen=True)
 class Region:
-    """A part of the world: an outline seen from above, (x, y) corners in order, and a range of heights (m).
+    """Part of the world: an outline seen from above, (x, y) corners in order, and a range of heights (m).
 
-    For an object its body origin counts, for a robot the origin of its body: a table of 0.75 m whose objects have their
-    origin between base and 0.25 m above it is the range 0.70 to 1.00.
+    An object lies in a region when its body origin does, a robot when the origin of its body does: a table of 0.75 m
+    whose objects have their origin between base and 0.25 m above it is the range 0.70 to 1.00.
     """
 
     name: str
@@ -57,17 +57,15 @@ class Region:
 class GoalCondition:
     """One goal condition.
 
-    `classes` are the object classes that fulfil it (none: any), `wanted` what they are called together (empty: the
-    classes) and `count` how many objects (0 counts as 1). `source` is where the objects were taken from (empty:
-    anywhere) or, for an answer, where the robot looked; an answer may count or miss what lies in `maybe`. `goal` is
-    where the objects or the robot go (any of the regions). `person` receives the object or, where the class is
-    "person", is asked for (None: anyone). `answer` is what was said, at `answered_s` (None: now). `robot` is the one
-    that acts (None: any).
+    `classes` are the object classes that fulfil it (none: any), `wanted` their common name (empty: the classes) and
+    `count` the number of objects (0 counts as 1). The robot takes the objects from `source` (empty: anywhere) or, for
+    an answer, looks there; an answer may count or miss objects in `maybe`. `goal` is the destination of the objects or
+    of the robot (any of the regions). `person` receives the object or, where the class is "person", is asked for (None:
+    anyone). `answer` is the answer that the robot gave at `answered_s` (None: now). `robot` must act (None: any).
 
     `when` says at which times it must hold. The step ran from `began_s` (None: since `since_s`) to `ended_s` (None: it
-    ends now). An object that must stay until the end of the mission may be lifted again within the intervals
-    `taken_s`: there a later step of the same mission takes it. What happened before `since_s` (simulated time) does
-    not count: it was another mission's doing.
+    ends now). A later step of the same mission may lift the objects again within the intervals `taken_s`. Events before
+    `since_s` (simulated time) belong to another mission and do not count.
     """
 
     kind: GoalKind
@@ -89,10 +87,10 @@ class GoalCondition:
 
     @property
     def from_s(self) -> float:
-        """When its step began."""
+        """Time when its step began."""
         return self.since_s if self.began_s is None else max(self.began_s, self.since_s)
 
     @property
     def needed(self) -> int:
-        """How many objects fulfil it."""
+        """Number of objects that fulfil it."""
         return max(1, self.count)

@@ -1,4 +1,4 @@
-"""What is known of a world: places, surfaces, objects and their usual places, people, and the robot's own places."""
+"""Knowledge of a world: places, surfaces, objects and their usual places, people, and the robot's own places."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from skills.perception.class_forms import PERSON, THING, class_forms
 from skills.quantities import Angle, Coordinate, Opening, Quantity, TopHeight
 
 ANYTHING: Final = "object"
-"""The name that stands for every class of objects."""
+"""Name that stands for every class of objects."""
 EVERYTHING: Final = "everything"
-"""The name that stands for all objects at a place, whatever they are."""
+"""Name that stands for all objects at a place, of any class."""
 ANYBODY: Final = PERSON
-"""The name that stands for any person at all."""
+"""Name that stands for any person."""
 _UNNAMED: Final = {
     **dict.fromkeys((ANYTHING, THING, "item", "anything", "something"), ANYTHING),
     EVERYTHING: EVERYTHING,
@@ -35,7 +35,7 @@ class _Facts(BaseModel):
 
 
 class Pose(_Facts):
-    """A planar pose in the world frame: x, y in metres, yaw in radians, counter-clockwise from x."""
+    """Planar pose in the world frame: x, y in metres, yaw in radians, counter-clockwise from x."""
 
     x: Coordinate = Field(description="metres")
     y: Coordinate = Field(description="metres")
@@ -43,7 +43,7 @@ class Pose(_Facts):
 
 
 class RobotFacts(_Facts):
-    """The robot: its name, the names of other robots that listen, and whether it must be called by name in writing."""
+    """Facts about the robot: its name, the names of others, and whether typed sentences must begin with its name."""
 
     name: Name = Field(description='as in "Hey Alice"')
     others: tuple[Name, ...] = Field(default=(), description="other robots: what is said to them is not for this one")
@@ -51,7 +51,7 @@ class RobotFacts(_Facts):
 
 
 class BatteryFacts(_Facts):
-    """When the robot goes to the dock and until when it charges there; states of charge from 0 to 1."""
+    """States of charge (0 to 1) at which the robot goes to the dock and leaves it."""
 
     low: Annotated[float, Quantity(ge=0.0, lt=1.0)] = Field(
         default=0.15, description="below this the mission is interrupted"
@@ -66,7 +66,7 @@ class BatteryFacts(_Facts):
 
 
 class Place(_Facts):
-    """A room: other names, where the robot stands to be in it, its outline (world frame, m)."""
+    """Room: other names, the pose of a robot in it, its outline (world frame, m)."""
 
     pose: Pose = Field(description="where the robot stands to be there")
     polygon: Polygon = Field(description="outline, corners (x, y)")
@@ -74,7 +74,7 @@ class Place(_Facts):
 
 
 class Door(_Facts):
-    """A narrow passage between two rooms: its middle (world frame, m) and clear width (m)."""
+    """Narrow passage between two rooms: its middle (world frame, m) and clear width (m)."""
 
     between: tuple[str, str] = Field(description="the rooms on its two sides")
     at: Corner = Field(description="its middle (x, y)")
@@ -82,7 +82,7 @@ class Door(_Facts):
 
 
 class SurfaceFacts(_Facts):
-    """A flat top in a room: other names, height above the floor (m), outline, and poses from which it is seen whole."""
+    """Flat top in a room: other names, height above the floor (m), outline, poses from which a robot sees it whole."""
 
     place: str = Field(description="the room that it is in")
     height: TopHeight = Field(description="of the top above the floor, m")
@@ -92,7 +92,7 @@ class SurfaceFacts(_Facts):
 
 
 class ObjectFacts(_Facts):
-    """A class of objects: other names, the categories it belongs to, the surfaces where it usually is."""
+    """Facts about a class of objects: other names, its categories, the surfaces where such objects usually are."""
 
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
     categories: tuple[Name, ...] = Field(default=(), description='as in "a drink"')
@@ -100,7 +100,7 @@ class ObjectFacts(_Facts):
 
 
 class Person(_Facts):
-    """Somebody: other names, the place where they usually are, and where exactly when that is known."""
+    """Person: other names, the usual place, and the exact pose when it is known."""
 
     at: str = Field(description="the place where they usually are")
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
@@ -108,7 +108,7 @@ class Person(_Facts):
 
 
 class Knowledge(_Facts):
-    """All that is known of one world. Names are matched without regard to case."""
+    """All knowledge of one world. Names match without regard to case."""
 
     robot: RobotFacts = Field(default=RobotFacts(name="Alice"), description="the robot")
     robots: RobotsFile | None = Field(
@@ -129,28 +129,28 @@ class Knowledge(_Facts):
     )
 
     def place(self, name: str) -> str | None:
-        """The room or surface that `name` means, by its own name; None when unknown."""
+        """Own name of the room or surface that `name` means; None when it is unknown."""
         return _resolve(name, self.places) or _resolve(name, self.surfaces)
 
     def room(self, place: str) -> str:
-        """The room in which a known place lies; a room lies in itself."""
+        """Room of a known place; a room is its own."""
         return self.surfaces[place].place if place in self.surfaces else place
 
     def surfaces_in(self, place: str) -> tuple[str, ...]:
-        """The surfaces of a room, in the file's order; a surface is its own only one."""
+        """Surfaces of a room, in the file's order; a surface is its own only one."""
         return tuple(name for name, surface in self.surfaces.items() if place in (name, surface.place))
 
     def place_pose(self, place: str) -> Pose:
-        """Where to stand for a known room (its pose) or surface (its first viewpoint)."""
+        """Pose of a robot at a known room (its pose) or surface (its first viewpoint)."""
         return self.surfaces[place].viewpoints[0] if place in self.surfaces else self.places[place].pose
 
     def object_name(self, name: str) -> str | None:
-        """The class or category that `name` means, by its own name; None when unknown."""
+        """Own name of the class or category that `name` means; None when it is unknown."""
         own = _resolve(name, self.things) or next((c for c in self.categories() if c.lower() == name.lower()), None)
         return own or _UNNAMED.get(name.lower())
 
     def classes(self, name: str) -> tuple[str, ...]:
-        """The classes that a class, alias or category stands for, in the file's order; empty when unknown."""
+        """Classes that a class, alias or category includes, in the file's order; empty when it is unknown."""
         known = _resolve(name, self.things)
         if known is None and self.object_name(name) in _UNNAMED:
             return tuple(self.things)
@@ -161,29 +161,29 @@ class Knowledge(_Facts):
         return tuple(dict.fromkeys(category for facts in self.things.values() for category in facts.categories))
 
     def usual_surfaces(self, name: str) -> tuple[str, ...]:
-        """Where objects of that class or category usually are, likeliest first."""
+        """Usual surfaces of objects of a class or category, the likeliest first."""
         return tuple(dict.fromkeys(place for c in self.classes(name) for place in self.things[c].usual))
 
     def person(self, name: str) -> str | None:
-        """The person that `name` means; None when unknown."""
+        """Own name of the person that `name` means; None when it is unknown."""
         return _resolve(name, self.people)
 
     def somebody(self, name: str) -> str | None:
-        """The person that `name` means, or `ANYBODY` for any; None when it means nobody."""
+        """Own name of the person that `name` means, `ANYBODY` for any person; None for any other name."""
         return self.person(name) or (ANYBODY if name.lower() == ANYBODY else None)
 
     def rooms_to_search(self, person: str, place: str | None) -> tuple[str, ...]:
-        """The rooms in which to look for a person: that of the place, or all, the one where they usually are first."""
+        """Rooms in which to look for a person: the room of the place, or all rooms, the person's usual room first."""
         if place is not None:
             return (self.room(place),)
         usual = (self.room(self.people[person].at),) if person in self.people else ()
         return tuple(dict.fromkeys((*usual, *self.places)))
 
     def default_place(self, task: Task | None, name: str) -> str | None:
-        """Where `task` is done to a thing or category when no place was said.
+        """Place for `task` on an object of a class or category when the speaker names no place.
 
-        The table of defaults answers first, by the task or else by grasp, and by the thing or else by its categories;
-        then the room where the thing usually is.
+        The table of defaults decides first, by the task or else by grasp, and by the class or else by its categories;
+        then the usual room of the objects.
         """
         words = [name, *(category for c in self.classes(name) for category in self.things[c].categories)]
         tables = [self.defaults.get(t.value, {}) for t in (task, Task.GRASP) if t is not None]
@@ -191,15 +191,15 @@ class Knowledge(_Facts):
         return said or next((self.room(surface) for surface in self.usual_surfaces(name)), None)
 
     def object_names(self) -> tuple[str, ...]:
-        """What can be asked for: classes, then categories."""
+        """Names of all objects: classes, then categories."""
         return (*self.things, *self.categories())
 
     def place_names(self) -> tuple[str, ...]:
-        """Where one can be sent: rooms, then surfaces."""
+        """Names of all places: rooms, then surfaces."""
         return (*self.places, *self.surfaces)
 
     def spellings(self, names: Iterable[str]) -> tuple[str, ...]:
-        """The names with all their aliases, for guessing what a misspelled one means."""
+        """Names with all their aliases, to guess the meaning of a misspelled name."""
         groups: tuple[Mapping[str, Place | SurfaceFacts | ObjectFacts | Person], ...]
         groups = (self.places, self.surfaces, self.things, self.people)
         aliases = {name: facts.aliases for group in groups for name, facts in group.items()}
@@ -220,14 +220,14 @@ def load_knowledge(path: Path | str) -> Knowledge:
     """Reads a world's `knowledge.yaml`.
 
     Raises:
-        InputError: with file, line and hint, for broken YAML, unknown or missing keys, wrong values, and names that
-            are used but nowhere defined or mean two things.
+        InputError: with file, line and hint, for broken YAML, unknown or missing keys, wrong values, and for names
+            that are not defined or mean two things.
     """
     return knowledge_of_source(read_yaml(path))
 
 
 def knowledge_of_source(source: YamlSource) -> Knowledge:
-    """The knowledge in a document that has been read. Raises InputError as `load_knowledge`."""
+    """Reads the knowledge of a parsed document. Raises InputError as `load_knowledge`."""
     knowledge = validate(Knowledge, source)
     for error in _cross_errors(knowledge, source):
         raise error
@@ -235,7 +235,7 @@ def knowledge_of_source(source: YamlSource) -> Knowledge:
 
 
 def _cross_errors(knowledge: Knowledge, source: YamlSource) -> Iterator[InputError]:
-    """Errors in what refers to something else in the file."""
+    """Errors in references from one part of the file to another."""
     tasks = [task.value for task in Task]
     for index, door in enumerate(knowledge.doors):
         for side, room in enumerate(door.between):
@@ -265,7 +265,7 @@ def _unless_known(
 
 
 def _doubles(knowledge: Knowledge, source: YamlSource) -> Iterator[InputError]:
-    """Names that mean two things of the same kind."""
+    """Errors for names that mean two things of the same kind."""
     for kinds in (("places", "surfaces"), ("things",), ("people",)):
         seen: dict[str, str] = {}
         for kind in kinds:

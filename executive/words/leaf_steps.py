@@ -1,4 +1,4 @@
-"""Steps that hold no others: commands, skills, used missions, and those that wait, check, charge, speak or set."""
+"""Steps without steps inside: commands, skills, used missions; waits, checks, charging, speech, and values."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ COMMAND_KEYS: Final = ("take", "to", "do", "object")
 
 
 def _named_goal(value: object) -> object:
-    """A goal is named; a pose belongs to the skill that takes one. Raises QuantityError."""
+    """Accepts the name of a goal; a pose belongs to a skill that takes one. Raises QuantityError."""
     if isinstance(value, list | dict):
         hint = "for a pose write 'skill: navigate' with 'with: {x: 1.0, y: 2.0, yaw: 1.57}', in metres and radians"
         raise QuantityError("should be the name of a place or person", hint)
@@ -43,7 +43,7 @@ _GIVES: Final = (
 
 
 class Say(Step):
-    """A sentence."""
+    """Step in English."""
 
     say: Text = Field(description="What to do, in English.")
     elsewhere: StrictBool | None = Field(default=None, description=_ELSEWHERE)
@@ -52,18 +52,18 @@ class Say(Step):
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """What the sentence means, once that is understood."""
+        """Commands that the sentence means, once it is understood."""
         return self._meaning
 
     def with_commands(self, commands: tuple[Command, ...]) -> Say:
-        """The same sentence, which means these commands."""
+        """Copies the step, with the commands that its sentence means."""
         copy = self.model_copy()
         copy._meaning = commands
         return copy
 
 
 class Do(Step):
-    """A command, by its parts."""
+    """Step of one command, given by its parts."""
 
     take: Text | None = Field(default=None, description="What is carried; a number may stand before it.")
     to: Goal | None = Field(default=None, description='The place or person, or "start", or "Robin at hall".')
@@ -81,14 +81,14 @@ class Do(Step):
         return self
 
     @classmethod
-    def of(cls, command: Command) -> Do:
-        """The step of a command, whose verb it remembers."""
+    def from_command(cls, command: Command) -> Do:
+        """Builds the step of a command, and keeps its verb."""
         step = cls.model_validate(parts_of_command(command))
         step.__dict__["command"] = command
         return step
 
     def with_command(self, command: Command) -> Do:
-        """The same step with another command."""
+        """Copies the step, with another command."""
         parts: Mapping[str, Any] = {**dict.fromkeys(COMMAND_KEYS), **parts_of_command(command), "do": command.task}
         copy = self.model_copy(update=parts)
         copy.__dict__["command"] = command
@@ -96,23 +96,23 @@ class Do(Step):
 
     @functools.cached_property
     def command(self) -> Command:
-        """The command. Raises ValueError: a part is no name."""
+        """Command of the step. Raises ValueError when a part is no name."""
         do = None if self.do is None else self.do.value
         return command_of_parts({"take": self.take, "to": self.to, "do": do, "object": self.object})
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """The one command."""
+        """The one command, as a tuple."""
         return (self.command,)
 
 
 def steps_of_commands(commands: Sequence[Command]) -> tuple[Do, ...]:
-    """A step for each command."""
-    return tuple(map(Do.of, commands))
+    """One step for each command."""
+    return tuple(map(Do.from_command, commands))
 
 
 class CallSkill(Step):
-    """A skill with its ports."""
+    """Step that calls a skill with its ports."""
 
     skill: Name = Field(description="The name of a registered skill.")
     values: Annotated[
@@ -123,12 +123,12 @@ class CallSkill(Step):
 
     @property
     def words(self) -> str:
-        """The skill's name."""
+        """Name of the skill."""
         return self.skill
 
 
 class UseMission(Step):
-    """Another mission file, which is done as a step."""
+    """Step that runs another mission file."""
 
     use: Name = Field(description="Another mission file, as seen from this file's folder.")
     values: Annotated[
@@ -139,32 +139,32 @@ class UseMission(Step):
 
     @property
     def mission(self) -> Any:
-        """The `Mission` of the file, once that is read."""
+        """`Mission` of the file, once it is read."""
         return self._mission
 
     def with_mission(self, mission: Any) -> UseMission:
-        """The same step with its mission."""
+        """Copies the step, with its mission."""
         copy = self.model_copy()
         copy._mission = mission
         return copy
 
     @property
     def inner_steps(self) -> tuple[Step, ...]:
-        """The mission's steps."""
+        """Steps of the mission."""
         return () if self._mission is None else (*self._mission.steps, *self._mission.framing_steps)
 
     @property
     def words(self) -> str:
-        """The mission's name."""
+        """Name of the mission."""
         return self.use if self._mission is None else str(self._mission.name)
 
 
 Clock = Annotated[str, BeforeValidator(clock_text)]
-"""A time of day."""
+"""Time of day."""
 
 
 class Awaited(Strict):
-    """What is waited for: one of a condition, a time and a time of day."""
+    """End of a wait: a condition, a time, or a time of day."""
 
     condition: Annotated[Condition | None, Field(alias="for", description="Wait until this holds.")] = None
     seconds: Duration | None = Field(default=None, description='So long: seconds, or "10 min".')
@@ -181,13 +181,13 @@ class Awaited(Strict):
 
     @property
     def until_clock_s(self) -> float:
-        """The time of day, in seconds after midnight; 0 where none is awaited."""
+        """Time of day in seconds after midnight; 0 where there is none."""
         hours, minutes = map(int, (self.until_clock or "00:00").split(":"))
         return 3600.0 * hours + 60.0 * minutes
 
 
 class Wait(Step):
-    """`wait`: for a condition, some time, or until a time of day."""
+    """`wait`: waits for a condition, some time, or until a time of day."""
 
     key: ClassVar[str] = "wait"
     awaited: Annotated[
@@ -196,24 +196,24 @@ class Wait(Step):
 
     @property
     def words(self) -> str:
-        """The condition in words, where it waits for one."""
+        """Name of the step, with its condition where it has one."""
         condition = self.awaited.condition
         return self.key if condition is None else f"wait until {condition}"
 
 
 class Answering(Step):
-    """A step whose answer later steps may read under a name."""
+    """Step whose answer later steps may read under a name."""
 
     gives: dict[str, Name] | None = Field(default=None, description=_GIVES)
 
     @property
     def answer_name(self) -> str | None:
-        """The name of its answer."""
+        """Name of its answer."""
         return (self.gives or {}).get("answer")
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """What it does not give."""
+        """Faults for outputs that the step does not have."""
         for wrong in (port for port in self.gives or () if port != "answer"):
             yield ("gives", wrong), f"it gives no '{wrong}'", "write {answer: NAME}"
 
@@ -228,12 +228,12 @@ class Check(Answering):
 
     @property
     def words(self) -> str:
-        """The condition in words."""
+        """Name of the step, with its condition."""
         return f"check whether {self.condition}"
 
 
 class Charging(Strict):
-    """How far to charge at the dock."""
+    """Level of charge at the dock."""
 
     level: Share | None = Field(
         default=None, description="The charge, from 0 to 1; by default as the knowledge file says."
@@ -241,7 +241,7 @@ class Charging(Strict):
 
 
 class Dock(Step):
-    """`dock`: go to the dock and charge."""
+    """`dock`: goes to the dock and charges."""
 
     key: ClassVar[str] = "dock"
     charging: Annotated[
@@ -256,7 +256,7 @@ class Dock(Step):
 
     @property
     def level(self) -> float | None:
-        """The charge, from 0 to 1; None: as the knowledge file says."""
+        """Level of charge from 0 to 1; None: the level of the knowledge file."""
         return self.charging.level
 
 
@@ -268,34 +268,34 @@ class Speak(Step):
 
     @property
     def text(self) -> Template:
-        """The text with its values. Raises ExpressionError."""
+        """Text with its expressions. Raises ExpressionError."""
         return Template(self.speak)
 
     @property
     def words(self) -> str:
-        """The text in quotes."""
+        """Text in quotes."""
         return f'speak "{self.speak}"'
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """A text that cannot be read."""
+        """Faults of a text that cannot be parsed."""
         yield from unreadable(("speak",), lambda: self.text)
 
 
 class Set(Step):
-    """`set`: values by name, worked out in order."""
+    """`set`: computes values by name, in order."""
 
     key: ClassVar[str] = "set"
     set: dict[Name, Scalar] = Field(description="Values by name: numbers, truths or expressions.")
 
     @property
     def values(self) -> Mapping[str, Expression]:
-        """The expression of each value. Raises ExpressionError."""
+        """Expression of each value. Raises ExpressionError."""
         return {name: _expression(value) for name, value in self.set.items()}
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """Names without a value, and values that cannot be read."""
+        """Faults for names without a value, and for values that cannot be parsed."""
         for name, value in self.set.items():
             if value is None:
                 yield ("set", name), f"'{name}' gets no value", "give a number, a truth or an expression"
@@ -303,5 +303,5 @@ class Set(Step):
 
 
 def _expression(value: Scalar) -> Expression:
-    """A value as an expression. Raises ExpressionError."""
+    """Expression of a value. Raises ExpressionError."""
     return Expression(value) if isinstance(value, str) else literal(0 if value is None else value)

@@ -1,4 +1,4 @@
-"""A mission, as a file writes it: what one robot does in one world, or each of several does."""
+"""Mission as a file writes it: the steps of one robot, or of each of several robots, in one world."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DEFAULT_WORLD: Final = "flat"
 
 
 class QuestionPolicy(enum.Enum):
-    """What becomes of a sentence that could mean several things."""
+    """Policy for a sentence that could mean several things."""
 
     ASK = "ask"  # somebody is asked where somebody is there; else the sentence is refused
     FIRST = "first"  # the likeliest meaning is taken
@@ -32,14 +32,14 @@ class QuestionPolicy(enum.Enum):
 
 
 class Stop(Strict):
-    """A waypoint at which the person stands for a while."""
+    """Waypoint at which a person stands for a while."""
 
     at: Corner | Name = Field(description="A point (x, y) in metres, or a place by its name.")
     pause: Delay = Field(default=0.0, description="How long the person stands there, in seconds.")
 
 
 class Route(Strict):
-    """A route on which a person walks, around walls and furniture."""
+    """Route of a walking person around walls and furniture."""
 
     waypoints: Annotated[tuple[Corner | Name | Stop, ...], Field(min_length=1)] = Field(
         description="Points (x, y) in metres or names of places, in order; the person begins at the first."
@@ -53,7 +53,7 @@ class Route(Strict):
 
 
 class LooseObject(Strict):
-    """An object that lies there at the beginning."""
+    """Object that lies on a surface at the beginning."""
 
     model: Name = Field(description="A class of objects, or the name of an imported model.")
     surfaces: Annotated[tuple[Name, ...], Field(min_length=1)] = Field(
@@ -62,7 +62,7 @@ class LooseObject(Strict):
 
 
 class Parameter(Strict):
-    """A parameter of a mission file."""
+    """Parameter of a mission file."""
 
     type: Literal["text", "number", "truth", "place", "object", "person"] | None = Field(
         default=None, description="What it is; a place, object or person is checked against the world."
@@ -73,7 +73,7 @@ class Parameter(Strict):
 
 
 def _short_parameter(value: object) -> object:
-    """A parameter may be declared by its default alone."""
+    """Expands a bare default to a parameter."""
     return value if isinstance(value, dict | Parameter) else {"default": value}
 
 
@@ -86,7 +86,7 @@ else:
 
 
 class _Whole(Placed):
-    """The policy of a mission, or of a robot's part of it."""
+    """Policy of a mission, or of a robot's part of it."""
 
     @field_validator("on_failure")
     @classmethod
@@ -104,7 +104,7 @@ class _Whole(Placed):
 
 
 class MissionPart(_Whole):
-    """What one of several robots does. Its policy, `always`, `while` and `when` replace those at the file's top."""
+    """Part of one of several robots. Its policy, `always`, `while` and `when` replace those at the file's top."""
 
     after: Name | Annotated[tuple[Name, ...], Field(min_length=1)] | None = Field(
         default=None, description="The robot, or the robots, whose parts must be done before this one begins."
@@ -121,13 +121,15 @@ class MissionPart(_Whole):
 
     @property
     def first(self) -> tuple[str, ...]:
-        """The robots whose parts must be done before."""
+        """Robots whose parts must be done before this one begins."""
         return (self.after,) if isinstance(self.after, str) else self.after or ()
 
 
 class Mission(_Whole):
-    """A mission in one world, for one robot or with a part for each of several. The policy keys at the top are for
-    the whole of it, or for each part."""
+    """Mission in one world, for one robot or with a part for each of several.
+
+    The policy at the top is for the whole mission, or for each part.
+    """
 
     model_config = ConfigDict(title="Errand mission")
 
@@ -185,7 +187,7 @@ class Mission(_Whole):
     @model_validator(mode="before")
     @classmethod
     def _steps_or_parts(cls, data: Any) -> Any:
-        """`parts` stand in the place of `steps`."""
+        """Accepts `parts` in place of `steps`."""
         if not isinstance(data, dict) or not data.keys() & {"steps", "parts"}:
             return data
         if (data.get("steps") is None) == (data.get("parts") is None):
@@ -193,8 +195,8 @@ class Mission(_Whole):
         return {"steps": None, **data}
 
     @classmethod
-    def of_steps(cls, steps: Sequence[Step], *, world: str, robot: str) -> Self:
-        """A mission without a file, named for its first command, or else for its first block."""
+    def from_steps(cls, steps: Sequence[Step], *, world: str, robot: str) -> Self:
+        """Builds a mission without a file, named after its first command, or else after its first block."""
         first = next((command for step in steps for each in step.walk() for command in each.commands), None)
         if first is None:
             name = type(steps[0]).__name__.lower() if steps else "do"
@@ -204,46 +206,46 @@ class Mission(_Whole):
 
     @property
     def document(self) -> YamlSource | None:
-        """The file's data and lines; None when it was not read from a file."""
+        """Data and lines of the file; None for a mission without a file."""
         return None if self._place is None else self._place.document
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Which name in a sentence was taken for which."""
+        """Notes on names in a sentence that were taken for known ones."""
         return self._notes
 
     @property
     def robot_name(self) -> str:
-        """The robot's name; empty where nobody has named it."""
+        """Name of the robot; empty where the mission names none."""
         return self.robot or ""
 
     @property
     def source(self) -> SourceLine | None:
-        """The line of its name; None when it was spoken."""
+        """Line of the mission's name; None for a mission without a file."""
         return None if self._place is None else self._place.line(("name",))
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """The commands of all steps, those of used missions included, in order."""
+        """Commands of all steps, used missions included, in order."""
         return tuple(command for step in self.walk() for command in step.commands)
 
     @property
     def framing_steps(self) -> tuple[Step, ...]:
-        """The steps that interrupt its own, and those that are done in the end."""
+        """Steps that interrupt the mission's own steps, and steps at its end."""
         return (*(step for each in self.when or () for step in each.steps), *self.always)
 
     @property
     def is_framed(self) -> bool:
-        """Returns whether something is watched while its steps run, or done in the end."""
+        """Returns whether the mission watches a condition, or has steps at its end."""
         return bool(self.always) or self.while_ is not None or self.when is not None
 
     def walk(self) -> Iterator[Step]:
-        """All steps in order; a step that holds others comes before them."""
+        """Yields all steps in order; a step with steps inside comes before them."""
         for step in (*self.steps, *self.framing_steps):
             yield from step.walk()
 
     def with_notes(self, notes: tuple[str, ...]) -> Self:
-        """The same mission with such notes."""
+        """Copies the mission, with other notes."""
         copy = self.model_copy()
         copy._notes = notes
         return copy

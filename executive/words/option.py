@@ -1,4 +1,4 @@
-"""Declares with a field how it is typed on the command line, so that each option has one place."""
+"""Command-line options, declared with the fields that they fill."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Option:
-    """How a field is typed on the command line; a number has the range of the field's quantity.
+    """Command-line option of a field; a number has the range of the field's quantity.
 
-    `name` is its option, by default the field's name; an `argument` has none. `read` makes the field's value of what is
-    typed, a value of the type `typed`; it raises InputError.
+    `name` is the option, by default the field's name; an `argument` has none. `read` converts the typed value, of type
+    `typed`, to the field's value; it raises InputError.
     """
 
     help: str

@@ -1,4 +1,4 @@
-"""Points and outlines in the plane."""
+"""Geometry of points and outlines in the plane."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Side:
-    """A side of an outline, and how far (m) something is off it."""
+    """Side of an outline, and its distance (m) from a line."""
 
     ends: tuple[Point, Point]
     off_m: float
@@ -30,19 +30,19 @@ def inside(polygon: Sequence[Point], point: Point) -> bool:
 
 
 def area_m2(polygon: Sequence[Point]) -> float:
-    """The area within the outline."""
+    """Area within the outline."""
     return float(_outline(tuple(polygon)).area)
 
 
 def distance_m(polygon: Sequence[Point], point: Point) -> float:
-    """How far (x, y) lies outside the outline; 0 within it."""
+    """Distance from (x, y) to the outline; 0 within it."""
     import shapely
 
     return float(shapely.distance(_outline(tuple(polygon)), shapely.Point(point)))
 
 
 def fits(outline: Sequence[Point], polygon: Sequence[Point], taken: Iterable[Sequence[Point]]) -> bool:
-    """Returns whether one outline lies within another, and meets none of those that are taken."""
+    """Returns whether an outline lies within a polygon and meets none of the `taken` outlines."""
     import shapely
 
     body = shapely.Polygon(outline)
@@ -50,25 +50,25 @@ def fits(outline: Sequence[Point], polygon: Sequence[Point], taken: Iterable[Seq
 
 
 def nearest_side(polygon: Sequence[Point], middle: Point, length_m: float) -> Side:
-    """The side of an outline along which a line of that length with that middle lies best: its ends are nearest."""
+    """Side of an outline that is nearest to both ends of a parallel line, given by its middle and length."""
     ends = zip(polygon, (*polygon[1:], polygon[0]), strict=True)
     return min((Side(pair, _ends_off_m(pair, middle, length_m)) for pair in ends), key=lambda side: side.off_m)
 
 
 def _ends_off_m(side: tuple[Point, Point], middle: Point, length_m: float) -> float:
-    """How far the ends of a line are from a side to which it is parallel, together."""
+    """Sum of the distances of both ends of a line from a side parallel to it."""
     import shapely
 
     (x0, y0), (x1, y1) = side
-    way_m = max(math.dist(*side), 1e-9)
-    dx, dy = (0.5 * length_m * (b - a) / way_m for a, b in ((x0, x1), (y0, y1)))
+    side_m = max(math.dist(*side), 1e-9)
+    dx, dy = (0.5 * length_m * (b - a) / side_m for a, b in ((x0, x1), (y0, y1)))
     ends = (middle[0] - dx, middle[1] - dy), (middle[0] + dx, middle[1] + dy)
     return sum(float(shapely.distance(shapely.LineString(side), shapely.Point(end))) for end in ends)
 
 
 @functools.lru_cache(maxsize=256)
 def _outline(polygon: tuple[Point, ...]) -> shapely.Polygon:
-    """The outline; rooms are asked for again and again while a mission is compiled."""
+    """Outline as a shapely polygon, cached since the compiler asks for rooms again and again."""
     import shapely
 
     return shapely.Polygon(polygon)

@@ -1,4 +1,4 @@
-"""Policies: under which limits, guards and further attempts a step or a mission runs, and what if it fails."""
+"""Policies: limits, guards and retries of a step or a mission, and the reaction to a failure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Objects = Annotated[int, Quantity(ge=0, le=10)]
 
 
 class StaleData(enum.Enum):
-    """What a condition makes of a reading that is older than it may be."""
+    """Policy for a reading that is older than it may be."""
 
     WAIT = "wait"  # stand still until there is a new one, and fail when the patience is over
     FAIL = "fail"  # count it as violated at once
@@ -24,7 +24,7 @@ class StaleData(enum.Enum):
 
 
 class OnFailure(enum.Enum):
-    """What to do when a step has failed and no retries are left."""
+    """Reaction to a failed step without retries left."""
 
     STOP = "stop"  # the mission fails
     RETRY = "retry"  # try again, once unless `retries` says otherwise, then stop
@@ -34,7 +34,7 @@ class OnFailure(enum.Enum):
 
 
 class Guards(Strict):
-    """What must hold while it runs; when it does not, the step fails."""
+    """Guards of a running step, which fails when one does not hold."""
 
     battery: Share | None = Field(default=None, description="The least charge of the battery, from 0 to 1.")
     localised: StrictBool | None = Field(default=None, description="Whether the robot must know where it is.")
@@ -53,7 +53,7 @@ class Guards(Strict):
 
 
 class OperatorQuestion(Strict):
-    """The question to the operator for `on_failure: ask`."""
+    """Question to the operator for `on_failure: ask`."""
 
     text: Text | None = Field(default=None, description="The question; by default it tells what failed and why.")
     limit_s: Annotated[
@@ -63,7 +63,7 @@ class OperatorQuestion(Strict):
 
 
 class Policy(Strict):
-    """How something runs."""
+    """Policy of a step or mission: timeout, retries, reaction to a failure, guards."""
 
     timeout_s: Annotated[
         Duration | None, Field(alias="timeout", description="Seconds on the robot's clock for each attempt.")
@@ -94,14 +94,14 @@ class Policy(Strict):
 
     @property
     def further_attempts(self) -> int:
-        """How many attempts follow one that failed."""
+        """Number of attempts after a failed one."""
         if self.retries is None:
             return int(self.on_failure is OnFailure.RETRY)
         return self.retries
 
     @property
     def is_empty(self) -> bool:
-        """Returns whether it asks for nothing."""
+        """Returns whether the policy changes nothing."""
         guards = self.guards or Guards()
         guarded = guards.battery is not None or guards.localised or guards.time_s is not None
         numbers = (self.timeout_s, self.pick_ups, self.move_aside)
@@ -109,7 +109,7 @@ class Policy(Strict):
         return stops and not guarded and not self.further_attempts and numbers == (None, None, None)
 
     def with_policy(self, below: Policy | None) -> Self:
-        """The same with what it leaves open taken from `below`."""
+        """Copies it, with its open values taken from `below`."""
         values: dict[str, Any] = {} if below is None else {key: getattr(below, key) for key in Policy.model_fields}
         return self.model_copy(
             update={key: value for key, value in values.items() if value is not None and getattr(self, key) is None}

@@ -1,4 +1,4 @@
-"""The robots of a run: their names, and for each its kind and where and with what it begins."""
+"""Robots of a run: their names, kinds, starts, docks and stacks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from skills.quantities import Angle, Coordinate, QuantityError, number_in
 from skills.robot import Pose2D
 
 EVERYBODY: Final = frozenset({"all", "both", "everybody", "everyone", "you", "all robots", "all of you"})
-"""Words that call all robots: none is the name of one."""
+"""Words that call all robots; no robot has one of them as its name."""
 _FORM: Final = "write NAME=KIND for each, for instance alice=spot,bob=fetch"
 _NAME: Final = re.compile(r"[^\W\d_][\w' .-]*")
 _ASSIGNED: Final = re.compile(r"([^=@,]*)=(.*)", re.DOTALL)
@@ -26,11 +26,11 @@ _NUMBER: Final = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?\s*", re.
 
 @dataclass(frozen=True)
 class RobotConfig:
-    """One robot of a run, by its name as people read it.
+    """Robot of a run.
 
     `kind` is a name of the entry-point group `errand.robots`; the robot begins at `start` (world frame), charges at the
-    place `dock` and uses the components of the file `stack`. What is None is as the world says, or the kind. A file
-    names it at `source`.
+    place `dock` and uses the components of the file `stack`. None stands for the world's value, or the kind's. `source`
+    is the line of a file that names the robot.
     """
 
     name: str
@@ -41,13 +41,13 @@ class RobotConfig:
     source: Annotated[SourceLine | None, Field(exclude=True)] = field(default=None, compare=False)
 
     def __str__(self) -> str:
-        """As the option `--robots` has it."""
+        """Text form of the option `--robots`."""
         at = "" if self.start is None else f"@{self.start.x_m!r},{self.start.y_m!r},{self.start.yaw_rad!r}"
         return f"{self.name}={self.kind}{at}"
 
 
 class NamedRobot(BaseModel):
-    """A robot of a run: its kind, and where and with what it begins."""
+    """Robot of a file: its kind, start, dock and stack."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
@@ -66,7 +66,7 @@ class NamedRobot(BaseModel):
 
 
 def _short_robot(value: object) -> Any:
-    """A robot may be named by its kind alone."""
+    """Expands a bare kind to a robot."""
     return {"kind": value} if isinstance(value, str) else value
 
 
@@ -74,35 +74,35 @@ RobotsFile = Annotated[
     dict[Name, Annotated[NamedRobot, BeforeValidator(_short_robot, json_schema_input_type=NamedRobot | Name)]],
     Field(min_length=1),
 ]
-"""Robots by name, each as its kind alone or with more."""
+"""Robots by name, each as its kind alone or with more keys."""
 
 
 def name_key(name: str) -> str:
-    """What two names of the same robot have in common: neither case nor signs between words count."""
+    """Normal form of a robot's name, without case and without signs between words."""
     return re.sub(r"[\W_]+", " ", name.casefold()).strip()
 
 
 def display_name(name: str) -> str:
-    """A robot's name as people read it: "alice" is Alice; capitals that are written stay."""
+    """Robot's name as people read it: "alice" is Alice; capitals stay."""
     return name[:1].upper() + name[1:]
 
 
-def robot_called(said: str, names: Iterable[str]) -> str | None:
-    """Which of the robots `names` is meant, as that name is written; None for no robot."""
+def find_robot(said: str, names: Iterable[str]) -> str | None:
+    """Finds the robot of that name among `names`, without regard to case and signs; None when there is none."""
     return next((name for name in names if name_key(name) == name_key(said)), None)
 
 
-def same_name(name: str, names: Iterable[str]) -> InputError | None:
-    """The error when `name` is one of `names`, or differs from it only in case or signs; None when it does not."""
-    other = robot_called(name, names)
+def name_clash(name: str, names: Iterable[str]) -> InputError | None:
+    """Error when `name` is one of `names`, or differs from it only in case or signs; None otherwise."""
+    other = find_robot(name, names)
     if other is None:
         return None
     what = f"two robots are called '{name}'" if other == name else f"'{other}' and '{name}' are the same name"
     return InputError(what, hint="give one of them another name")
 
 
-def checked_name(name: str) -> str:
-    """The name, if a robot can have it. Raises InputError."""
+def check_name(name: str) -> str:
+    """Returns the name if a robot can have it. Raises InputError."""
     if not name:
         raise InputError("a robot without a name", hint=_FORM)
     if not _NAME.fullmatch(name) or not name_key(name).strip():
@@ -112,8 +112,8 @@ def checked_name(name: str) -> str:
     return name
 
 
-def checked_kind(kind: str, kinds: Collection[str]) -> str:
-    """The kind, if it is one of those known. Raises InputError, which lists them and suggests the nearest."""
+def check_kind(kind: str, kinds: Collection[str]) -> str:
+    """Returns the kind if it is known. Raises InputError with the known kinds and the nearest one."""
     if kind not in kinds:
         known = known_names(kind, sorted(kinds))
         near = suggestion(kind, kinds, known)
@@ -122,43 +122,43 @@ def checked_kind(kind: str, kinds: Collection[str]) -> str:
 
 
 def parse_robots(text: str, kinds: Collection[str]) -> tuple[RobotConfig, ...]:
-    """The robots of the option `--robots`, in its order: "alice=spot,bob=fetch" or "alice=spot@1.0,2.0,1.57,bob=fetch".
+    """Parses the option `--robots`: "alice=spot,bob=fetch" or "alice=spot@1.0,2.0,1.57,bob=fetch".
 
     Raises:
-        InputError: there is none, two have one name, a name or start is none, or a kind is not among `kinds`.
+        InputError: there is no robot, two have one name, a name or start is invalid, or a kind is not among `kinds`.
     """
     robots: dict[str, RobotConfig] = {}
     for said in _entries(text):
         match = _ASSIGNED.fullmatch(said)
         if match is None:
             raise InputError(f"'{said.strip()[:60]}' gives no robot with its kind", hint=_FORM)
-        name, (kind, at, start) = checked_name(match[1].strip()), match[2].partition("@")
-        if (double := same_name(name, robots)) is not None:
+        name, (kind, at, start) = check_name(match[1].strip()), match[2].partition("@")
+        if (double := name_clash(name, robots)) is not None:
             raise double
-        checked_kind(kind.strip(), kinds)
+        check_kind(kind.strip(), kinds)
         try:
-            pose = pose_in(start.split(",")) if at else None
+            pose = parse_pose(start.split(",")) if at else None
         except QuantityError as error:
             raise InputError(f"'{start[:60]}' is no start for {name}: {error.what}", hint=error.hint) from None
         robots[name] = RobotConfig(display_name(name), kind.strip(), pose)
     return tuple(robots.values())
 
 
-def robots_in(
+def robots_of_file(
     robots: Mapping[str, NamedRobot], kinds: Collection[str], source: YamlSource | None
 ) -> tuple[RobotConfig, ...]:
-    """The robots that stand under `robots` in a file, in its order; their stacks are seen from its folder.
+    """Reads the robots under `robots` in a file, in its order; stack paths start from the file's folder.
 
     Raises:
-        InputError: with file and line: two have one name, a name is none, or a kind is not among `kinds`.
+        InputError: with file and line: two have one name, a name is invalid, or a kind is not among `kinds`.
     """
     found: dict[str, RobotConfig] = {}
     for name, robot in robots.items():
         line = None if source is None else SourceLine(source.path, source.line(("robots", name)))
         try:
-            if (double := same_name(checked_name(name), found)) is not None:
+            if (double := name_clash(check_name(name), found)) is not None:
                 raise double
-            checked_kind(robot.kind, kinds)
+            check_kind(robot.kind, kinds)
         except InputError as error:
             raise InputError.at(line, error.message, hint=error.hint) from error
         stack = None if robot.stack is None else Path(robot.stack)
@@ -173,8 +173,8 @@ def robots_in(
     return tuple(found.values())
 
 
-def pose_in(words: Sequence[str]) -> Pose2D:
-    """The pose of three words: x and y (m) and the heading (rad). Raises QuantityError: they are none."""
+def parse_pose(words: Sequence[str]) -> Pose2D:
+    """Parses three words as a pose: x and y (m) and the heading (rad). Raises QuantityError."""
     named = (("x", Coordinate), ("y", Coordinate), ("the heading", Angle))
     if len(words) != len(named):
         raise QuantityError(
@@ -190,7 +190,7 @@ def pose_in(words: Sequence[str]) -> Pose2D:
 
 
 def _entries(text: str) -> Iterator[str]:
-    """The parts of the option, one for each robot; the commas in a start separate none. Raises InputError: none."""
+    """Yields the part of the option for each robot; commas within a start separate none. Raises InputError."""
     if not text.strip(" ,"):
         raise InputError("no robots are named", hint=_FORM)
     entry = ""

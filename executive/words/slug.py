@@ -1,4 +1,4 @@
-"""Names as parts of path ids and of file names."""
+"""Slugs: names as parts of path ids and of file names."""
 
 import re
 import zlib
@@ -8,9 +8,9 @@ LONGEST_SLUG: Final = 80
 
 
 def slug(text: str) -> str:
-    """Text as one part of a path id or of a file's name: lower case, words joined by hyphens, no dots or slashes.
+    """Makes a text one part of a path id or file name: lower case, words joined by hyphens, no dots or slashes.
 
-    A long text is cut off and ends with its checksum, so that others with the same beginning differ from it.
+    A long text is cut off and ends with its checksum, so that texts with the same beginning stay different.
     """
     words = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "unnamed"
     if len(words) <= LONGEST_SLUG:

@@ -1,4 +1,4 @@
-"""A step of a mission: its policy, its place in the file, and what every kind of step can tell of itself."""
+"""Base of all steps of a mission: policy, place in the file, and common properties."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from skills.quantities import Number, Whole
 Given = str | StrictBool | Whole | Number
 Scalar = Given | None
 Fault = tuple[KeyPath, str, str]
-"""The path below a step to what is wrong with it, a sentence and a hint."""
+"""Path below a step to its fault, a sentence and a hint."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """The place of a step or a mission in a file: the document, and the path in it.
+    """Place of a step or a mission in a file: the document, and the path in it.
 
-    What does not stand in the `part` of one of several robots is looked for at the file's top.
+    Keys that the `part` of one of several robots does not have are looked up at the file's top.
     """
 
     document: YamlSource
@@ -33,11 +33,11 @@ class Place:
     part: bool = False
 
     def line(self, below: KeyPath = ()) -> SourceLine:
-        """The line of what stands at a path below."""
+        """Line of the value at a path below."""
         return SourceLine(self.document.path, self.document.line(self._whole(below)))
 
     def error(self, below: KeyPath, message: str, hint: str) -> InputError:
-        """An error in what stands at a path below."""
+        """Error in the value at a path below."""
         return self.document.error(self._whole(below), message, hint)
 
     def _whole(self, below: KeyPath) -> KeyPath:
@@ -46,64 +46,64 @@ class Place:
 
 
 class Placed(Policy):
-    """A step or a mission: its policy, and where it stands in a file."""
+    """Policy of a step or a mission, with its place in a file."""
 
     _place: Place | None = PrivateAttr(default=None)
 
     @property
     def place(self) -> Place | None:
-        """Where it stands in a file; None when it was spoken."""
+        """Place in a file; None without a file."""
         return self._place
 
     def error(self, below: KeyPath, message: str, hint: str) -> InputError:
-        """An error in what stands at a path below it, for instance ("world",)."""
+        """Error in the value at a path below it, for instance ("world",)."""
         return InputError(message, hint=hint) if self._place is None else self._place.error(below, message, hint)
 
     def with_place(self, place: Place | None) -> Self:
-        """The same, which stands at a place."""
+        """Copies it, with another place."""
         copy = self.model_copy()
         copy._place = place
         return copy
 
 
 class Step(Placed):
-    """A step: its policy, and what it is to do."""
+    """Step of a mission, with its policy."""
 
     key: ClassVar[str] = ""
-    """The first key of its form, which names it in path ids."""
+    """First key of its form, which names the step in path ids."""
 
     @property
     def source(self) -> SourceLine | None:
-        """The line where it stands; None when it was spoken."""
+        """Line of the step; None without a file."""
         return None if self._place is None else self._place.line()
 
     @property
     def is_block(self) -> bool:
-        """Returns whether it decides, repeats, waits or the like, and is no command, skill or mission."""
+        """Returns whether the step decides, repeats, waits or the like, and is no command, skill or mission."""
         return bool(self.key)
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """Its own commands."""
+        """Commands of the step itself."""
         return ()
 
     @property
     def inner_steps(self) -> tuple[Step, ...]:
-        """The steps that it holds, in the order of its fields."""
+        """Steps inside it, in the order of its fields."""
         return tuple(step for name in type(self).model_fields for step in _steps_in(getattr(self, name)))
 
     @property
     def words(self) -> str:
-        """What it is called in sentences."""
+        """Name of the step in sentences."""
         return self.key
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """What is wrong with its values by themselves."""
+        """Faults of its values by themselves."""
         yield from ()
 
     def walk(self) -> Iterator[Step]:
-        """Itself and all steps that it holds, those of a used mission included."""
+        """Yields the step and all steps inside it, those of a used mission included."""
         yield self
         for step in self.inner_steps:
             yield from step.walk()
@@ -118,7 +118,7 @@ def _steps_in(value: Any) -> Iterator[Step]:
 
 
 def unreadable(path: KeyPath, read: Callable[[], object]) -> Iterator[Fault]:
-    """What is wrong with an expression or a text with expressions."""
+    """Yields the fault of an expression, or of a text with expressions, that cannot be parsed."""
     try:
         read()
     except ExpressionError as error:

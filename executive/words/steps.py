@@ -1,7 +1,7 @@
-"""Steps of a mission, as a file writes them: those that hold others, and all kinds in one union.
+"""Steps with steps inside, and the union of all kinds of steps, as a mission file writes them.
 
-Each step is one model, told from the others by its first key. What has been read is the same model with its sentences
-understood and its names those of the world.
+The first key of a step selects its model. A resolved step is of the same model, with its sentences understood and its
+names replaced by those of the world.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ else:
     AnyStep = TypeAliasType("AnyStep", Annotated["_AnyStep", WrapValidator(lambda data, _: _read(data))])
     Steps = Annotated[tuple[AnyStep, ...], Field(min_length=1)]
     Branch = Annotated[Steps, WrapValidator(_none_is_empty, json_schema_input_type=Steps | None)]
-"""Steps in a row; a branch may have none."""
+"""Sequence of steps; a branch may be empty."""
 
 
 class Choose(Step):
-    """`if`: the steps of `then` when the condition holds, else those of `else`, which may be none."""
+    """`if`: runs the steps of `then` when the condition holds, otherwise those of `else`, which may be empty."""
 
     key: ClassVar[str] = "if"
     condition: Annotated[
@@ -67,12 +67,12 @@ class Choose(Step):
 
     @property
     def words(self) -> str:
-        """The condition in words."""
+        """Name of the step, with its condition."""
         return f"if {self.condition}"
 
 
 class Loop(Strict):
-    """Rounds of `steps`."""
+    """Rounds of a `repeat`: their number, interval and end."""
 
     times: Count | None = Field(default=None, description="How many rounds; with a condition, how many at most.")
     until: Condition | None = Field(default=None, description="Rounds are made until this holds after one.")
@@ -112,7 +112,7 @@ _ROUNDS: Final = "How often, and until when, `steps` are repeated."
 
 
 class Repeat(Step):
-    """`repeat`: rounds of the same steps."""
+    """`repeat`: repeats its steps in rounds."""
 
     key: ClassVar[str] = "repeat"
     loop: Annotated[Loop, Field(alias="repeat", description=_ROUNDS)]
@@ -120,7 +120,7 @@ class Repeat(Step):
 
 
 class ForEach(Step):
-    """`repeat` with `for_each`: its steps are read once for each value, which they name."""
+    """`repeat` with `for_each`: reads its steps once for each value, which they name."""
 
     key: ClassVar[str] = "repeat"
     loop: Annotated[Loop, Field(alias="repeat", description=_ROUNDS)]
@@ -128,13 +128,13 @@ class ForEach(Step):
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """No steps."""
+        """Fault of missing steps."""
         if not self.steps:
             yield (), "'repeat' needs 'steps' beside it", "add what is to be done in each round"
 
 
 class Try(Step):
-    """`try`: the steps in a row; as soon as one fails, those of `else` in their place."""
+    """`try`: runs the steps in order, and those of `else` as soon as one fails."""
 
     key: ClassVar[str] = "try"
     steps: Annotated[Steps, Field(alias="try", description="Steps; as soon as one fails, those of `else` are done.")]
@@ -148,7 +148,7 @@ class Try(Step):
 
 
 class Together(Step):
-    """`together`: all steps side by side; done when enough of them are, then the others are stopped."""
+    """`together`: runs all steps in parallel until enough of them are done, and stops the others."""
 
     key: ClassVar[str] = "together"
     if TYPE_CHECKING:
@@ -168,27 +168,27 @@ class Together(Step):
 
     @property
     def needed(self) -> int:
-        """How many steps must be done."""
+        """Number of steps that must be done."""
         if isinstance(self.done_when, int):
             return self.done_when
         return 1 if self.done_when == "any" else len(self.steps)
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """More steps that must be done than there are."""
+        """Fault of a number greater than that of the steps."""
         if self.needed > len(self.steps):
             what = f"{self.needed} of {len(self.steps)} steps cannot be done"
             yield ("done_when",), what, f"give {len(self.steps)} at most"
 
 
 class While(Strict):
-    """What must hold while steps run."""
+    """Condition that must hold while steps run."""
 
     holds: Condition = Field(description="When it does not hold, the steps are stopped and have failed.")
 
 
 class Handler(Strict):
-    """What interrupts a group or a mission."""
+    """Condition that interrupts a group or a mission, with the steps to run then."""
 
     condition: Annotated[
         Condition, Field(alias="if", description="When this begins to hold, the steps are interrupted.")
@@ -198,7 +198,7 @@ class Handler(Strict):
 
 
 class Group(Step):
-    """`group`: steps in a row that share a policy, and what is watched while they run and done in the end."""
+    """`group`: steps in order with a common policy, watched conditions, and steps at the end."""
 
     key: ClassVar[str] = "group"
     steps: Annotated[Steps, Field(alias="group", description="Steps in a row that share a policy.")]
@@ -214,17 +214,17 @@ class Group(Step):
 
     @property
     def inner_steps(self) -> Steps:
-        """The steps that interrupt it, its own, and those at the end."""
+        """Steps that interrupt the group, its own, and those at the end."""
         return (*(step for each in self.when or () for step in each.steps), *self.steps, *self.always)
 
     @property
     def words(self) -> str:
-        """Its name."""
+        """Name of the group."""
         return self.name or self.key
 
 
 def _choices(data: Any) -> Any:
-    """Choices may be a list of their names. Raises ValueError: one is true or false."""
+    """Expands a list of choices to a mapping. Raises ValueError when one is true or false."""
     names = list(data) if isinstance(data, list | dict) else []
     if any(isinstance(name, bool) for name in names):
         raise ValueError("yes, no, on and off mean true and false in YAML: put them in quotes")
@@ -242,10 +242,10 @@ else:
 
 
 class Ask(Answering):
-    """`ask`: puts a question to the people around, or to the operator.
+    """`ask`: asks the people around, or the operator.
 
-    The answer is one of `choices`, whose steps are then done; or, with `match`, a name of the world as people say it, a
-    number or any text. When nobody answers in time it is `default`; without one the step fails.
+    The answer is one of `choices`, whose steps then run; or, with `match`, a name of the world, a number or any text.
+    When nobody answers in time the answer is `default`; without one the step fails.
     """
 
     key: ClassVar[str] = "ask"
@@ -271,17 +271,17 @@ class Ask(Answering):
 
     @property
     def text(self) -> Template:
-        """The question with its values. Raises ExpressionError."""
+        """Question with its expressions. Raises ExpressionError."""
         return Template(self.ask)
 
     @property
     def words(self) -> str:
-        """The question in quotes."""
+        """Question in quotes."""
         return f'ask "{self.ask}"'
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """A default that is no choice, and choices that sound the same."""
+        """Faults of a default that is no choice, and of choices that sound the same."""
         choices = self.choices or {}
         if choices and self.default is not None and self.default not in choices:
             yield ("default",), f"'{self.default}' is none of the choices", f"they are {listing(choices)}"
@@ -303,17 +303,17 @@ _KEYS: Final[Mapping[str, type[Step]]] = MappingProxyType(
 )
 
 
-def _refused(told: Sequence[str]) -> str:
-    if not told:
+def _refused(keys: Sequence[str]) -> str:
+    if not keys:
         return f"the step is empty: give it {FORMS}"
-    return f"a step has either '{told[0]}' or {listing(told[1:])}, not both"
+    return f"a step has either '{keys[0]}' or {listing(keys[1:])}, not both"
 
 
 _FORMS: Final = Forms(_KEYS, _refused)
 
 
 def _read(data: Any) -> Any:
-    """A step of a file: `dock` may stand alone, and the steps of a `for_each` are read later, for each value."""
+    """Reads a step of a file; `dock` may stand alone, and the steps of a `for_each` are read later, for each value."""
     if data == "dock" or (isinstance(data, Mapping) and "dock" in data and data["dock"] is None):
         data = {**({} if data == "dock" else data), "dock": {}}
     if isinstance(data, ForEach):

@@ -1,4 +1,4 @@
-"""Variation of a world from run to run: light, clutter, people who walk about, friction."""
+"""Variations of a world from run to run: light, clutter, walking people, friction."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ NORMAL_LIGHT: Final = "normal"
 MOST_CLUTTER: Final = 40
 MOST_PEOPLE: Final = 8
 Brightness = Annotated[float, Quantity(ge=0.0, le=5.0)]
-"""1 is day light."""
+"""Factor of the brightness; 1 is day light."""
 Clutter = Annotated[int, Quantity(ge=0, le=MOST_CLUTTER)]
 MorePeople = Annotated[int, Quantity(ge=0, le=MOST_PEOPLE)]
 Friction = Annotated[float, Quantity(ge=0.05, le=5.0)]
-"""A factor; 1 is as usual."""
+"""Factor of the friction; 1 is normal."""
 
 
 @dataclass(frozen=True)
 class Light:
-    """A light, as it differs from the usual day light.
+    """Light of a world, as a change of the normal day light.
 
-    All beams are multiplied by `brightness` and have a `colour` (red, green, blue; 0 to 1). With a `sun` (direction in
-    which its beam goes, world frame, and intensity), that one comes on top.
+    `brightness` multiplies all beams, `colour` (red, green, blue; 0 to 1) tints them. A `sun` (direction of its beam,
+    world frame, and intensity) is added.
     """
 
     brightness: float = 1.0
@@ -45,11 +45,11 @@ LIGHTS: Final[Mapping[str, Light]] = MappingProxyType(
         "low sun": Light(0.5, sun=((0.95, 0.0, -0.31), 1.6)),
     }
 )
-"""The lights that have names."""
+"""Lights by name."""
 
 
-def light_called(words: str) -> Light:
-    """The light of a name, or of a brightness (0 to 5). Raises InputError: it is neither."""
+def parse_light(words: str) -> Light:
+    """Parses the name of a light, or a brightness (0 to 5). Raises InputError for any other text."""
     try:
         return LIGHTS[words] if words in LIGHTS else Light(number_in(words, Brightness))
     except QuantityError as error:
@@ -59,11 +59,11 @@ def light_called(words: str) -> Light:
 
 @dataclass(frozen=True)
 class Variation:
-    """A world's difference from what its files say.
+    """Change of a world from its files.
 
-    `light` is one of `LIGHTS` by name, or a brightness (1.0 is day light). `clutter` more objects lie about,
-    of classes that the mission does not ask for; `people` more people walk about; the friction of all loose objects
-    and of the robots is multiplied by `friction`.
+    `light` is one of `LIGHTS` by name, or a brightness (1.0 is day light). `clutter` adds objects of classes that the
+    mission does not ask for; `people` adds walking people; `friction` multiplies the friction of all loose objects and
+    of the robots.
 
     Raises:
         InputError: a value is out of range, or the light is unknown.
@@ -77,7 +77,7 @@ class Variation:
     friction: Annotated[Friction, Option("Multiplies the friction of loose objects and robots.")] = 1.0
 
     def __post_init__(self) -> None:
-        light_called(self.light)
+        parse_light(self.light)
         for name, kind in (("clutter", Clutter), ("people", MorePeople), ("friction", Friction)):
             try:
                 number_of(getattr(self, name), kind)
@@ -88,16 +88,16 @@ class Variation:
         return self != NO_VARIATION
 
     def lines(self) -> tuple[str, ...]:
-        """What is varied, one line each."""
+        """One line for each variation."""
         people = "1 person more walks about" if self.people == 1 else f"{self.people} people more walk about"
-        told = {
+        lines = {
             f"light: {self.light}": self.light != NORMAL_LIGHT,
             f"clutter: {self.clutter} objects more": self.clutter > 0,
             people: self.people > 0,
             f"friction: {self.friction:g} times": self.friction != 1.0,
         }
-        return tuple(words for words, varied in told.items() if varied)
+        return tuple(words for words, varied in lines.items() if varied)
 
 
 NO_VARIATION: Final = Variation()
-"""All is as the world's files say."""
+"""The world as its files describe it."""

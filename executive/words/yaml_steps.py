@@ -1,4 +1,4 @@
-"""Steps as lines and back: commands in their text form, else the YAML that a person would write."""
+"""Steps as lines of text and back: commands in their text form, other steps in YAML."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from skills.files.yaml_source import parse_yaml
 
 
 class _Document(Strict):
-    """Steps alone."""
+    """Document of steps alone."""
 
     steps: Steps
 
 
 def steps_to_data(steps: Iterable[Step]) -> list[Any]:
-    """The steps as the plain data of a mission file, without what goes without saying."""
+    """Converts steps to the plain data of a mission file, without default values."""
     return [_short(step.model_dump(mode="json", by_alias=True, exclude_defaults=True)) for step in steps]
 
 
 def steps_to_yaml(steps: Iterable[Step]) -> tuple[str, ...]:
-    """The lines of a mission file's `steps`; none where there are no steps."""
+    """Lines of a mission file's `steps`; none for no steps."""
     data = steps_to_data(steps)
     if not data:
         return ()
@@ -37,9 +37,9 @@ def steps_to_yaml(steps: Iterable[Step]) -> tuple[str, ...]:
 
 
 def lines_of_steps(steps: Sequence[Step]) -> tuple[str, ...]:
-    """What `steps_from_lines` reads: the commands where there are only such, else the steps in YAML.
+    """Lines that `steps_from_lines` reads: commands in their text form where all steps are commands, otherwise YAML.
 
-    Of a mission file, whose steps can be more than that, only the commands.
+    For the steps of a mission file, only the commands.
     """
     walked = [step for one in steps for step in one.walk()]
     if all(isinstance(step, Do) for step in walked) or any(step.source is not None for step in walked):
@@ -48,7 +48,7 @@ def lines_of_steps(steps: Sequence[Step]) -> tuple[str, ...]:
 
 
 def steps_from_lines(lines: Sequence[str]) -> Steps:
-    """The steps of commands in their text form, or of YAML. Raises ValueError: the lines are neither."""
+    """Parses commands in their text form, or steps in YAML. Raises ValueError for other lines."""
     try:
         return steps_of_commands(tuple(map(parse_command, lines)))
     except ValueError:
@@ -56,7 +56,7 @@ def steps_from_lines(lines: Sequence[str]) -> Steps:
 
 
 def steps_from_yaml(lines: Sequence[str]) -> Steps:
-    """The steps of such lines. Raises ValueError: they are none."""
+    """Parses steps in YAML. Raises ValueError for other lines."""
     try:
         data = parse_yaml("\n".join(lines), Path("steps")).data
     except InputError as error:
@@ -65,7 +65,7 @@ def steps_from_yaml(lines: Sequence[str]) -> Steps:
 
 
 def _short(value: Any) -> Any:
-    """Data without empty keys; an expression stands for itself, and a number of whole seconds has no point."""
+    """Drops empty keys; an expression stands for itself, and a whole number of seconds has no point."""
     if isinstance(value, list):
         return [_short(each) for each in value]
     if isinstance(value, float) and value.is_integer():

@@ -218,7 +218,7 @@ def _cycles_s(robots: int) -> list[float]:
 def _fetch(name: str) -> Any:
     script = Script(steps=STEPS_EACH, says=lambda skill, left: f"{skill}, {left} to go")
     registry = {skill: scripted_skill(script, skill, *ports) for skill, ports in PORTS.items()}
-    steps = tuple(Do.of(parse_command(text)) for text in FETCH)
+    steps = tuple(Do.from_command(parse_command(text)) for text in FETCH)
     knowledge = Knowledge.model_validate(KNOWLEDGE)
     return compile_mission(Mission(name="fetch", robot=name, steps=steps), knowledge=knowledge, registry=registry)
 

@@ -186,7 +186,7 @@ class Ran:
 
 def run_texts(simulation: Simulation, world: World, texts: Sequence[str], seed: int) -> Ran:
     """Run a mission of commands in their text form, timed and noted."""
-    steps = tuple(Do.of(parse_command(text)) for text in texts)
+    steps = tuple(Do.from_command(parse_command(text)) for text in texts)
     mission = Mission(name="trial", world=str(world.folder), robot=ROBOT, steps=steps)
     tree = compile_mission(mission, knowledge=knowledge_of(world), registry=built_in_skills())
     spot = LastSpot()

@@ -24,7 +24,7 @@ import numpy as np
 from executive.app.evaluate.evaluation_file import load_evaluation
 from executive.app.scenarios import read_scenario
 from executive.language.parser import load_parser
-from executive.mission.load import for_robot, load_mission, overridden
+from executive.mission.load import knowledge_of_mission, load_mission, mission_of_robot
 from executive.mission.resolve import mission_from_file
 from executive.mission.stack_file import load_stack
 from executive.testing.skill_test import load_skill_tests
@@ -104,8 +104,8 @@ def missions() -> Callable[[Path], None]:
 
     def compile_path(path: Path) -> None:
         loaded = load_mission(path)
-        knowledge = overridden(loaded, flat)
-        for part in [for_robot(loaded, name, name) for name in loaded.parts] if loaded.parts else [loaded]:
+        knowledge = knowledge_of_mission(loaded, flat)
+        for part in [mission_of_robot(loaded, name, name) for name in loaded.parts] if loaded.parts else [loaded]:
             mission = mission_from_file(part, parser=parser, knowledge=knowledge)
             compile_mission(mission, knowledge=knowledge, registry=skills)
 

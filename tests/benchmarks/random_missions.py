@@ -150,7 +150,7 @@ class MissionMaker:
             return Dock(charging=Charging(level=rng.choice([None, 0.5])))
         if kind == 6:
             return CallSkill(skill=rng.choice(SKILLS))
-        return Do.of(parse_command(rng.choice(COMMANDS)))
+        return Do.from_command(parse_command(rng.choice(COMMANDS)))
 
     def set(self) -> Step:
         """Values that get others."""
@@ -182,7 +182,7 @@ class MissionMaker:
         if kind == 3:
             return ButtonPressed(button=rng.choice(BUTTONS))
         if kind == 4 and not instant:
-            return Look.of(parse_command(rng.choice(LOOKS)))
+            return Look.from_command(parse_command(rng.choice(LOOKS)))
         if kind == 5 and not instant:
             return DoorOpen(door=("hall", "kitchen"))
         return ValueIs(text=rng.choice(TRUTHS))

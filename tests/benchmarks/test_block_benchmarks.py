@@ -43,7 +43,7 @@ def block(made, policy=None):
 
 
 def go(text):
-    return Do.of(parse_command(text))
+    return Do.from_command(parse_command(text))
 
 
 def wait(seconds=1000.0):

@@ -54,7 +54,7 @@ def test_parse_to_compiled_tree(benchmark):
 
     def compiled():
         meant = understand(SENTENCE, parser=parser, knowledge=knowledge, require_wake=True)
-        mission = Mission.of_steps(meant.all_steps, world="flat", robot="Alice")
+        mission = Mission.from_steps(meant.all_steps, world="flat", robot="Alice")
         return compile_mission(mission, knowledge=knowledge, registry=registry)
 
     assert benchmark(compiled).commands

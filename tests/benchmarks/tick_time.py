@@ -50,7 +50,7 @@ def fetch(steps_each, more=0):
     """The tree of a fetch, whose leaves drive for some ticks and say something new in each; `more` follow."""
     script = Script(steps=steps_each, says=lambda name, left: f"{name}, {left} to go")
     registry = {name: scripted_skill(script, name, *ports) for name, ports in PORTS.items()}
-    steps = tuple(Do.of(parse_command(text)) for text in FETCH * (1 + more))
+    steps = tuple(Do.from_command(parse_command(text)) for text in FETCH * (1 + more))
     knowledge = Knowledge.model_validate(KNOWLEDGE)
     return compile_mission(Mission(name="fetch", robot="Alice", steps=steps), knowledge=knowledge, registry=registry)
 

@@ -55,7 +55,7 @@ def shelf(tmp_path, monkeypatch):
 
 
 def test_the_beer_before_it_is_moved_aside_and_the_coke_is_taken(shelf):
-    steps = (Do.of(parse_command(f"Take [Nothing] to [{TAKEN}] and do [grasp] to [coke]")),)
+    steps = (Do.from_command(parse_command(f"Take [Nothing] to [{TAKEN}] and do [grasp] to [coke]")),)
     mission = Mission(name="shelf", world=str(shelf.folder), robot="Alice", steps=steps).with_policy(
         Policy(move_aside=1)
     )

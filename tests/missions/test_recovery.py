@@ -51,7 +51,7 @@ class FlatMission:
     def __init__(self, texts, *, seed=1, **plant: Any) -> None:
         self.world = open_world("flat")
         self.knowledge = knowledge_of(self.world)
-        steps = [Do.of(parse_command(text)) for text in texts]
+        steps = [Do.from_command(parse_command(text)) for text in texts]
         self.tree = compile_mission(
             Mission(name="m", robot="Alice", steps=tuple(steps)), knowledge=self.knowledge, registry=built_in_skills()
         )

@@ -15,7 +15,7 @@ from executive.app.mission_files import mission_file
 from executive.mission.request import Request
 from executive.mission.scenario import NO_SCENARIO, RandomFaults, Scenario
 from executive.mission.stack_file import stack_file
-from executive.words.robot_config import NamedRobot, RobotConfig, robots_in
+from executive.words.robot_config import NamedRobot, RobotConfig, robots_of_file
 from executive.words.slug import slug
 from executive.words.variation import (
     NORMAL_LIGHT,
@@ -24,7 +24,7 @@ from executive.words.variation import (
     Friction,
     MorePeople,
     Variation,
-    light_called,
+    parse_light,
 )
 from plant.robots.robot_kind import robot_kinds
 from skills.files.errors import InputError
@@ -145,7 +145,7 @@ class _Reader:
         fleets = [named] if isinstance(named, dict) else named
         kinds = [{name: NamedRobot.model_validate({"kind": kind}) for name, kind in each.items()} for each in fleets]
         try:
-            return [robots_in(each, robot_kinds(), None) for each in kinds]
+            return [robots_of_file(each, robot_kinds(), None) for each in kinds]
         except InputError as error:
             raise self.source.error(("robots",), error.message, error.hint) from error
 
@@ -189,7 +189,7 @@ class _Reader:
         """A light of the file by its name or its brightness. Raises InputError with the line: it is neither."""
         words = light if isinstance(light, str) else f"{light:g}"
         try:
-            light_called(words)
+            parse_light(words)
         except InputError as error:
             raise self.source.error(path, error.message, error.hint) from error
         return words

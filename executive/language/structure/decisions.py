@@ -343,7 +343,7 @@ class DecisionBuilder:
         said = speech_in(body[0].text, self.reader) if len(body) == 1 else None
         if said is None or said.text is None or said.to is not None or len(reading.commands) != 1:
             raise RefusalError("while I go somewhere I can only say something", [text_of(body)])
-        both = (Do.of(reading.commands[0]), Speak(speak=template(said.text)))
+        both = (Do.from_command(reading.commands[0]), Speak(speak=template(said.text)))
         self.put(row, Together(steps=both), reading.state)
 
     def modified(self, row: Row, clause: Clause, found: Clause) -> None:

@@ -222,7 +222,7 @@ class PlainReader:
 
     def seen(self, reading: PlainReading, state: State, before: State, text: str) -> Supposed:
         """The condition that what was looked for is there; `text` says it."""
-        looks = tuple(Look.of(command) for command in reading.commands if command.task is Task.FIND)
+        looks = tuple(Look.from_command(command) for command in reading.commands if command.task is Task.FIND)
         known = self._state_if_seen(reading, state)
         fails = replace(known, memory=replace(known.memory, where=None, told=before.memory.told))
         condition = looks[0] if len(looks) == 1 else AllOf(parts=looks)

@@ -122,7 +122,7 @@ def looked_at_by(reading: PlainReading, before: State, reader: PlainReader) -> L
     found = Command(goal=taken.goal, task=Task.FIND, object=taken.object, object_count=taken.object_count, verb="find")
     memory = replace(reading.state.memory, where=None, told=before.memory.told)
     fails = replace(reading.state, memory=memory, held=None, goal=None, at=None)
-    return LookedAt(Supposed(Look.of(found), "", reading.state, fails), looked=False, steps=len(commands))
+    return LookedAt(Supposed(Look.from_command(found), "", reading.state, fails), looked=False, steps=len(commands))
 
 
 def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
@@ -133,7 +133,7 @@ def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
     placed = re.search(r"\b(?:in|on|at|inside|near)\b", text, re.IGNORECASE)
     if taken is None or placed or not isinstance(look, Look) or look.command.object != taken.object:
         return supposed
-    there = Look.of(replace(look.command, goal=taken.goal))
+    there = Look.from_command(replace(look.command, goal=taken.goal))
     return replace(supposed, condition=Not(part=there) if isinstance(condition, Not) else there)
 
 

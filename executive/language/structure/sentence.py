@@ -254,7 +254,7 @@ class SentenceBuilder(DecisionBuilder):
             raise (refusal if said else plain) from None
         self.flush(row)
         found = supposed.condition
-        step = Do.of(found.command) if isinstance(found, Look) else Check(condition=found)
+        step = Do.from_command(found.command) if isinstance(found, Look) else Check(condition=found)
         self.put_done(row, ((step,), supposed.holds, supposed.notes))
         row.asked = LookedAt(supposed, looked=True)
         return at + 1

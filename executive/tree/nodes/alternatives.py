@@ -9,7 +9,7 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.mission.gripper import either
+from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.board import Board
@@ -73,7 +73,7 @@ def _try_plan(assembler: Assembler, block: model.Try, builder: PlanBuilder) -> A
     tried, after_tried = assembler.branch(block.steps, builder.at("try"), "try", flow)
     midway = flow.copy()
     if after_tried.held != flow.held:
-        midway.held, midway.opening = either(flow.held, after_tried.held), False
+        midway.held, midway.opening = held_after_either(flow.held, after_tried.held), False
     other, after_other = assembler.branch(block.otherwise, builder.at("else"), "else", midway)
     flow.join([after_tried, after_other])
     return Assembled((builder.node("try", "else the other", *tried.nodes, *other.nodes),), (*tried.parts, *other.parts))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Annotated, Final
 
-from executive.mission.gripper import after_command, is_same
+from executive.mission.gripper import held_after, is_same
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.goals import clearing_goals, command_goal, surfaces_to_search
 from executive.tree.node import NodeSpec
@@ -66,7 +66,7 @@ def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembl
     refuse_several(builder)
     refuse_everything(builder)
     node = _giving(assembler, step, _BY_TASK[command.task](builder), builder)
-    flow.held = after_command(command, held, knowledge)
+    flow.held = held_after(command, held, knowledge)
     lets_go = command.item is not None or command.task is Task.PLACE
     flow.opening = opening and command.task is not Task.GRASP and flow.held == held and not lets_go
     goal = command_goal(command, knowledge, _elsewhere(builder))
@@ -87,7 +87,7 @@ def _pair_plan(assembler: Assembler, builder: PlanBuilder, bring: Command) -> As
     flow.held, flow.opening = None, False
     parts = (
         StepPart(node.path_id, get, goal=goals[0], held=held, opening=opening),
-        StepPart(node.path_id, bring, goal=goals[1], held=after_command(get, held, knowledge), opening=False),
+        StepPart(node.path_id, bring, goal=goals[1], held=held_after(get, held, knowledge), opening=False),
     )
     return Assembled((node,), parts, used=2)
 

@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.mission.gripper import either
+from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.board import Board
@@ -148,7 +148,7 @@ def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> As
     flow = assembler.flow
     if flow.held != before.held and rounds.times != 1:
         flow.names = dict(before.names)
-        flow.held, flow.opening = either(before.held, flow.held), False
+        flow.held, flow.opening = held_after_either(before.held, flow.held), False
         body = assembler.row(block.steps, builder.at("round"), "round")
     if mode == "until" and condition is not None:
         decide, key, parts = decide_plan(assembler.flow, condition, builder.at("until"))
@@ -156,7 +156,7 @@ def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> As
     if mode == "while":
         assembler.flow.join([before, assembler.flow.copy()])
     elif assembler.flow.held != before.held:
-        assembler.flow.held = either(before.held, assembler.flow.held)
+        assembler.flow.held = held_after_either(before.held, assembler.flow.held)
     words = "" if condition is None else str(condition)
     often = f"{mode} {words}" if condition is not None else f"{rounds.times} times" if rounds.times else "for ever"
     every = f", every {rounds.every_s:g} s" if rounds.every_s else ""

@@ -68,7 +68,7 @@ class AskPeople(ExplainedLeaf):
         self._false_start = None
         self._until_s = self.context.clock.now() + self.limit_s
         try:
-            self._text = self.text.filled(self._view.values(self.keys))
+            self._text = self.text.fill(self._view.values(self.keys))
         except ExpressionError as error:
             self._false_start = Failed(Cause.PRECONDITION, f"{self.text.text}: {error.message}")
             return
@@ -148,7 +148,7 @@ def _as_text(value: Value) -> str:
 
 def _speak_plan(assembler: Assembler, block: Speak, builder: PlanBuilder) -> Assembled:
     if not block.text.names:
-        return Assembled((builder.skill("speak", {"text": block.text.filled({})}),))
+        return Assembled((builder.skill("speak", {"text": block.text.fill({})}),))
     assembler.check_template(block.text, builder)
     key = builder.key("text")
     fill = set_plan(assembler.flow, builder, {key: block.text}, {key: str}, "fill", "put the values in")

@@ -9,7 +9,7 @@ from typing import Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.mission.gripper import either
+from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.node import NodeSpec
@@ -78,7 +78,7 @@ def _plan(assembler: Assembler, block: model.Together, builder: PlanBuilder) -> 
             flow.names.update({name: named for name, named in after.names.items() if before.get(name) != named})
     moved = [after.held for after in afters if after.held != flow.held]
     if moved:
-        flow.held, flow.opening = (moved[0] if everything else either(flow.held, *moved)), False
+        flow.held, flow.opening = (moved[0] if everything else held_after_either(flow.held, *moved)), False
     name = "side by side" if everything else f"side by side, until {block.needed} of {len(block.steps)} are done"
     node = builder.node("together", name, *(each.nodes[0] for each in made), needed=block.needed)
     return Assembled((node,), tuple(part for each in made for part in each.parts))

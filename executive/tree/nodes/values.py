@@ -47,7 +47,7 @@ class SetValues(ExplainedLeaf):
         for key, each in self.values.items():
             try:
                 known = self.view.values(self.keys)
-                value = each.filled(known) if isinstance(each, Template) else each.value(known)
+                value = each.fill(known) if isinstance(each, Template) else each.value(known)
             except ExpressionError as error:
                 return self.fail(Failed(Cause.PRECONDITION, f"{each.text}: {error.message}"))
             self.context.board.put(key, float(value) if self.kinds[key] is float else value)

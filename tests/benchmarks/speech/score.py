@@ -26,7 +26,7 @@ import sentences
 import voices
 
 from executive.cli.listen_command import listener_for
-from executive.speech.sound import RATE_HZ, joined, read_wav
+from executive.speech.sound import RATE_HZ, concatenate, read_wav
 from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
 
@@ -109,8 +109,8 @@ def _noisy(clear: Sequence[Case], folder: Path, args: argparse.Namespace) -> lis
     draw = np.random.default_rng(args.seed)
     cases = []
     for number, (case, kind) in enumerate(zip(clear, cycle(NOISES), strict=False)):
-        speech = joined(read_wav(case.wav)).astype(float)
-        talkers = [joined(read_wav(clear[n].wav)) for n in draw.integers(len(clear), size=5)]
+        speech = concatenate(read_wav(case.wav)).astype(float)
+        talkers = [concatenate(read_wav(clear[n].wav)) for n in draw.integers(len(clear), size=5)]
         sounds = {
             "white": lambda count: noise.white(count, draw),
             "pink": lambda count: noise.pink(count, draw),
@@ -134,7 +134,7 @@ def _score(listener, cases: Sequence[Case], *, show: bool) -> tuple[Counter, flo
     counts, heard_s, spent_s = Counter(), 0.0, 0.0
     for case in cases:
         begun = time.perf_counter()
-        heard = listener.file(case.wav)
+        heard = listener.hear_file(case.wav)
         spent_s += time.perf_counter() - begun
         heard_s += heard.loudness.count / RATE_HZ
         right = tuple(map(str, heard.commands)) == case.said.commands

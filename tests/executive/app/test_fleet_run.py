@@ -134,7 +134,7 @@ class Fleet:
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
 
     def _docking(self, name):
-        step = Do.of(Command(task=Task.CHARGE))
+        step = Do.from_command(Command(task=Task.CHARGE))
         return self._prepared(Request(), Mission(name="charge", robot=name, steps=(step,)))
 
     def hold(self, skill):

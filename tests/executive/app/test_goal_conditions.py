@@ -99,7 +99,7 @@ def conditions_by(knowledge, registry, run_tree):
 
 
 def step(text, policy=SKIPPED):
-    return Do.of(parse_command(text)).with_policy(policy)
+    return Do.from_command(parse_command(text)).with_policy(policy)
 
 
 def test_a_step_that_was_skipped_has_no_condition(conditions_by, script):

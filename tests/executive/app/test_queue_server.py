@@ -339,7 +339,7 @@ def test_a_message_that_cannot_be_used_is_told_and_raises_nothing(calls, stand, 
     stand("topic mqtt:home/door")
     calls.heard("mqtt", "home/door", b"open!")
     calls.heard("mqtt", "elsewhere", b"")
-    monkeypatch.setattr("executive.app.queue_server.values_in_json", lambda text: 1 / 0)
+    monkeypatch.setattr("executive.app.queue_server.parse_json_values", lambda text: 1 / 0)
     calls.heard("mqtt", "home/door", b"")
     assert [line.split(";")[0] for line in lines] == [
         "topic mqtt:home/door: the values are no JSON object",

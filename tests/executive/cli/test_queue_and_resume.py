@@ -67,7 +67,7 @@ def first_leaf(tree):
 
 def corrected_to(goal, prepared, robot="Alice"):
     """A note of going elsewhere being under way."""
-    go = Mission.of_steps(steps_of_commands([Command(goal=goal)]), world="flat", robot=robot)
+    go = Mission.from_steps(steps_of_commands([Command(goal=goal)]), world="flat", robot=robot)
     other = compile_mission(
         go.model_copy(update={"name": f"go {goal} 2"}), knowledge=prepared.knowledge, registry=installed_skills()
     )

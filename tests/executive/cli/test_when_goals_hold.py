@@ -20,7 +20,7 @@ AT_END, AT_STEP = When.END_OF_MISSION, When.END_OF_STEP
 
 
 def step(text, **policy):
-    return Do.of(parse_command(text)).with_policy(Policy(**policy))
+    return Do.from_command(parse_command(text)).with_policy(Policy(**policy))
 
 
 def go(place, **policy):
@@ -29,7 +29,7 @@ def go(place, **policy):
 
 GET = step("Take [Nothing] to [kitchen] and do [grasp] to [coke]")
 PUT = step("Take [coke] to [bedroom] and do [Nothing] to [Nothing]")
-LOOK = Look.of(parse_command("Take [Nothing] to [kitchen] and do [find] to [coke]"))
+LOOK = Look.from_command(parse_command("Take [Nothing] to [kitchen] and do [find] to [coke]"))
 
 
 def block(made):

@@ -19,7 +19,7 @@ def speech(parser, knowledge, registry):
         return understand(text, parser=parser, knowledge=knowledge, require_wake=False, memory=memory)
 
     def compiled(steps, taken):
-        mission = Mission.of_steps(steps, world="test", robot="Alice")
+        mission = Mission.from_steps(steps, world="test", robot="Alice")
         number = 1 + sum(name.startswith(mission.name) for name in taken)
         named = mission if number == 1 else mission.model_copy(update={"name": f"{mission.name} {number}"})
         return compile_mission(named, knowledge=knowledge, registry=registry)

@@ -255,11 +255,11 @@ def compiling_talk(speech, control):
 
     def compiled(steps, taken):
         asked.append([step.words or str(step.command) for step in steps])
-        plain = [Do.of(Command(goal="hall"))]
+        plain = [Do.from_command(Command(goal="hall"))]
         return replace(speech.compile(plain, taken), steps=tuple(steps))
 
     conversation = Conversation(replace(speech, compile=compiled), control)
-    tree = speech.compile([Do.of(Command(goal="kitchen"))], frozenset())
+    tree = speech.compile([Do.from_command(Command(goal="kitchen"))], frozenset())
     control.begin({"Alice": tree})
     conversation.set_mission(tree)
     return conversation, asked

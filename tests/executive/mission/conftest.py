@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from executive.language.parser import load_parser
-from executive.mission.load import for_robot, load_mission, overridden
+from executive.mission.load import knowledge_of_mission, load_mission, mission_of_robot
 from executive.mission.resolve import mission_from_file
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
@@ -42,8 +42,8 @@ def compile_file(parser, flat, skills):
 
     def compile_path(path):
         loaded = load_mission(path)
-        knowledge = overridden(loaded, flat)
-        parts = [for_robot(loaded, name, name) for name in loaded.parts or ()] or [loaded]
+        knowledge = knowledge_of_mission(loaded, flat)
+        parts = [mission_of_robot(loaded, name, name) for name in loaded.parts or ()] or [loaded]
         missions = [mission_from_file(part, parser=parser, knowledge=knowledge) for part in parts]
         trees = [compile_mission(mission, knowledge=knowledge, registry=skills) for mission in missions]
         return trees[0]

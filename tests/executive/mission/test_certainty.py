@@ -18,7 +18,7 @@ def value(text: str) -> ValueIs:
     return ValueIs(text=text)
 
 
-LOOK = Look.of(Command(item=None, goal=None, task=Task.FIND, object=ObjectKind("beer")))
+LOOK = Look.from_command(Command(item=None, goal=None, task=Task.FIND, object=ObjectKind("beer")))
 
 
 @pytest.mark.parametrize(

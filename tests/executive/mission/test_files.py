@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.mission.load import load_mission, overridden
+from executive.mission.load import knowledge_of_mission, load_mission
 from executive.mission.resolve import MAX_DEPTH, MAX_STEPS, mission_from_file
 from executive.tree.board import Constant, FromBoard
 from skills.files.errors import InputError
@@ -142,11 +142,11 @@ def test_knowledge_of_the_file_is_laid_over_the_worlds(tmp_path, parser, flat):
         "name: m\nknowledge:\n  people: {Sam: {at: office, aliases: [the boss]}}\n  things: {coke: {usual: [desk]}}\n"
         "steps:\n  - {to: the boss}\n"
     )
-    knowledge = overridden(load_mission(path), flat)
+    knowledge = knowledge_of_mission(load_mission(path), flat)
     assert (knowledge.people["Sam"].at, knowledge.things["coke"].usual) == ("office", ("desk",))
     assert knowledge.things["coke"].categories == ("drink",)
-    assert overridden(load_mission(path), knowledge) == knowledge
-    own = overridden(load_mission(path), flat)
+    assert knowledge_of_mission(load_mission(path), knowledge) == knowledge
+    own = knowledge_of_mission(load_mission(path), flat)
     assert mission_from_file(path, parser=parser, knowledge=own).commands[0].goal == "Sam"
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from executive.language.parser import load_parser
 from executive.language.understand import understand
-from executive.mission.load import load_mission, overridden
+from executive.mission.load import knowledge_of_mission, load_mission
 from executive.mission.resolve import mission_from_file
 from executive.words.command import Command, parse_command
 from executive.words.knowledge import load_knowledge
@@ -160,7 +160,7 @@ def spoken(parser, knowledge):
 
     def mission(sentence):
         meant = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
-        return Mission.of_steps(meant.all_steps, world="flat", robot="Alice")
+        return Mission.from_steps(meant.all_steps, world="flat", robot="Alice")
 
     return mission
 
@@ -177,7 +177,7 @@ def test_a_sentence_becomes_a_mission(spoken):
 
 def test_commands_become_a_mission_named_for_the_first():
     command = parse_command("Take [Nothing] to [hall] and do [Nothing] to [Nothing]")
-    assert Mission.of_steps(steps_of_commands([command]), world="flat", robot="Alice").name == "do hall"
+    assert Mission.from_steps(steps_of_commands([command]), world="flat", robot="Alice").name == "do hall"
 
 
 STRUCTURED = "if there is a beer in the kitchen bring it, otherwise wait until half past two"
@@ -201,7 +201,7 @@ def test_what_a_sentence_asks_for_comes_back_from_its_lines(spoken, sentence):
 
 def test_of_a_file_only_the_commands_are_lines():
     place = Place(YamlSource(Path("mission.yaml"), None, {}, first_line=3), ())
-    step = Do.of(Command(goal="hall")).with_place(place)
+    step = Do.from_command(Command(goal="hall")).with_place(place)
     assert lines_of_steps((Repeat(loop=Loop(times=2), steps=(step,)).with_place(place),)) == (str(step.commands[0]),)
 
 
@@ -214,7 +214,7 @@ MISSIONS = [
 def test_the_missions_that_come_with_it_load_in_their_world(path, parser):
     worlds = Path(__file__).parents[3] / "plant" / "worlds"
     file = load_mission(path)
-    knowledge = overridden(file, load_knowledge(worlds / file.world / "knowledge.yaml"))
+    knowledge = knowledge_of_mission(file, load_knowledge(worlds / file.world / "knowledge.yaml"))
     mission = mission_from_file(file, parser=parser, knowledge=knowledge)
     assert mission.steps
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.mission.load import for_robot, load_mission, overridden
+from executive.mission.load import knowledge_of_mission, load_mission, mission_of_robot
 from executive.mission.resolve import mission_from_file
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
@@ -58,8 +58,8 @@ def run_mission(parser, flat, skills, run_tree, script, missions, make):
 
     def run_file(name, part=None):
         loaded = load_mission(next(path for path in missions if path.stem == name))
-        loaded = loaded if part is None else for_robot(loaded, "Alice", part)
-        knowledge = overridden(loaded, flat)
+        loaded = loaded if part is None else mission_of_robot(loaded, "Alice", part)
+        knowledge = knowledge_of_mission(loaded, flat)
         mission = mission_from_file(loaded, parser=parser, knowledge=knowledge)
         return run_tree(compile_mission(mission, knowledge=knowledge, registry=registry)).robots[0]
 

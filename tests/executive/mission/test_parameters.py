@@ -3,7 +3,7 @@
 import pytest
 
 from executive.mission.load import load_mission
-from executive.mission.parameters import given_values
+from executive.mission.parameters import parse_values
 from executive.mission.resolve import mission_from_file
 from skills.files.errors import InputError
 
@@ -26,7 +26,7 @@ def resolved(parser, flat, tmp_path):
 
     def of(*settings, text=FILE):
         (tmp_path / "mission.yaml").write_text(text, encoding="utf-8")
-        loaded = load_mission(tmp_path / "mission.yaml", given_values(settings))
+        loaded = load_mission(tmp_path / "mission.yaml", parse_values(settings))
         return mission_from_file(loaded, parser=parser, knowledge=flat)
 
     return of
@@ -86,9 +86,9 @@ def test_an_unknown_type_is_refused_in_its_line(resolved):
 )
 def test_a_setting_that_is_no_plain_value_is_refused(setting, says):
     with pytest.raises(InputError, match=says):
-        given_values([setting])
+        parse_values([setting])
 
 
 @pytest.mark.parametrize(("setting", "value"), [("t=14:30", "14:30"), ("n=010", "010"), ("n=1e3", 1000.0), ("n=3", 3)])
 def test_a_setting_has_the_type_that_people_mean(setting, value):
-    assert list(given_values([setting]).values()) == [value]
+    assert list(parse_values([setting]).values()) == [value]

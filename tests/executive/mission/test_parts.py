@@ -2,9 +2,9 @@
 
 import pytest
 
-from executive.mission.load import for_robot, load_mission, overridden
+from executive.mission.load import knowledge_of_mission, load_mission, mission_of_robot
 from executive.mission.resolve import mission_from_file
-from executive.words.robot_config import RobotConfig, robots_in
+from executive.words.robot_config import RobotConfig, robots_of_file
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
@@ -48,14 +48,16 @@ def part(load, parser, flat):
     """The mission of one robot."""
 
     def of(name, text=FILE, **given):
-        return mission_from_file(for_robot(load(text, **given), name.title(), name), parser=parser, knowledge=flat)
+        return mission_from_file(
+            mission_of_robot(load(text, **given), name.title(), name), parser=parser, knowledge=flat
+        )
 
     return of
 
 
 def test_robots_stand_in_the_file_with_what_they_begin_with(load, tmp_path):
     loaded = load()
-    alice, bob = robots_in(loaded.robots, KINDS, loaded.document)
+    alice, bob = robots_of_file(loaded.robots, KINDS, loaded.document)
     own = RobotConfig("Bob", "fetch", Pose2D(1.0, 2.5, 0.0), "office", tmp_path / "own.yaml")
     assert (alice, bob) == (RobotConfig("Alice", "spot"), own)
     assert (bob.source.file.name, bob.source.line) == ("mission.yaml", 4)
@@ -114,7 +116,7 @@ NAMED = [
 def test_robots_that_cannot_be_are_refused_with_their_line(load, robots, line, words):
     loaded = load(f"name: x\nrobots:\n  {robots}\nsteps: [{{to: hall}}]\n")
     with pytest.raises(InputError) as error:
-        robots_in(loaded.robots, KINDS, loaded.document)
+        robots_of_file(loaded.robots, KINDS, loaded.document)
     assert (error.value.line, words in str(error.value)) == (line, True), str(error.value)
 
 
@@ -126,4 +128,4 @@ def test_a_file_with_parts_is_no_mission_for_one_robot(load, parser, flat):
 def test_the_robots_do_not_stand_in_the_knowledge(load, flat):
     loaded = load("name: x\nknowledge: {robots: {alice: spot}}\nsteps: [{to: hall}]\n")
     with pytest.raises(InputError, match="write 'robots' at the top"):
-        overridden(loaded, flat)
+        knowledge_of_mission(loaded, flat)

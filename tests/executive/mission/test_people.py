@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.mission.load import load_mission, routes_in
+from executive.mission.load import load_mission, routes_of_people
 from skills.files.errors import InputError
 
 WALKS = """\
@@ -27,7 +27,7 @@ def loaded(tmp_path, text):
 
 
 def test_places_become_points_by_any_of_their_names(tmp_path, flat):
-    routes = routes_in(loaded(tmp_path, WALKS), flat)
+    routes = routes_of_people(loaded(tmp_path, WALKS), flat)
     counter = flat.place_pose("kitchen counter")
     assert routes["Robin"].model_dump() == {
         "waypoints": (
@@ -44,12 +44,12 @@ def test_places_become_points_by_any_of_their_names(tmp_path, flat):
 
 
 def test_a_mission_without_people_has_no_routes(tmp_path, flat):
-    assert routes_in(loaded(tmp_path, "name: alone\nsteps: [{to: kitchen}]\n"), flat) == {}
+    assert routes_of_people(loaded(tmp_path, "name: alone\nsteps: [{to: kitchen}]\n"), flat) == {}
 
 
 def test_a_place_that_nobody_knows_is_refused_at_its_line(tmp_path, flat):
     with pytest.raises(InputError, match="unknown place 'kitchn'") as error:
-        routes_in(loaded(tmp_path, WALKS.replace("[kitchen,", "[kitchn,")), flat)
+        routes_of_people(loaded(tmp_path, WALKS.replace("[kitchen,", "[kitchn,")), flat)
     assert (error.value.line, error.value.hint) == (4, "did you mean 'kitchen'?")
 
 

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from executive.mission.request import Request, start_in
+from executive.mission.request import Request, parse_start
 from executive.words.robot_config import RobotConfig
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
 
 def test_a_start_is_a_pose_or_unknown():
-    assert (start_in("1.25 -3 0.1"), start_in("unknown")) == (Pose2D(1.25, -3.0, 0.1), "unknown")
+    assert (parse_start("1.25 -3 0.1"), parse_start("unknown")) == (Pose2D(1.25, -3.0, 0.1), "unknown")
 
 
 def test_from_anywhere_the_stacks_of_robots_are_found(tmp_path, monkeypatch):
@@ -30,5 +30,5 @@ def test_from_anywhere_the_stacks_of_robots_are_found(tmp_path, monkeypatch):
 @pytest.mark.parametrize("text", ["", "nowhere", "1 2", "1 2 3 4", "1 2 nan", "1 2 x"])
 def test_what_is_no_start_is_refused_with_a_hint(text):
     with pytest.raises(InputError, match="--start") as error:
-        start_in(text)
+        parse_start(text)
     assert error.value.hint

@@ -64,7 +64,7 @@ def moving_skill(skill_name, inputs, outputs_):
 @pytest.fixture
 def mission(make, knowledge):
     registry = {name: moving_skill(name, *ports) for name, ports in make.PORTS.items()}
-    steps = [Do.of(parse_command(text)) for text in make.FETCH]
+    steps = [Do.from_command(parse_command(text)) for text in make.FETCH]
     return compile_mission(
         Mission(name="fetch drink", robot="Alice", steps=tuple(steps)), knowledge=knowledge, registry=registry
     )

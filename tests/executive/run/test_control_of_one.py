@@ -46,7 +46,9 @@ def control():
 def run_pair(clock, knowledge, registry, make, control):
     def runner(observe=None, *, after=(), time_limit_s=1200.0, step=None):
         log, robots = [], {name: make.ScriptedRobot(clock, name) for name in ("Alice", "Bob")}
-        missions = {name: Mission(name="go", robot=name, steps=(step or Do.of(parse_command(GO)),)) for name in robots}
+        missions = {
+            name: Mission(name="go", robot=name, steps=(step or Do.from_command(parse_command(GO)),)) for name in robots
+        }
         trees = {n: compile_mission(m, knowledge=knowledge, registry=registry) for n, m in missions.items()}
         entries = [
             RunEntry(
@@ -161,7 +163,7 @@ def test_a_stopped_robot_does_not_even_do_what_missions_do_in_the_end(run_pair, 
         control.stop_button("too near", robot="Bob")
         control.cancel("enough")
 
-    going = Do.of(parse_command(GO))
+    going = Do.from_command(parse_command(GO))
     pair = run_pair(at({2: stop_and_cancel}), step=Group(steps=(going,), always=(going,)))
     assert set(pair.outcomes().values()) == {Outcome.CANCELLED}
     drives = {name: robot.calls.count("drive") for name, robot in pair.robots.items()}

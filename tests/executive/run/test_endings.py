@@ -186,7 +186,7 @@ def test_a_mission_in_between_that_is_cancelled_does_its_own_and_that_of_the_one
 
 
 def test_where_a_command_is_cancelled_the_end_begins_at_once(go, control):
-    drive = Do.of(parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"))
+    drive = Do.from_command(parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"))
     _, begun = go(group(drive, always=[skill("relocalise")]), act=cancels(control, 2))
     assert begun == ["navigate", "relocalise"]
 

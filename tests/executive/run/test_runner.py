@@ -257,7 +257,7 @@ def test_overruns_are_counted(compiled, run_tree, make, script, published):
 @pytest.fixture
 def run_two(make, knowledge, registry, clock, published):
     """Runs a mission to the bedroom by Alice and Bob; `after` says who waits for whom."""
-    steps = (Do.of(parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")),)
+    steps = (Do.from_command(parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")),)
 
     def run_them(**after):
         entries = [

@@ -43,7 +43,7 @@ class ScriptedRecognition:
         """The readings of one further search."""
         yield self.wider
 
-    def unprompted(self) -> str:
+    def unprompted_text(self) -> str:
         """The text that was given for it, or the first of the readings."""
         return self.plain or next((transcript.text for transcript in self.transcripts), "")
 
@@ -65,7 +65,7 @@ class ScriptedRecogniser:
         text = self.texts.pop(0) if self.texts else ""
         return ScriptedRecognition((Transcript(text, -1.0),) if text else ())
 
-    def draft(self, sound: Samples, vocabulary: Vocabulary) -> str:
+    def partial_transcript(self, sound: Samples, vocabulary: Vocabulary) -> str:
         """The first word of the next text."""
         return self.texts[0].split()[0] if self.texts else ""
 

@@ -65,7 +65,7 @@ def test_what_is_said_can_be_had_before_it_ends():
     endpointer = Endpointer(LoudIsSpeech(), RULES)
     assert list(endpointer.push(speech_like(0.5, 1.0))) == []
     assert endpointer.speaking
-    assert len(endpointer.so_far()) / RATE_HZ == pytest.approx(1.3, abs=3 * FRAME_S)
+    assert len(endpointer.current_sound()) / RATE_HZ == pytest.approx(1.3, abs=3 * FRAME_S)
 
 
 def test_noise_and_tones_are_no_speech():

@@ -2,7 +2,7 @@ import pytest
 from made_speech import ScriptedRecognition
 
 from executive.language.spelling import SoundAlikes
-from executive.speech.interpret import Candidate, Reading, corrections, interpret, opening_as_heard, smoothed
+from executive.speech.interpret import Candidate, Reading, choose_opening, corrections, interpret, remove_repetitions
 from executive.speech.recogniser import Transcript
 
 ALIKES = SoundAlikes(["wrench", "bench", "coke"])
@@ -75,7 +75,7 @@ def test_nothing_said_means_nothing():
     ],
 )
 def test_what_was_said_twice_is_heard_once(said, left):
-    assert smoothed(said) == left
+    assert remove_repetitions(said) == left
 
 
 NAMES = ("wrench", "bench", "desk", "kitchen", "beer", "coke")
@@ -146,7 +146,7 @@ OLIVER, ALICE = "Hey Oliver, get me a cube.", "Hey Alice, get me a cube."
 
 def _opening(text, plain, likely):
     recognition = ScriptedRecognition(plain=plain, likely=likely)
-    return opening_as_heard(recognition, text, ("Alice",), lambda heard: "alice" in heard.lower())
+    return choose_opening(recognition, text, ("Alice",), lambda heard: "alice" in heard.lower())
 
 
 #   heard with the name expected    heard without   likelier by e to the    taken
@@ -178,4 +178,4 @@ def test_a_call_at_the_end_stays():
 
 
 def test_where_nothing_is_heard_without_expecting_names_the_call_stays():
-    assert opening_as_heard(ScriptedRecognition(), ALICE, ("Alice",), lambda heard: False) == ALICE
+    assert choose_opening(ScriptedRecognition(), ALICE, ("Alice",), lambda heard: False) == ALICE

@@ -28,7 +28,7 @@ def listener_to(flat, parser):
 
 
 def _heard(listener, tmp_path, sound, **form):
-    return listener.file(write_wav(tmp_path / "a.wav", sound, **form))
+    return listener.hear_file(write_wav(tmp_path / "a.wav", sound, **form))
 
 
 def test_a_request_becomes_commands(listener_to, tmp_path):
@@ -110,7 +110,7 @@ def test_an_hour_is_heard_in_bounded_time_and_memory(listener_to, tmp_path):
     file = write_wav(tmp_path / "hour.wav", np.zeros(3600 * RATE_HZ, np.int8))
     tracemalloc.start()
     begun = time.perf_counter()
-    heard = listener.file(file)
+    heard = listener.hear_file(file)
     assert time.perf_counter() - begun < 60.0
     assert tracemalloc.get_traced_memory()[1] < 20e6
     tracemalloc.stop()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_speech import silence, tone, write_raw_wav, write_wav
 
-from executive.speech.sound import RATE_HZ, Loudness, joined, level_db, read_wav
+from executive.speech.sound import RATE_HZ, Loudness, concatenate, level_db, read_wav
 from skills.files.errors import InputError
 
 
@@ -28,7 +28,7 @@ def test_single_samples_at_full_scale_are_not_clipped():
 def test_blocks_add_up():
     whole, halves = tone(1.0), np.array_split(tone(1.0), 2)
     assert Loudness().with_block(halves[0]).with_block(halves[1]) == Loudness().with_block(whole)
-    assert joined(halves).tolist() == whole.tolist()
+    assert concatenate(halves).tolist() == whole.tolist()
 
 
 def test_levels_are_in_decibels_below_full_scale():
@@ -46,7 +46,7 @@ EDGE = 400  # samples at either end, where a change of the rate has no neighbour
 @pytest.mark.parametrize("channels", [1, 2])
 def test_any_rate_and_stereo_become_one_channel_at_16_khz(tmp_path, rate_hz, channels):
     file = write_wav(tmp_path / "a.wav", tone(2.3, rate_hz=rate_hz), rate_hz=rate_hz, channels=channels)
-    heard = joined(read_wav(file))
+    heard = concatenate(read_wav(file))
     assert len(heard) == pytest.approx(2.3 * RATE_HZ, abs=1)
     assert np.abs(heard - tone(2.3)[: len(heard)])[EDGE:-EDGE].max() < 0.002
 
@@ -64,32 +64,32 @@ WRITTEN = [
 
 @pytest.mark.parametrize(("tag", "bits", "half"), WRITTEN)
 def test_every_width_is_read(tmp_path, tag, bits, half):
-    heard = joined(read_wav(write_raw_wav(tmp_path / "a.wav", half * 100, tag=tag, bits=bits)))
+    heard = concatenate(read_wav(write_raw_wav(tmp_path / "a.wav", half * 100, tag=tag, bits=bits)))
     assert heard == pytest.approx(np.full(100, 0.5), abs=0.005)
 
 
 def test_the_extensible_head_tells_the_kind_further_on(tmp_path):
     extra = struct.pack("<HHIH", 22, 16, 0, PCM) + bytes.fromhex("0000 0000 1000 8000 00aa 0038 9b71")
     file = write_raw_wav(tmp_path / "a.wav", struct.pack("<h", 2**14) * 9, tag=EXTENSIBLE, bits=16, extra=extra)
-    assert len(joined(read_wav(file))) == 9
+    assert len(concatenate(read_wav(file))) == 9
 
 
 def test_other_chunks_before_the_sound_are_left_out(tmp_path):
     file = write_wav(tmp_path / "a.wav", tone(0.5))
     whole = file.read_bytes()
     file.write_bytes(whole[:36] + b"LIST" + struct.pack("<I", 5) + b"INFO!\0" + whole[36:])
-    assert len(joined(read_wav(file))) == RATE_HZ // 2
+    assert len(concatenate(read_wav(file))) == RATE_HZ // 2
 
 
 @pytest.mark.parametrize("size", [0xFFFF_FFFF, 0x7FFF_FFFF])
 def test_a_recorder_that_did_not_know_the_length_is_read_to_the_end(tmp_path, size):
     file = write_raw_wav(tmp_path / "a.wav", b"\0\1" * 50, tag=PCM, bits=16, size=size)
-    assert len(joined(read_wav(file))) == 50
+    assert len(concatenate(read_wav(file))) == 50
 
 
 def test_samples_beyond_full_scale_are_cut(tmp_path):
     file = write_raw_wav(tmp_path / "a.wav", struct.pack("<f", 7.0) * 4, tag=FLOAT, bits=32)
-    assert joined(read_wav(file)).tolist() == [1.0] * 4
+    assert concatenate(read_wav(file)).tolist() == [1.0] * 4
 
 
 def _refusal(file):

@@ -11,7 +11,7 @@ from executive.speech.activity import load_detector
 from executive.speech.hearing import Reader, spoken_phrases
 from executive.speech.listener import Listener
 from executive.speech.recogniser import vocabulary_of_world
-from executive.speech.sound import joined, read_wav
+from executive.speech.sound import concatenate, read_wav
 from executive.speech.whisper import load_whisper
 from skills.files.errors import InputError
 
@@ -51,24 +51,26 @@ def listener(whisper, flat, parser):
     ],
 )
 def test_a_spoken_request_becomes_commands(listener, say, said, commands):
-    heard = listener.file(say(said))
+    heard = listener.hear_file(say(said))
     assert heard.addressed
     assert list(map(str, heard.commands)) == commands
 
 
 def test_what_is_said_to_nobody_is_left_alone(listener, say):
-    heard = listener.file(say("The hammer belongs on the workbench."))
+    heard = listener.hear_file(say("The hammer belongs on the workbench."))
     assert not heard.addressed and heard.commands == ()
 
 
 def test_the_same_sound_gives_the_same_readings(whisper, say, flat):
-    words, sound = vocabulary_of_world(flat, called=True), joined(read_wav(say("Hey Alice, find the wrench.")))
+    words, sound = vocabulary_of_world(flat, called=True), concatenate(read_wav(say("Hey Alice, find the wrench.")))
     first, second = (whisper.transcribe(sound, words) for _ in range(2))
     assert first.transcripts == second.transcripts
 
 
 def test_the_words_that_were_said_are_likelier_than_others(whisper, say, flat):
-    recognition = whisper.transcribe(joined(read_wav(say("Find the wrench."))), vocabulary_of_world(flat, called=False))
+    recognition = whisper.transcribe(
+        concatenate(read_wav(say("Find the wrench."))), vocabulary_of_world(flat, called=False)
+    )
     right, wrong = recognition.likelihoods(["Find the wrench.", "Take the beer."])
     assert right > wrong + 5.0
 

@@ -141,7 +141,7 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
     def one_life(texts, *, kill_after=None, kill_when=None, lag=0, policy=Policy()):  # noqa: B008 - frozen
         missions = store.missions()
         mission = missions[0] if missions else store.add(REQUEST, queued=False)
-        steps = [Do.of(parse_command(text)) for text in texts]
+        steps = [Do.from_command(parse_command(text)) for text in texts]
         mission_file = Mission(name="fetch drink", robot="Alice", steps=tuple(steps)).with_policy(policy)
         tree = compile_mission(mission_file, knowledge=knowledge, registry=handling)
         journal, recollection = store.journal(mission.id), None

@@ -90,7 +90,7 @@ def value(text):
 
 
 WAIT = block(Wait(awaited=Awaited(seconds=0.2)))
-BEER = Look.of(parse_command("Take [Nothing] to [shelf] and do [find] to [beer]"))
+BEER = Look.from_command(parse_command("Take [Nothing] to [shelf] and do [find] to [beer]"))
 RETRIES = Policy(retries=1)
 
 # Each construct, and what is done in all, whenever the process is killed.

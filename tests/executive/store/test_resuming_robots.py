@@ -128,7 +128,7 @@ def live(store, clock, robots, make, handling, knowledge):
     """One life of the executive: it ends by itself, or is killed when so many ticks of robots were noted."""
 
     def entry_for(mission, name, made, kill_after, after):
-        steps = tuple(Do.of(parse_command(text)) for text in TAKE_AND_PUT)
+        steps = tuple(Do.from_command(parse_command(text)) for text in TAKE_AND_PUT)
         tree = compile_mission(Mission(name="tidy", robot=name, steps=steps), knowledge=knowledge, registry=handling)
         journal, robots[name].holder = store.journal(mission.id, name), None
         if mission.starts:

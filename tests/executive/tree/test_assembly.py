@@ -14,7 +14,7 @@ from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Tog
 from skills.files.errors import InputError
 
 HOLDING, PRESSED = ValueIs(text="holding"), ButtonPressed(button="go")
-LOOK = Look.of(parse_command("Take [Nothing] to [kitchen] and do [find] to [beer]"))
+LOOK = Look.from_command(parse_command("Take [Nothing] to [kitchen] and do [find] to [beer]"))
 TAKE = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
 BRING = "Take [coke] to [kitchen] and do [Nothing] to [Nothing]"
 
@@ -24,7 +24,7 @@ def block(made, policy=None):
 
 
 def go(text):
-    return Do.of(parse_command(text))
+    return Do.from_command(parse_command(text))
 
 
 def to(place):
@@ -383,6 +383,6 @@ def test_a_loop_reads_the_answer_that_its_own_steps_change(compiled_steps):
 
 
 def test_a_count_that_a_round_lowers_may_fall_below_zero(compiled_steps):
-    count = Do.of(replace(LOOK.command, object_count=0)).model_copy(update={"gives": {"count": "n"}})
+    count = Do.from_command(replace(LOOK.command, object_count=0)).model_copy(update={"gives": {"count": "n"}})
     assert compiled_steps(count, block(Repeat(loop=Loop(until=ValueIs(text="n < 0")), steps=(put(n="n - 1"),))))
     assert compiled_steps(count, block(Repeat(loop=Loop(while_=ValueIs(text="n > -3")), steps=(put(n="n - 1"),))))

@@ -54,7 +54,7 @@ def check(knowledge, registry, tmp_path):
         made = []
         for line, one in enumerate(steps, start=1):
             place = Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=line), ())
-            step = Do.of(parse_command(one)) if isinstance(one, str) else one
+            step = Do.from_command(parse_command(one)) if isinstance(one, str) else one
             made.append(step.with_place(place) if isinstance(step, Do | CallSkill) else step)
         mission = Mission(name="m", robot="Alice", steps=tuple(made))
         tree = compile_mission(mission, knowledge=knowledge, registry=registry)
@@ -75,7 +75,7 @@ def told(checked):
 
 
 def test_steps_together_take_as_long_as_those_that_must_be_done(check):
-    drive, wait = Do.of(parse_command(GO.format("kitchen"))), Wait(awaited=Awaited(seconds=300.0))
+    drive, wait = Do.from_command(parse_command(GO.format("kitchen"))), Wait(awaited=Awaited(seconds=300.0))
     alone, either, both = (check(one).estimate for one in (drive, *(_together(drive, wait, n) for n in (1, 2))))
     assert alone.duration_s < 60
     assert either.duration_s == pytest.approx(alone.duration_s)
@@ -299,7 +299,7 @@ def test_a_surface_that_is_full_by_what_surely_lies_there_is_warned_of(check, kn
 
 
 def test_rounds_until_something_holds_are_a_range_up_to_the_most_of_them(check):
-    go, look = Do.of(parse_command(GO.format("kitchen"))), Look.of(parse_command(FIND))
+    go, look = Do.from_command(parse_command(GO.format("kitchen"))), Look.from_command(parse_command(FIND))
     once = check(Repeat(loop=Loop(times=1), steps=(go,))).estimate
     some = check(Repeat(loop=Loop(times=3, until=look), steps=(go,))).estimate
     endless = check(Repeat(loop=Loop(until=look), steps=(go,))).estimate

@@ -206,7 +206,7 @@ def test_people_are_looked_for_in_rooms(
 
     script.ends["find_people"] = look
     command = parse_command(f"Take [Nothing] to [{goal}] and do [find] to [{asked}]")
-    mission = Mission(name="ask", robot="Alice", steps=(Do.of(command),))
+    mission = Mission(name="ask", robot="Alice", steps=(Do.from_command(command),))
     worst = run_tree(compile_mission(mission, knowledge=one_person, registry=registry)).worst
     assert (worst.outcome, list(worst.answers.values())) == (Outcome.SUCCESS, [answer])
     assert worst.message.startswith(told)
@@ -275,7 +275,7 @@ def test_what_cannot_be_done_is_refused_with_a_reason(compiled, text, words):
 
 def test_refusals_name_the_line(knowledge, registry, tmp_path):
     command = parse_command("Take [Nothing] to [moon] and do [Nothing] to [Nothing]")
-    step = Do.of(command).with_place(Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=7), ()))
+    step = Do.from_command(command).with_place(Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=7), ()))
     with pytest.raises(InputError, match=r"m\.yaml:7: the place 'moon'"):
         compile_mission(Mission(name="m", robot="Alice", steps=(step,)), knowledge=knowledge, registry=registry)
 
@@ -284,7 +284,7 @@ def test_nodes_keep_their_line(knowledge, registry, tmp_path):
     place = Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=4), ())
     command = parse_command("Take [Nothing] to [kitchen] and do [grasp] to [coke]")
     tree = compile_mission(
-        Mission(name="m", robot="Alice", steps=(Do.of(command).with_place(place),)),
+        Mission(name="m", robot="Alice", steps=(Do.from_command(command).with_place(place),)),
         knowledge=knowledge,
         registry=registry,
     )
@@ -294,7 +294,9 @@ def test_nodes_keep_their_line(knowledge, registry, tmp_path):
 def test_an_absent_skill_and_an_empty_mission_are_refused(knowledge, registry):
     command = parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")
     with pytest.raises(InputError, match="no skill 'navigate'"):
-        compile_mission(Mission(name="m", robot="Alice", steps=(Do.of(command),)), knowledge=knowledge, registry={})
+        compile_mission(
+            Mission(name="m", robot="Alice", steps=(Do.from_command(command),)), knowledge=knowledge, registry={}
+        )
     with pytest.raises(InputError, match="no commands"):
         compile_mission(Mission(name="m", robot="Alice", steps=()), knowledge=knowledge, registry=registry)
 

@@ -654,7 +654,7 @@ def test_the_report_is_drawn_without_scripts_in_the_width_of_a_telephone(browser
 @pytest.fixture
 def two(knowledge, registry, control):
     """A served page of Alice and Bob, each on the way to the kitchen: the feed, their trees and the page's address."""
-    step = Do.of(parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"))
+    step = Do.from_command(parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"))
     missions = {name: Mission(name="go", robot=name, steps=(step,)) for name in ("Alice", "Bob")}
     trees = {name: compile_mission(m, knowledge=knowledge, registry=registry) for name, m in missions.items()}
     feed = Feed()

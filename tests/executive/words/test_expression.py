@@ -229,7 +229,7 @@ def test_literal_that_is_too_large_is_refused(plain):
     ],
 )
 def test_template_is_filled(text, expected):
-    assert Template(text).filled(VALUES) == expected
+    assert Template(text).fill(VALUES) == expected
 
 
 @pytest.mark.parametrize("text", ["{", "}", "a {b", "{{a}", "{}", "{a!r}", "{1 +}", "{import os}"])
@@ -321,7 +321,7 @@ def test_any_template_is_a_text_or_an_expression_error(text):
         template = Template(text)
         for each in template.expressions:
             each.kind(KINDS)
-        filled = template.filled(VALUES)
+        filled = template.fill(VALUES)
     except ExpressionError:
         return
     assert isinstance(filled, str)
@@ -343,4 +343,4 @@ def test_literal_of_any_value_is_itself_or_refused(plain):
     [("{n} beers", "3 beers", True), ("{n} beers", "which?", False), ("a  {{x}}", "a {x}", True), ("a.", "ab", False)],
 )
 def test_a_text_could_be_a_template_with_some_values(template, text, could):
-    assert Template(template).could_be(text) is could
+    assert Template(template).matches(text) is could

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.words.robot_config import RobotConfig, display_name, parse_robots, robot_called
+from executive.words.robot_config import RobotConfig, display_name, find_robot, parse_robots
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
@@ -60,5 +60,5 @@ def test_a_name_is_shown_with_a_capital(name, shown):
 
 
 def test_a_robot_is_called_without_regard_to_case():
-    assert robot_called("BOB", ["alice", "bob"]) == "bob"
-    assert robot_called("Robin", ["alice", "bob"]) is None
+    assert find_robot("BOB", ["alice", "bob"]) == "bob"
+    assert find_robot("Robin", ["alice", "bob"]) is None

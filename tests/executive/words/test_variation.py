@@ -2,13 +2,13 @@
 
 import pytest
 
-from executive.words.variation import LIGHTS, Light, Variation, light_called
+from executive.words.variation import LIGHTS, Light, Variation, parse_light
 from skills.files.errors import InputError
 
 
 def test_a_light_is_named_or_a_brightness() -> None:
-    assert light_called("dim") is LIGHTS["dim"]
-    assert light_called("0.7") == Light(0.7)
+    assert parse_light("dim") is LIGHTS["dim"]
+    assert parse_light("0.7") == Light(0.7)
 
 
 @pytest.mark.parametrize("words", ["moonlight", "7", "-1"])

@@ -31,7 +31,7 @@ def row(each):
 
 leaves = st.one_of(
     built(ValueIs, text=expressions),
-    st.builds(Look.of, checks, st.just(0.0) | seconds),
+    st.builds(Look.from_command, checks, st.just(0.0) | seconds),
     built(DoorOpen, door=st.tuples(names, names), max_age_s=st.just(0.0) | seconds),
     built(ButtonPressed, button=names),
 )
@@ -55,7 +55,7 @@ loops = st.one_of(
     built(Loop, while_=conditions),
 )
 small = st.one_of(
-    st.builds(Do.of, commands),
+    st.builds(Do.from_command, commands),
     built(Wait, awaited=awaited),
     built(Check, condition=conditions, gives=st.none() | st.fixed_dictionaries({"answer": names})),
     built(Dock, charging=built(Charging, level=st.none() | st.floats(0.01, 1.0))),
@@ -96,7 +96,7 @@ def test_yaml_reads_back_to_the_same_steps(steps):
 
 
 def test_it_is_what_a_person_would_write():
-    look = Look.of(Command(goal="kitchen", task=Task.FIND, object=ObjectKind("beer")))
+    look = Look.from_command(Command(goal="kitchen", task=Task.FIND, object=ObjectKind("beer")))
     fetch = steps_of_commands(
         [
             Command(goal="kitchen", task=Task.GRASP, object=ObjectKind("beer"), verb="fetch"),

@@ -80,7 +80,7 @@ def compile_step(knowledge, make, script):
     registry = {name: make.scripted_skill(script, name, *each) for name, each in ports.items()}
 
     def compile_it(own=None, mission=None, registry=registry):
-        steps = (Do.of(GRASP).with_policy(Policy(move_aside=own)),)
+        steps = (Do.from_command(GRASP).with_policy(Policy(move_aside=own)),)
         policy = Policy(move_aside=mission)
         return compile_mission(
             Mission(name="m", robot="Alice", steps=steps).with_policy(policy), knowledge=knowledge, registry=registry

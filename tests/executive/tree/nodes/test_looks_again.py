@@ -14,9 +14,9 @@ from executive.words.policy import Policy
 from executive.words.steps import Choose, Group, Handler, Loop, Repeat, Together, Try
 from skills.api import Cause, Failed, Succeeded
 
-BEER = Look.of(parse_command("Take [Nothing] to [shelf] and do [find] to [beer]"))
-COUNTED = Look.of(parse_command("Take [Nothing] to [shelf] and do [find] to [2 beer]"))
-SOMEBODY = Look.of(parse_command("Take [Nothing] to [hall] and do [find] to [person]"))
+BEER = Look.from_command(parse_command("Take [Nothing] to [shelf] and do [find] to [beer]"))
+COUNTED = Look.from_command(parse_command("Take [Nothing] to [shelf] and do [find] to [2 beer]"))
+SOMEBODY = Look.from_command(parse_command("Take [Nothing] to [hall] and do [find] to [person]"))
 HOLDING = ValueIs(text="holding")
 
 

@@ -315,7 +315,7 @@ def test_what_falls_while_it_is_handed_over_is_picked_up_as_well(carrying, scrip
 
 
 def test_where_the_skill_can_be_told_it_looks_first_at_the_spot_where_it_must_lie(knowledge):
-    mission = Mission(name="m", robot="Alice", steps=(Do.of(parse_command(PUT)),))
+    mission = Mission(name="m", robot="Alice", steps=(Do.from_command(parse_command(PUT)),))
     tree = compile_mission(mission, knowledge=knowledge, registry=built_in_skills())
     (find,) = [node for node in tree.mission.walk() if node.path_id.endswith("carry-on/again/find")]
     looks = [node.options["inputs"] for node in find.walk() if node.name == "detect"]

@@ -39,7 +39,7 @@ def play(compile_steps, run_tree):
 
 
 def step(command, **policy):
-    return Do.of(command).with_policy(Policy(**policy))
+    return Do.from_command(command).with_policy(Policy(**policy))
 
 
 @pytest.fixture

@@ -27,9 +27,9 @@ from executive.app.fleet import (
 )
 from executive.app.goal_conditions import Share
 from executive.app.mission_run import entry_for, robot_report
+from executive.app.placed_robots import PlacedRobot
 from executive.app.prepared import Prepared
 from executive.app.report_file import EndedTree
-from executive.app.robots import PlacedRobot
 from executive.mission.scenario import Scenario
 from executive.record.announce import announce
 from executive.record.event_log import EventLog

@@ -13,8 +13,8 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Final
 
+from executive.app.placed_robots import DEFAULT_KIND, PlacedRobot, shared_detector
 from executive.app.prepared import Prepared
-from executive.app.robots import DEFAULT_KIND, PlacedRobot, shared_detector
 from executive.app.worlds import refuse_unusable
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
 from executive.tree.estimate import Route, RoutePlanner, load_estimates

@@ -13,10 +13,10 @@ from py_trees.common import Status
 from executive.app.auction import Auction, Bid
 from executive.app.feasibility import check_prepared, route_planner_of
 from executive.app.goal_conditions import Share
+from executive.app.placed_robots import PlacedRobot
 from executive.app.prepare import Setting, prepare_alone
 from executive.app.prepared import Prepared
 from executive.app.report_file import EndedTree
-from executive.app.robots import PlacedRobot
 from executive.language.addressees import Whom
 from executive.language.understand import Part
 from executive.mission.request import Request

@@ -19,10 +19,10 @@ from executive.app.fleet import (
 )
 from executive.app.mission_run import log_map
 from executive.app.page_view import PageView
+from executive.app.placed_robots import placed_robots
 from executive.app.prepared import Prepared
 from executive.app.report import VERDICTS
 from executive.app.report_file import MissionRow, ReportPage, ReportPart, map_of, part_of, save_report
-from executive.app.robots import placed_robots
 from executive.app.signals import ended_by_signals
 from executive.app.simulated import SimulatedBackend, compile_first
 from executive.app.worlds import knowledge_of, open_world

@@ -11,8 +11,8 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 from executive.app.mission_run import run_request
+from executive.app.placed_robots import only_robot
 from executive.app.prepare import prepare
-from executive.app.robots import only_robot
 from executive.app.simulated import SimulatedBackend
 from executive.app.worlds import open_world
 from executive.mission.request import Request

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from executive.app.backend import Scene
+from executive.app.conversations import Talk, load_ahead
 from executive.app.feasibility import refuse_impossible
 from executive.app.mission_files import shipped_missions
 from executive.app.prepare import prepare
 from executive.app.prepared import Prepared
-from executive.app.talk import Talk, load_ahead
 from executive.conversation import ReplyKind
 from executive.mission.parameters import parse_values
 from executive.mission.request import Request

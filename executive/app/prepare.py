@@ -9,8 +9,8 @@ from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
 
 from executive.app.mission_files import mission_file
+from executive.app.placed_robots import PlacedRobot, knowledge_for, only_robot, placed_robots, refuse_blocked
 from executive.app.prepared import Prepared, together
-from executive.app.robots import PlacedRobot, knowledge_for, only_robot, placed_robots, refuse_blocked
 from executive.app.worlds import knowledge_of, open_world, with_map
 from executive.language.parser import load_parser
 from executive.language.questions import Answerer, ClarifyingQuestion, answer_by

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from executive.app.robots import PlacedRobot
+from executive.app.placed_robots import PlacedRobot
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills

@@ -13,7 +13,7 @@ import numpy as np
 from py_trees.common import Status
 
 from executive.app.artifacts import Artifacts, detection_picture, file_name, to_jpeg
-from executive.app.pictures import read_picture
+from executive.app.picture_files import read_picture
 from executive.app.prepared import Prepared
 from executive.app.report import Ending, ReportedAnswer, ReportedObject, RobotReport, RunReport, counts_text
 from executive.record.history import Event, seen_objects

@@ -13,8 +13,8 @@ from typing import Final
 from executive.app.artifacts import Artifacts, draw_artifacts
 from executive.app.backend import Durable, Scene
 from executive.app.goal_conditions import Share, verdict_of
+from executive.app.placed_robots import PlacedRobot, shared_detector
 from executive.app.report import RefereeReport
-from executive.app.robots import PlacedRobot, shared_detector
 from executive.record.work import Profile
 from executive.run.outcome import RobotResult
 from executive.run.visitor import RunEntry

@@ -99,7 +99,7 @@ class _Building:
         out: Path,
         console: Console,
     ) -> None:
-        from executive.app.robots import only_robot
+        from executive.app.placed_robots import only_robot
         from executive.app.simulated import simulate
         from skills.geometry import compose
         from skills.mapping.survey import Survey
@@ -191,7 +191,7 @@ class _Building:
         )
 
     def _draw(self) -> None:
-        from executive.app.pictures import write_picture
+        from executive.app.picture_files import write_picture
 
         if not self._mapper.keyframes:
             return

@@ -16,7 +16,7 @@ from executive.app.backend import Scene
 from executive.app.kernels import compile_kernels, newly_compiled
 from executive.app.mission_files import save_pose
 from executive.app.page_view import scene_actions
-from executive.app.robots import only_robot, refuse_blocked
+from executive.app.placed_robots import only_robot, refuse_blocked
 from executive.app.simulated import simulate
 from executive.app.worlds import open_world
 from executive.cli.number_options import quantity_option

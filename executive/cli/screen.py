@@ -15,11 +15,11 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
+from executive.app.conversations import Talk, load_ahead
 from executive.app.mission_run import Finished
 from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.runs import Watching
-from executive.app.talk import Talk, load_ahead
 from executive.cli.run_keys import HELP, Keys, keys_pressed, prompt_lines
 from executive.language.parser import load_parser
 from executive.record.schemas import SPEECH

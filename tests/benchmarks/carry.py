@@ -22,7 +22,7 @@ from typing import Any, Final
 import numpy as np
 import shapely
 
-from executive.app.robots import only_robot
+from executive.app.placed_robots import only_robot
 from executive.app.simulated import simulate
 from executive.run.outcome import Outcome
 from plant.simulation import Simulation

@@ -30,7 +30,7 @@ from errand_train.dataset.render import is_validation
 from errand_train.dataset.resting import choose, resting_poses
 from errand_train.dataset.room import Support
 from errand_train.dataset.views import View, camera_specs
-from executive.app.robots import shared_detector
+from executive.app.placed_robots import shared_detector
 from executive.app.worlds import knowledge_of, open_world
 from executive.testing.bench import SkillBench
 from plant.diagram import LooseModel, build_diagram

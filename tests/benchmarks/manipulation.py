@@ -41,7 +41,7 @@ from pydrake.math import RigidTransform
 
 from errand_train.commands.worst_sheet import Shown, contact_sheet
 from errand_train.detector.scoring import Judged
-from executive.app.robots import only_robot
+from executive.app.placed_robots import only_robot
 from executive.app.simulated import run_entry, simulate
 from executive.app.worlds import knowledge_of
 from executive.run.outcome import Outcome, RobotResult

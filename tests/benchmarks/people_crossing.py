@@ -24,8 +24,8 @@ from pathlib import Path
 import numpy as np
 
 from executive.app.mission_run import run_request
+from executive.app.placed_robots import only_robot
 from executive.app.prepare import prepare
-from executive.app.robots import only_robot
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
 from executive.words.mission import Route

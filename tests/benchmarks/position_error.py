@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from executive.app.robots import shared_detector
+from executive.app.placed_robots import shared_detector
 from skills.api import Detection, LocalisationEstimate
 from skills.detection import box_overlap
 from skills.perception.detection_3d import detections_3d

@@ -88,7 +88,7 @@ class SmallPlant:
 
 def _small_plant(folder: Path, *, can: bool = True) -> SmallPlant:
     """Writes the world into `folder` and puts the robot into it, at (-0.5, 0) and 1.7 m before the table."""
-    from executive.app.robots import shared_detector
+    from executive.app.placed_robots import shared_detector
     from executive.testing.bench import SkillBench
     from executive.testing.small_room import write_small_room
     from plant.simulation import Simulation

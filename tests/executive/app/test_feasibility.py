@@ -13,7 +13,7 @@ from executive.app.feasibility import (
     route_cache_of,
     route_planner_of,
 )
-from executive.app.robots import only_robot
+from executive.app.placed_robots import only_robot
 from executive.app.worlds import open_world
 from executive.tree.estimate import Route
 from plant.robots.robot_kind import robot_kind

@@ -14,8 +14,8 @@ from executive.app.dispatch import Dispatch
 from executive.app.fleet import FleetMission, Offers, missions_json
 from executive.app.fleet_run import run_fleet
 from executive.app.page_view import PageView
+from executive.app.placed_robots import PlacedRobot
 from executive.app.prepared import Prepared
-from executive.app.robots import PlacedRobot
 from executive.cli import entry
 from executive.cli.fleet_command import _to_do, resumable_lines
 from executive.mission.request import Request

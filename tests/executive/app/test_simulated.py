@@ -7,7 +7,7 @@ import pytest
 from tiny_detector import CLASSES, model_bytes, write_model
 
 from executive.app import simulated
-from executive.app.robots import TURNING_M, refuse_blocked, shared_detector, stand_at
+from executive.app.placed_robots import TURNING_M, refuse_blocked, shared_detector, stand_at
 from executive.app.simulated import compile_first
 from plant.worlds.seeding import place_people
 from plant.worlds.world import load_world

@@ -9,7 +9,7 @@ from pydrake.math import RollPitchYaw
 from typer.testing import CliRunner
 
 from executive.app.mission_files import save_pose
-from executive.app.robots import only_robot
+from executive.app.placed_robots import only_robot
 from executive.app.simulated import simulate
 from executive.app.worlds import open_world
 from executive.cli.entry import app

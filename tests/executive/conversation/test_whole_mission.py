@@ -2,9 +2,9 @@
 
 import pytest
 
+from executive.app.conversations import conversation_of
 from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
-from executive.app.talk import conversation_of
 from executive.mission.request import Request
 from executive.run.control import Control
 from tests.visitors import OnTick

@@ -2,8 +2,8 @@
 
 import pytest
 
+from executive.app.conversations import Talk
 from executive.app.prepare import prepare
-from executive.app.talk import Talk
 from executive.conversation import ReplyKind
 from executive.mission.request import Request
 from executive.run.control import Control

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from executive.app.robots import PlacedRobot, knowledge_for, placed_robots
+from executive.app.placed_robots import PlacedRobot, knowledge_for, placed_robots
 from executive.app.worlds import knowledge_of, open_world
 from executive.words.robot_config import RobotConfig
 from plant.worlds.seeding import place_people

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from executive.app.pictures import read_picture, write_picture
+from executive.app.picture_files import read_picture, write_picture
 from skills.files.errors import InputError
 
 

@@ -1,4 +1,4 @@
-"""An auction of missions among robots: each goes to the robot that is done with it first."""
+"""Auction of missions among robots: each mission goes to the robot that finishes it first."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Bid:
-    """What one robot offers for one mission.
+    """Bid of one robot for one mission.
 
-    It is free in `ready_s` (s from now), takes `duration_s` from there, and has `charge` (0 to 1) left afterwards.
-    `problems` are sentences that say why it cannot do it; such a bid never wins. With `charges` it would have to charge
-    first, which `duration_s` includes.
+    The robot is free in `ready_s` (s from now), then takes `duration_s`, and has `charge` (0 to 1) left at the end.
+    `problems` are sentences that say why the robot cannot do the mission; a bid with problems never wins. With
+    `charges` the robot charges first; `duration_s` includes this time.
     """
 
     mission: int
@@ -26,8 +26,10 @@ class Bid:
 
 @dataclass(frozen=True)
 class Award:
-    """A mission that goes to a robot, which is done with it at `ends_s` (s from now); `first`: it begins right away
-    after what the robot does now, or when it has charged, where it `charges` before."""
+    """Assignment of a mission to a robot, which finishes it at `ends_s` (s from now).
+
+    A `first` mission is the robot's next one. With `charges` the robot charges before it.
+    """
 
     mission: int
     robot: str
@@ -37,8 +39,10 @@ class Award:
 
 
 def award(bids: Iterable[Bid]) -> Sequence[Award]:
-    """Gives each mission to one robot, one after another: always the one that is done first, by what the robots have
-    to do by then; among equals the lower number, then the name. Missions that nobody can do are not among them.
+    """Assigns missions greedily: the next award goes to the pair of mission and robot that ends first.
+
+    A robot is ready again when its awarded missions end. Ties go to the lower mission number, then to the robot's name.
+    Missions that no robot can do get no award.
     """
     left = [bid for bid in bids if not bid.problems]
     ready_s = {bid.robot: bid.ready_s for bid in left}
@@ -59,8 +63,7 @@ PlacesOf = Callable[[int], frozenset[str]]
 
 @dataclass(frozen=True)
 class Round:
-    """What one round of the auction brings: missions that begin now, why nobody can do some others, and robots that
-    charge before they begin theirs."""
+    """Result of one round: missions that begin now, reasons why no robot can do others, robots that charge first."""
 
     begun: Sequence[Award]
     refused: Mapping[int, str]
@@ -68,17 +71,16 @@ class Round:
 
 
 class Auction:
-    """Gives each mission to one robot at a time. No mission is given out again once it is over.
+    """Assignment of missions to robots, one mission for each robot at a time.
 
-    `waiting` are the missions that no robot has, `robots` those that can be given work, and `under_way` the mission of
-    each robot that has one. Those that are `resting` charge: they bid, and begin nothing meanwhile.
+    `waiting` are the missions that no robot has, `robots` the robots that can work, and `under_way` maps a robot to its
+    mission. Robots that are `resting` charge: they bid, but begin nothing.
     """
 
     def __init__(
         self, missions: Iterable[int], robots: Iterable[str], places: PlacesOf = lambda mission: frozenset()
     ) -> None:
-        """`missions` are those to be done, in the order in which they came; `robots` those that are there; `places`
-        those at which a mission has work for one robot at a time."""
+        """Takes the missions in the order of the queue; `places` returns the places that a mission needs for itself."""
         self._places = places
         self.waiting: list[int] = list(dict.fromkeys(missions))
         self.robots: list[str] = list(dict.fromkeys(robots))
@@ -87,11 +89,10 @@ class Auction:
         self._after: dict[int, int] = {}
 
     def assign(self, bid: BidOf) -> Round:
-        """One round of the auction, in which robots that are busy bid as well; `bid` is asked for each pair.
+        """Runs one round of the auction; busy robots bid as well.
 
-        A mission that goes to a busy robot, or to one that has to charge first, waits, and is put up again when any
-        robot is free; so does one with work at a place where a robot is at work. Without a robot that can be given
-        work, nothing is refused.
+        A mission waits for the next round if it goes to a busy robot or to one that charges first, or if it needs a
+        place where another robot works. Without any robot nothing is refused.
         """
         free = [robot for robot in self.robots if robot not in self.under_way and robot not in self.resting]
         taken = self._taken if free else frozenset[str]()
@@ -101,7 +102,11 @@ class Auction:
         bids = {mission: [bid(mission, robot) for robot in self.robots] for mission in up}
         awards = award(one for each in bids.values() for one in each)
         given = {each.mission for each in awards}
-        refused = {mission: _why(each) for mission, each in bids.items() if mission not in given}
+        refused = {
+            mission: f"no robot can do it: {'; '.join(f'{one.robot}: {one.problems[0]}' for one in each)}"
+            for mission, each in bids.items()
+            if mission not in given
+        }
         next_up = [each for each in awards if each.first and each.robot in free]
         begun: list[Award] = []
         for each in next_up:
@@ -116,37 +121,32 @@ class Auction:
 
     @property
     def _taken(self) -> frozenset[str]:
-        """The places where robots are at work."""
+        """Places where robots work now."""
         return frozenset[str]().union(*map(self._places, self.under_way.values()))
 
     def add(self, mission: int, *, after: int | None = None) -> None:
-        """One more mission, which is put up when the one that it comes `after` has been done."""
+        """Adds a mission; with `after` it waits until that mission is done."""
         self.waiting.append(mission)
         if after is not None:
             self._after[mission] = after
 
     def done(self, mission: int) -> None:
-        """A mission has been done: those that come after it are put up."""
+        """Releases the missions that wait for this one, which is done."""
         self._after = {each: before for each, before in self._after.items() if before != mission}
 
     def drop(self, mission: int) -> Sequence[int]:
-        """A mission was not done: those that come after it are not waiting any more; their numbers."""
+        """Removes the missions that wait for this one, which was not done; returns their numbers."""
         dropped = [each for each, before in self._after.items() if before == mission]
         self.waiting = [each for each in self.waiting if each not in dropped]
         return [*dropped, *(later for each in dropped for later in self.drop(each))]
 
     def hand_back(self, robot: str) -> int:
-        """The robot's mission waits for another robot, before all others; its number. Raises KeyError: it has none."""
+        """Puts the robot's mission first in the queue; returns its number. Raises KeyError if the robot has none."""
         mission = self.under_way.pop(robot)
         self.waiting.insert(0, mission)
         return mission
 
     def lose(self, robot: str) -> None:
-        """The robot can be given no work any more."""
+        """Removes the robot, which can work no more."""
         self.resting.discard(robot)
         self.robots = [each for each in self.robots if each != robot]
-
-
-def _why(bids: Sequence[Bid]) -> str:
-    """Why no robot can do a mission."""
-    return f"no robot can do it: {'; '.join(f'{bid.robot}: {bid.problems[0]}' for bid in bids)}"

@@ -1,4 +1,4 @@
-"""A mission that no robot can do alone, in two parts for two robots, which hand over what is held by a table."""
+"""Splits a mission that no robot can do alone into two parts for two robots, with a table as the hand-over point."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from skills.files.errors import InputError
 
 @dataclass(frozen=True)
 class Split:
-    """The commands of a mission in two parts; the second takes from the `table` what the first puts there (None: the
-    gripper is empty between the two)."""
+    """Commands of a mission in two parts.
+
+    The first part puts the held object on the `table`, and the second takes it from there. Without a `table` the
+    gripper is empty between the parts.
+    """
 
     first: tuple[Command, ...]
     second: tuple[Command, ...]
@@ -26,7 +29,7 @@ class Split:
 
 @dataclass(frozen=True)
 class Chain:
-    """A split with the bids of two robots for its parts, done at `ends_s` (s from now)."""
+    """Split of a mission with the bids of two robots for its parts."""
 
     split: Split
     first: Bid
@@ -34,28 +37,28 @@ class Chain:
 
     @property
     def ends_s(self) -> float:
-        """When the second is done, which begins when the first is."""
+        """End of the second part, which begins after the first, in s from now."""
         begins_s = max(self.first.ready_s + self.first.duration_s, self.second.ready_s)
         return begins_s + self.second.duration_s
 
 
 def splits(commands: Sequence[Command], tables: Iterable[str]) -> Iterator[Split]:
-    """All ways to do a mission of plain commands in two parts, one after the other."""
+    """Yields each split of a mission of plain commands into two parts."""
     own = tuple(commands)
     for number in range(1, len(own)):
         before, after = own[number - 1], own[number]
         if after.item is None:
             yield Split(own[:number], own[number:])
         elif before.task is Task.GRASP and before.object == after.item:
-            thing, count = after.item, after.item_count
+            item, count = after.item, after.item_count
             for table in tables:
-                put = Command(item=thing, goal=table, item_count=count)
-                take = Command(goal=table, task=Task.GRASP, object=thing, object_count=count)
+                put = Command(item=item, goal=table, item_count=count)
+                take = Command(goal=table, task=Task.GRASP, object=item, object_count=count)
                 yield Split((*own[:number], put), (take, *own[number:]), table)
 
 
 def soonest(split: Split, first: Iterable[Bid], second: Sequence[Bid]) -> Chain | None:
-    """The chain of two different robots that is done first; None: no two robots can do it."""
+    """Returns the chain of two different robots that ends first; None if no two robots can do it."""
     able = [(a, b) for a in first for b in second if not a.problems and not b.problems and a.robot != b.robot]
     chains = [Chain(split, a, b) for a, b in able]
     return min(chains, key=lambda chain: (chain.ends_s, chain.first.robot, chain.second.robot), default=None)
@@ -65,26 +68,18 @@ BidOn = Callable[[FleetMission, str], Bid]
 TakesFrom = Callable[[str, SurfaceFacts], bool]
 
 
-@dataclass(frozen=True)
-class ChainedMission:
-    """What the robots would do of each part, and where one takes over from the other (None: nothing is handed over)."""
+def best_split(mission: FleetMission, bid: BidOn, takes_from: TakesFrom) -> Split | None:
+    """Returns the split of a mission that two robots finish first.
 
-    first: Mapping[str, Prepared]
-    second: Mapping[str, Prepared]
-    table: str | None
-
-
-def chained(mission: FleetMission, bid: BidOn, takes_from: TakesFrom) -> ChainedMission | None:
-    """The mission in two parts that is done first by two robots; None: no two can do it, or it has more than commands.
-
-    `bid` is asked what each robot offers for a part, `takes_from` whether it reaches what another one puts on a table.
+    None if no two robots can do it, or the mission has more than commands. `bid` returns a robot's bid for a part;
+    `takes_from` returns whether a robot reaches an object that another robot puts on a table.
     """
     prepared = next(iter(mission.options.values()))
     if len(mission.options) < 2 or not is_plain(prepared.tree):
         return None
 
     def bids(commands: tuple[Command, ...], robots: Iterable[str]) -> Sequence[Bid]:
-        part = replace(mission, options=_options(mission, commands))
+        part = replace(mission, options=options_for(mission, commands))
         found = [bid(part, name) for name in robots if name in part.options]
         return [one for one in found if not one.problems]
 
@@ -92,7 +87,7 @@ def chained(mission: FleetMission, bid: BidOn, takes_from: TakesFrom) -> Chained
     chains: list[Chain | None] = []
     for split in splits(prepared.tree.commands, prepared.knowledge.surfaces):
         begins = split.first if split.table is None else split.first[:-1]
-        if begins not in able:  # what a robot could not even begin is asked once for all tables
+        if begins not in able:  # the bids for the part before the table are the same for all tables
             able[begins] = tuple(one.robot for one in bids(begins, mission.options))
         if first := bids(split.first, able[begins]):
             second = bids(split.second, mission.options)
@@ -101,14 +96,11 @@ def chained(mission: FleetMission, bid: BidOn, takes_from: TakesFrom) -> Chained
                 second = [one for one in second if takes_from(one.robot, surfaces[one.robot][table])]
             chains.append(soonest(split, first, second))
     best = min(filter(None, chains), key=lambda chain: chain.ends_s, default=None)
-    if best is None:
-        return None
-    first_part, second_part = (_options(mission, commands) for commands in (best.split.first, best.split.second))
-    return ChainedMission(first_part, second_part, best.split.table)
+    return None if best is None else best.split
 
 
-def _options(mission: FleetMission, commands: tuple[Command, ...]) -> Mapping[str, Prepared]:
-    """What each robot would do of commands; one that has no way to do them at all is left out."""
+def options_for(mission: FleetMission, commands: tuple[Command, ...]) -> Mapping[str, Prepared]:
+    """Returns the commands prepared for each robot; leaves out robots for which they cannot be compiled."""
     options: dict[str, Prepared] = {}
     for name, prepared in mission.options.items():
         with suppress(InputError):

@@ -1,4 +1,4 @@
-"""Gives what is queued out to the robots of a fleet, and keeps what became of it."""
+"""Assigns queued missions to the robots of a fleet by an auction; stores who does each, and how it ended."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from executive.app.auction import Auction
 from executive.app.backend import Backend
-from executive.app.chain import chained
+from executive.app.chain import best_split, options_for
 from executive.app.fleet import (
     EndedMission,
     FleetMission,
@@ -44,20 +44,19 @@ from skills.files.errors import listing
 from skills.robot import Pose2D
 
 LEFT_M: Final = 1.5
-"""A robot that has come so far has left the table where it put something down for another."""
+"""Distance from a hand-over table at which a robot has made space for the next one."""
 
 
 def silence(line: str) -> None:
-    """Shows nothing."""
+    """Drops a line that a caller would show."""
 
 
 @dataclass
 class Dispatch(Assigner):
-    """Assigns the missions of a store to robots of a backend by an auction, and keeps in the store whose each is, how
-    it ended and what a referee saw.
+    """Assigner of a store's missions to robots of a backend.
 
-    A robot whose `battery` is low gives its mission back once it has nothing in hand, and charges by its mission of
-    `docks`. `tell` shows a line, `offers` makes what the robots offer.
+    A robot whose battery is low returns its mission once its gripper is empty, and charges by its mission in `docks`.
+    `tell` shows a line; `offers` builds the bids of the robots.
     """
 
     store: MissionStore
@@ -76,16 +75,16 @@ class Dispatch(Assigner):
         self._auction = Auction(
             (), self.robots, lambda number: surfaces_of(next(iter(self.missions[number].options.values())))
         )
-        self._parts = {number: each for number, each in self._given.all().items() if each.part_of is not None}
+        given = self._given.all()
         for number in self.missions:
-            follows = self._parts[number].follows if number in self._parts else None
+            follows = given[number].follows if number in given else None
             self._auction.add(number, after=follows if follows in self.missions else None)
         self._robots = {
             name: FleetRobot(placed, placed.start, dock=self.docks.get(name), faults=tuple(self.faults.get(name, ())))
             for name, placed in self.robots.items()
         }
         self._offers = self.offers(self._robots, self.battery, self.backend.clock.now, self._auction)
-        self._gone: dict[str, str] = {}
+        self._lost: dict[str, str] = {}
         self._recalled: set[str] = set()
         self._to_dock: list[str] = []
         self._leaving: dict[str, tuple[int, Pose2D]] = {}
@@ -93,13 +92,13 @@ class Dispatch(Assigner):
         self._stopped: str | None = None
 
     def stop(self, reason: str) -> None:
-        """The run is ended from outside: what robots have under way stays in the queue; from signal handlers."""
+        """Ends the run; missions under way stay in the queue. Signal handlers may call it."""
         self._stopped = reason
 
     def assign(self) -> Sequence[RunEntry]:
-        """The missions that begin now."""
+        """Runs a round of the auction; returns the missions that begin now."""
         entries: list[RunEntry] = []
-        self._let_follow({})
+        self._release_following({})
         given = self._auction.assign(lambda number, name: self._offers.known(self.missions[number], name))
         refused = {number: why for number, why in given.refused.items() if not self._split(number)}
         for number, why in refused.items():
@@ -122,14 +121,17 @@ class Dispatch(Assigner):
         return entries if len(refused) == len(given.refused) else [*entries, *self.assign()]
 
     def _split(self, number: int) -> bool:
-        """Has a mission done in two parts, as no robot can do it alone; whether two can."""
-        mission = self.missions[number]
-        chain = None if number in self._parts else chained(mission, self._offers.new, self._offers.takes_from)
-        if chain is None:
+        """Splits a mission that no robot can do alone into two parts; returns whether two robots can do them."""
+        mission, given = self.missions[number], self._given.all()
+        if number in given and given[number].part_of is not None:
+            return False
+        split = best_split(mission, self._offers.new, self._offers.takes_from)
+        if split is None:
             return False
         names = [f"{mission.stored.request.name}, part {part} of 2" for part in (1, 2)]
         added: list[int] = []
-        for name, options in zip(names, (chain.first, chain.second), strict=True):
+        for name, commands in zip(names, (split.first, split.second), strict=True):
+            options = options_for(mission, commands)
             request = next(iter(options.values())).request
             request = replace(request, sentence=None, file=None, text=None, name=name)
             stored = self.store.add(request, queued=True)
@@ -137,89 +139,90 @@ class Dispatch(Assigner):
             self._auction.add(stored.id, after=added[0] if added else None)
             added.append(stored.id)
         self._given.split(number, added)
-        self._parts = {part: each for part, each in self._given.all().items() if each.part_of is not None}
         self.store.begin(number)
-        by = "" if chain.table is None else f", by the {chain.table}"
+        by = "" if split.table is None else f", by the {split.table}"
         self.tell(f"No robot can do mission {number} alone: missions {added[0]} and then {added[1]} do it{by}")
         return True
 
     def recall(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
-        """The robots that are low and have nothing in hand; and those that charge when nothing is left to do."""
-        self._let_follow(seen)
+        """Returns the robots that must stop, with the reason: low battery and empty gripper, or nothing left to do."""
+        self._release_following(seen)
         under_way = self._auction.under_way
-        low = {name: each for name, each in seen.items() if name in under_way and self._may_leave(name, each)}
+        low: dict[str, RobotStatus] = {}
+        for name, each in seen.items():
+            robot, is_low = self._robots[name], each.charge is not None and each.charge < self.battery.low
+            if name in under_way and is_low and robot.dock and not each.holding and not robot.progress.begun:
+                low[name] = each
         idle = self._auction.resting if not under_way and not self._auction.waiting else ()
         self._recalled = {*low, *idle}
         why = {name: f"its battery is at {each.charge:.0%}" for name, each in low.items()}
         return {**why, **dict.fromkeys(idle, "nothing is left to do")}
 
-    def _let_follow(self, seen: Mapping[str, RobotStatus]) -> None:
-        """The next part begins when the robot of the one before has left the table, or does not leave it."""
+    def _release_following(self, seen: Mapping[str, RobotStatus]) -> None:
+        """Lets a second part begin once the robot of the first has left the table or is no longer sent to its dock."""
         for name, (number, from_W) in tuple(self._leaving.items()):
             pose = seen[name].pose if name in seen else None
-            gone_m = 0.0 if pose is None else math.hypot(pose.x_m - from_W.x_m, pose.y_m - from_W.y_m)
-            if name not in self._auction.resting or gone_m > LEFT_M:
+            away_m = 0.0 if pose is None else math.hypot(pose.x_m - from_W.x_m, pose.y_m - from_W.y_m)
+            if name not in self._auction.resting or away_m > LEFT_M:
                 del self._leaving[name]
                 self._auction.done(number)
 
-    def _may_leave(self, name: str, seen: RobotStatus) -> bool:
-        """Returns whether a robot is low, can charge, and leaves nothing half done."""
-        robot = self._robots[name]
-        low = seen.charge is not None and seen.charge < self.battery.low
-        return low and robot.dock is not None and not seen.holding and not robot.progress.begun
-
     def tick(self, progress: Progress) -> None:
-        """Sees how far the missions are."""
+        """Takes the changes of each robot's tree."""
         for name, note in progress.notes.items():
             journal = self._robots[name].journal
             if journal is not None:
                 journal.note(note)
 
     def mission_ended(self, end: MissionEnd) -> None:
-        """A robot's mission is over, or another robot goes on with it."""
+        """Ends a robot's mission, or hands its rest to another robot."""
         name = end.result.robot_name
         robot, recalled = self._robots[name], name in self._recalled
         self._recalled.discard(name)
-        gone = self._look(robot, end)
-        if gone is not None:
-            self._gone[name] = gone
+        lost = self._update_robot(robot, end)
+        if lost is not None:
+            self._lost[name] = lost
             self._auction.lose(name)
-            self.tell(f"{name} is given no more work: {gone}")
+            self.tell(f"{name} is given no more work: {lost}")
         if name not in self._auction.under_way:
-            self._charged(name, end.result, recalled=recalled)
+            self._auction.resting.discard(name)
+            if end.result.outcome is not Outcome.SUCCESS and not recalled:
+                robot.dock = None  # it could not charge, and is not sent there again
+            self.tell(f"{name} is at {robot.charge:.0%}: {end.result.message}")
             return
         if self._stopped is not None and end.result.outcome is Outcome.CANCELLED:
             self._leave_in_queue(name, end)
             return
         if end.result.outcome is Outcome.SUCCESS:
-            self._over(name, end.result)
+            self._end(name, end.result)
             return
-        if gone is None and not recalled:
-            if not self._given_to_another(name, end):
-                self._over(name, end.result)
+        if lost is None and not recalled:
+            if not self._try_another(name, end):
+                self._end(name, end.result)
             return
         why = self._stuck(name, holding=end.seen is not None and end.seen.holding)
         if why is not None or not self._auction.robots:
-            reason = f"{name} failed ({gone})"
-            self._over(name, replace(end.result, message=f"{reason}; {why or 'there is no other robot'}"))
+            reason = f"{name} failed ({lost})"
+            self._end(name, replace(end.result, message=f"{reason}; {why or 'there is no other robot'}"))
             return
         self._hand_on(name, end.result)
-        if gone is None:
-            self._leave_for_dock(name)
+        if lost is None:
+            self._send_to_dock(name)
 
     def _leave_in_queue(self, name: str, end: MissionEnd) -> None:
-        """The next run goes on with a robot's mission; one of which it cannot be said how far it came is cancelled."""
+        """Leaves a robot's mission to the next run, or cancels it if its progress is unknown."""
         why = self._stuck(name, holding=end.seen is not None and end.seen.holding)
         if why is not None:
-            self._over(name, replace(end.result, message=f"{end.result.message}; {why}"))
+            self._end(name, replace(end.result, message=f"{end.result.message}; {why}"))
             return
-        number = self._auction.hand_back(name)
-        self._go_on_later(number, self._robots[name], end.result)
+        number = self._requeue(name, end.result)
         self.tell(f"Mission {number} stays in the queue: {end.result.message}")
 
-    def _given_to_another(self, name: str, end: MissionEnd) -> bool:
-        """Offers to the others, once, what one robot did not manage: it has nothing in its gripper, and has put nothing
-        down anywhere. Whether another can do it."""
+    def _try_another(self, name: str, end: MissionEnd) -> bool:
+        """Offers a failed mission to the other robots, once; returns whether one of them can do it.
+
+        The robot's gripper must be empty, and it must not have put anything down.
+        """
         number, robot = self._auction.under_way[name], self._robots[name]
         mission = self.missions[number]
         clear = end.seen is not None and not end.seen.holding and not robot.progress.put
@@ -237,18 +240,17 @@ class Dispatch(Assigner):
         return True
 
     def _hand_on(self, name: str, result: RobotResult) -> None:
-        """What is left of a robot's mission waits for another."""
-        number = self._auction.hand_back(name)
-        self._go_on_later(number, self._robots[name], result)
+        """Queues the rest of a robot's mission for another robot."""
+        number = self._requeue(name, result)
         self.tell(f"Mission {number} waits for another robot: {result.message}")
 
-    def _leave_for_dock(self, name: str) -> None:
-        """A robot is to go to its dock."""
+    def _send_to_dock(self, name: str) -> None:
+        """Sends a robot to its dock at the next round."""
         self._auction.resting.add(name)
         self._to_dock.append(name)
 
-    def _look(self, robot: FleetRobot, end: MissionEnd) -> str | None:
-        """Sees where a robot is at the end of a mission; why nothing more can be asked of it (None: it can)."""
+    def _update_robot(self, robot: FleetRobot, end: MissionEnd) -> str | None:
+        """Updates a robot's state at the end of a mission; returns why it can work no more (None: it can)."""
         robot.free_at_s = self._now_s
         if end.seen is None:
             return end.gone
@@ -264,21 +266,13 @@ class Dispatch(Assigner):
         )
         return "it does not know where it is" if lost or end.seen.pose is None else None
 
-    def _charged(self, name: str, result: RobotResult, *, recalled: bool) -> None:
-        """A robot's way to its dock is over. Where it could not charge, it is not sent there again."""
-        self._auction.resting.discard(name)
-        robot = self._robots[name]
-        if result.outcome is not Outcome.SUCCESS and not recalled:
-            robot.dock = None
-        self.tell(f"{name} is at {robot.charge:.0%}: {result.message}")
-
     def close(self) -> None:
-        """What no robot has at the end stays in the queue; what was handed back is told as failed."""
-        handed_back = self._given.all()
+        """Fails the missions that were handed back and that no robot took; the others stay in the queue."""
+        assigned = self._given.all()
         for number in self._auction.waiting if self._stopped is None else ():
-            given = handed_back.get(number)
+            given = assigned.get(number)
             if given is not None and given.robot is not None:
-                why = {**self._gone, **self.missions[number].tried}
+                why = {**self._lost, **self.missions[number].tried}
                 reasons = listing([f"{name}: {each}" for name, each in why.items()])
                 self._finish(number, MissionState.FAILURE, f"no robot went on with it ({reasons})")
 
@@ -287,7 +281,7 @@ class Dispatch(Assigner):
         return self.backend.clock.now()
 
     def _dock_entry(self, name: str) -> RunEntry:
-        """A robot goes to its dock and charges."""
+        """Begins a robot's charging mission."""
         robot = self._robots[name]
         assert robot.dock is not None
         robot.free_at_s = self._now_s + charging_time_s(robot.charge, self.battery.charged)
@@ -297,12 +291,14 @@ class Dispatch(Assigner):
         return replace(self._robot_entry(name, robot.dock), tree=robot.dock.tree)
 
     def _entry(self, name: str, mission: FleetMission) -> RunEntry:
+        """Begins a mission of a robot."""
         robot, prepared = self._robots[name], mission.options[name]
         number = mission.stored.id
+        done_before = self._given.all()[number].done
 
         def note(progress: MissionProgress) -> None:
-            """Keeps how far the mission is."""
-            self._given.progress(number, mission.done + progress.done, "it was begun" if progress.begun else None)
+            """Stores the progress of the mission."""
+            self._given.progress(number, done_before + progress.done, "it was begun" if progress.begun else None)
 
         robot.journal = ProgressJournal(prepared.tree, note)
         speaker_W = next(iter(self.robots.values())).start
@@ -311,12 +307,12 @@ class Dispatch(Assigner):
         return replace(entry, tree=prepared.tree, speaker_W=speaker_W)
 
     def spare(self) -> Sequence[RunEntry]:
-        """The robots before they have a mission."""
+        """Returns the robots as they stand before their first mission."""
         options = next((mission.options for mission in self.missions.values()), {})
         return [self._robot_entry(name, options[name]) for name in self.robots if name in options]
 
     def _robot_entry(self, name: str, prepared: Prepared) -> RunEntry:
-        """The robot with its faults and estimators, which stay the same from mission to mission."""
+        """Returns the robot with its faults and estimators, which are built once for all its missions."""
         robot = self._robots[name]
         if robot.entry is None:
             disturbed = replace(prepared.request, scenario=Scenario(robot.faults))
@@ -332,31 +328,32 @@ class Dispatch(Assigner):
             )
 
     def _stuck(self, name: str, *, holding: bool) -> str | None:
-        """Why no other robot can go on with the mission of one that is gone; None: one can."""
+        """Returns why no other robot can continue a robot's mission; None if one can."""
         robot, mission = self._robots[name], self.missions[self._auction.under_way[name]]
         progress = robot.progress
         if not progress.begun:
             return None
         commands = mission.options[name].tree.commands[progress.done :]
         if holding:
-            thing = next((each.object or each.item for each in commands if each.object or each.item), None)
-            return f"the {thing or 'thing'} is in {name}'s gripper"
+            held = next((each.object or each.item for each in commands if each.object or each.item), None)
+            return f"the {held or 'object'} is in {name}'s gripper"
         return f"{name} had begun it, and how far it came is not known"
 
-    def _go_on_later(self, number: int, robot: FleetRobot, result: RobotResult) -> None:
-        """What is left of a mission that is handed back."""
-        mission, done = self.missions[number], robot.progress.done
+    def _requeue(self, name: str, result: RobotResult) -> int:
+        """Queues the rest of a robot's mission; returns its number."""
+        number = self._auction.hand_back(name)
+        mission, done = self.missions[number], self._robots[name].progress.done
         if done:
-            share = Share(mission.options[result.robot_name].tree, result, done)
-            options = {name: rest_of(each, done) for name, each in mission.options.items()}
-            shares, done = (*mission.shares, share), mission.done + done
-            self.missions[number] = replace(mission, options=options, done=done, shares=shares)
+            share = Share(mission.options[name].tree, result, done)
+            options = {other: rest_of(each, done) for other, each in mission.options.items()}
+            self.missions[number] = replace(mission, options=options, shares=(*mission.shares, share))
         self._given.hand_back(number)
         self.store.finish(number, MissionState.QUEUED, "")
         self._log_missions()
+        return number
 
-    def _over(self, name: str, result: RobotResult) -> None:
-        """A mission has come to its end."""
+    def _end(self, name: str, result: RobotResult) -> None:
+        """Judges and ends a robot's mission."""
         number = self._auction.under_way.pop(name)
         mission = self.missions[number]
         tree, since_s = mission.options[name].tree, mission.since_s or 0.0
@@ -369,28 +366,31 @@ class Dispatch(Assigner):
             robot_report(result, self.robots[name].kind, report),
         )
         self.over.append(EndedMission(number, ended, since_s, self._now_s))
-        if number in self._parts:
-            self._part_over(number, Share(tree, result, len(tree.parts)), seen)
+        self._end_part(number, Share(tree, result, len(tree.parts)), seen)
         tried = {} if result.outcome is Outcome.SUCCESS else mission.tried
         message = "; ".join([result.message, *(f"{other} before: {why}" for other, why in tried.items())])
         self._finish(number, MissionState(result.outcome.value), message)
 
-    def _part_over(self, number: int, share: Share, seen: Mapping[str, Any] | None) -> None:
-        """The next part goes on from what this one did, and its robot leaves the table to the other; after the last,
-        all are judged together."""
-        mission, whole = self.missions[number], self._parts[number].part_of
-        following = [part for part, each in self._parts.items() if each.follows == number]
+    def _end_part(self, number: int, share: Share, seen: Mapping[str, Any] | None) -> None:
+        """Ends a part of a mission: the robot leaves the table to the next one; the last part judges the whole.
+
+        Does nothing for a mission that is no part.
+        """
+        given = self._given.all()
+        mission, whole = self.missions[number], given[number].part_of
+        following = [part for part, each in given.items() if each.follows == number]
         for part in following:
             shares = (*mission.shares, share)
             self.missions[part] = replace(self.missions[part], since_s=mission.since_s, shares=shares)
         name = share.tree.robot_name
         if following and name in self._auction.robots and self._robots[name].dock is not None:
-            self._leave_for_dock(name)
+            self._send_to_dock(name)
             self._leaving[name] = (number, self._robots[name].pose)
         if whole is not None and not following:
             self._given.judge(whole, seen)
 
     def _finish(self, number: int, state: MissionState, message: str) -> None:
+        """Stores the end of a mission, and releases or drops the missions that wait for it."""
         self.store.finish(number, state, message)
         self.tell(f"Mission {number}: {state.value}: {message}")
         if state is MissionState.SUCCESS:
@@ -402,6 +402,6 @@ class Dispatch(Assigner):
         self._log_missions()
 
     def _log_missions(self) -> None:
-        """Log whose each mission is by now."""
+        """Logs the assignments."""
         if self.log is not None:
             self.log(MISSIONS, missions_message(self.store, missions_json(self.store, list(self.missions))))

@@ -56,11 +56,10 @@ class _RoutesOnMap(RoutePlanner):
         return self._routes.route(start, goal)
 
 
-def route_planner_of(world: World, robot: PlacedRobot, *, kept: bool = True) -> RoutePlanner:
-    """Routes of a robot on its map of a world.
+def route_planner_of(world: World, robot: PlacedRobot, *, cached: bool = True) -> RoutePlanner:
+    """Returns a planner of a robot's routes on its map of a world.
 
-    They are `kept` for later processes, or only as long as the planner. When there is no such map, the first route
-    raises InputError.
+    With `cached` the routes are stored for later processes. Without a map the first route raises InputError.
 
     Raises:
         InputError: with file and line where its stack file cannot be used.
@@ -68,7 +67,7 @@ def route_planner_of(world: World, robot: PlacedRobot, *, kept: bool = True) -> 
     facts = robot_kind(robot.kind).facts
     files = (facts,) if robot.stack_file is None else (facts, robot.stack_file)
     planned = _RoutesOnMap(world, robot)
-    return route_cache_of(world, planned, *files) if kept else planned
+    return route_cache_of(world, planned, *files) if cached else planned
 
 
 def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> Checked:

@@ -1,4 +1,4 @@
-"""Missions and robots as a fleet sees them: who can do what, how far it is, and what a robot offers for it."""
+"""Missions and robots of a fleet: each robot's version of a mission, its progress, and its bids."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from executive.app.prepare import Setting, prepare_alone
 from executive.app.prepared import Prepared
 from executive.app.report_file import EndedTree
 from executive.language.addressees import Whom
-from executive.language.understand import Part
 from executive.mission.request import Request
 from executive.run.visitor import RunEntry, TickNote
 from executive.store.assignments import GivenMission, GivenMissions
@@ -42,22 +41,22 @@ from skills.manipulation.place.free_spot import spots
 from skills.robot import Pose2D
 
 URGENT: Final = 0.5
-"""At this share of the charge that counts as low, a robot that has something in hand goes to its dock all the same."""
+"""Share of the low charge at which a robot goes to its dock although it holds an object."""
 _TOUCHED: Final = (Status.RUNNING, Status.SUCCESS)
 _HEADINGS: Final = 16
 
 
 @dataclass(frozen=True)
 class FleetMission:
-    """A mission of the queue: what each robot that may do it would do. The first `done` commands are done already.
+    """Mission of the queue, prepared for each robot that may do it: `options` hold the commands that are left.
 
-    It began at `since_s` (s on the robots' clock; None: not yet); `shares` are what robots did that had it before, and
-    `tried` why one did not do it, by its name.
+    It began at `since_s` (s on the robots' clock; None: not yet). `shares` are the parts that other robots did;
+    `tried` maps a robot that failed to the reason. The store holds the rest of its state
+    (`executive.store.assignments.GivenMission`).
     """
 
     stored: StoredMission
     options: Mapping[str, Prepared]
-    done: int = 0
     since_s: float | None = None
     shares: tuple[Share, ...] = ()
     tried: Mapping[str, str] = field(default_factory=dict)
@@ -71,10 +70,13 @@ def fleet_mission(
     robots: Mapping[str, PlacedRobot],
     done: int = 0,
 ) -> FleetMission:
-    """A mission of the store for these robots. Raises InputError, which names the mission: it is for none of them."""
+    """Prepares a mission of the store, without its first `done` commands, for these robots.
+
+    Raises InputError with the mission's number if none of them can do it.
+    """
     try:
         options = _options(stored, world, knowledge, robots)
-        return FleetMission(stored, {name: rest_of(each, done) for name, each in options.items()}, done)
+        return FleetMission(stored, {name: rest_of(each, done) for name, each in options.items()})
     except InputError as error:
         what = f"mission {stored.id} ({stored.request.name}): {error.message}"
         raise InputError(what, hint=error.hint or "it stays in the queue", file=error.file, line=error.line) from error
@@ -88,13 +90,16 @@ def _options(
 ) -> Mapping[str, Prepared]:
     request = stored.request
     if request.world_name != world.name:
-        hint = f"run those of {request.world_name} in a run of their own"
+        hint = f"run the missions of {request.world_name} in a run of their own"
         raise InputError(f"it is for the world {request.world_name}, and this run is in {world.name}", hint=hint)
     if request.sentence is not None:
         setting = Setting(request, world, _patient(knowledge), robots)
         meant = setting.understand()
-        meanings = [part.meaning for part in meant.parts]
-        return {name: setting.part(name, meanings) for name in _named(meant.parts, robots)}
+        meanings, named = [part.meaning for part in meant.parts], {part.robot for part in meant.parts} - {Whom.ANY}
+        if len(named) > 1 or (Whom.ALL in named and len(robots) > 1):
+            raise InputError("it is for several robots at once", hint="queue a mission for each of them")
+        able = [name for name in robots if not named or name in named or Whom.ALL in named]
+        return {name: setting.part(name, meanings) for name in able}
     alone = prepare_alone(request)
     if alone.world.seed_rules != world.seed_rules:
         raise InputError("its file brings objects into the world", hint="run it by `errand run`")
@@ -103,27 +108,19 @@ def _options(
     return {name: setting.for_robot(name).compile(mission) for name, mission in missions.items()}
 
 
-def _named(parts: Sequence[Part], robots: Mapping[str, PlacedRobot]) -> tuple[str, ...]:
-    """The robots that may do a mission. Raises InputError: it is for several at once."""
-    named = {part.robot for part in parts} - {Whom.ANY}
-    if len(named) > 1 or (Whom.ALL in named and len(robots) > 1):
-        raise InputError("it is for several robots at once", hint="queue a mission for each of them")
-    return tuple(name for name in robots if not named or name in named or Whom.ALL in named)
-
-
 def rest_of(prepared: Prepared, done: int) -> Prepared:
-    """What is left of a mission of plain commands of which the first `done` are done."""
+    """Returns a mission of plain commands without the first `done`."""
     return with_commands(prepared, prepared.tree.commands[done:]) if done else prepared
 
 
 def surfaces_of(prepared: Prepared) -> frozenset[str]:
-    """The surfaces that a mission's commands name, at each of which one robot works at a time."""
+    """Surfaces that a mission's commands name; one robot at a time works at each."""
     goals = {command.goal for command in prepared.tree.commands if command.goal is not None}
     return frozenset(filter(None, map(prepared.knowledge.place, goals))) & prepared.knowledge.surfaces.keys()
 
 
 def with_commands(prepared: Prepared, commands: Sequence[Command]) -> Prepared:
-    """A mission of plain commands with others in their place. Raises InputError: they cannot be carried out."""
+    """Replaces the commands of a mission of plain commands. Raises InputError if they cannot be compiled."""
     steps: tuple[Step, ...] = steps_of_commands(commands)
     match prepared.mission.steps:
         case (Say() as said,):
@@ -135,13 +132,13 @@ def with_commands(prepared: Prepared, commands: Sequence[Command]) -> Prepared:
 
 
 def _patient(knowledge: Knowledge) -> Knowledge:
-    """What a robot of a fleet knows: others go on with its mission when it is low, so that it interrupts it later."""
+    """Lowers the charge at which a robot interrupts its own mission: in a fleet another robot takes it over before."""
     battery = knowledge.battery.model_copy(update={"low": URGENT * knowledge.battery.low})
     return knowledge.model_copy(update={"battery": battery})
 
 
 def charging_missions(world: World, knowledge: Knowledge, robots: Mapping[str, PlacedRobot]) -> Mapping[str, Prepared]:
-    """What each robot does to charge; one without a dock is not among them."""
+    """Prepares a charging mission for each robot that has a dock."""
     charge = Command(task=Task.CHARGE)
     setting = Setting(Request(commands=(str(charge),), world_name=world.name), world, _patient(knowledge), robots)
     steps = steps_of_commands([charge])
@@ -153,8 +150,7 @@ def charging_missions(world: World, knowledge: Knowledge, robots: Mapping[str, P
 
 
 def bid_for(mission: FleetMission, now: FleetRobot, low: float) -> Bid:
-    """What a robot offers for a mission from where it is, when it is free: whether it can do it, how long that takes,
-    and what is left of its battery, which is not to come below `low`."""
+    """Returns a free robot's bid for a mission: problems, duration, and the charge left, at least `low`."""
     robot, planner = now.placed.name, now.routes(mission)
     prepared = mission.options.get(robot)
     if prepared is None:
@@ -178,7 +174,7 @@ def bid_for(mission: FleetMission, now: FleetRobot, low: float) -> Bid:
 
 
 def charging_time_s(charge: float, charged: float) -> float:
-    """How long a battery charges (s), from one state of charge to another (0 to 1)."""
+    """Duration of charging from one state of charge to another (0 to 1), in s."""
     return max(0.0, charged - charge) / load_estimates().battery.charging_per_s
 
 
@@ -187,7 +183,10 @@ def _checked_from(pose: Pose2D, prepared: Prepared, planner: RoutePlanner) -> Ch
 
 
 def _out_of_reach(prepared: Prepared, pose: Pose2D, planner: RoutePlanner) -> Iterator[str]:
-    """What a robot is to take from where it cannot come. Alone it would look elsewhere; of a fleet another one can."""
+    """Yields a sentence for each object that the robot must take from a place that it cannot reach.
+
+    A single robot would search elsewhere; in a fleet another robot can do it.
+    """
     knowledge = prepared.knowledge
     for command in prepared.tree.commands:
         if command.task is not Task.GRASP or command.object is None:
@@ -196,12 +195,12 @@ def _out_of_reach(prepared: Prepared, pose: Pose2D, planner: RoutePlanner) -> It
         usual = knowledge.usual_surfaces(command.object.name) if place is None else (place,)
         surfaces = [name for spot in usual for name in knowledge.surfaces_in(spot)]
         views = [view for name in surfaces for view in knowledge.surfaces[name].viewpoints]
-        if surfaces and not any(is_way(planner, pose, Pose2D(each.x, each.y, each.yaw)) for each in views):
-            yield f"there is no way to the {place or surfaces[0]}, where the {command.object} is to be taken"
+        if surfaces and not any(is_reachable(planner, pose, Pose2D(each.x, each.y, each.yaw)) for each in views):
+            yield f"no path leads to the {place or surfaces[0]}, where it must take the {command.object}"
 
 
-def is_way(planner: RoutePlanner, start: Pose2D, goal: Pose2D) -> bool:
-    """Returns whether there is a route."""
+def is_reachable(planner: RoutePlanner, start: Pose2D, goal: Pose2D) -> bool:
+    """Returns whether a route leads from one pose to another."""
     try:
         planner.route(start, goal)
     except ValueError:
@@ -211,8 +210,11 @@ def is_way(planner: RoutePlanner, start: Pose2D, goal: Pose2D) -> bool:
 
 @dataclass(frozen=True)
 class MissionProgress:
-    """What of a tree is done: the first `done` commands for good, and whether what comes after has been `begun`: a
-    skill that changes the world has done its work, or does it; with `put`, one that gives away what was taken."""
+    """Progress of a mission.
+
+    The first `done` commands need not be done again. After them, `begun` says that a skill that changes the world has
+    run or is running, and `put` that such a skill releases an object.
+    """
 
     done: int
     begun: bool = False
@@ -220,16 +222,16 @@ class MissionProgress:
 
 
 def is_plain(tree: CompiledTree) -> bool:
-    """Returns whether a mission is nothing but commands, one after the other."""
+    """Returns whether a mission is a sequence of commands and nothing else."""
     commands = all(isinstance(step, Do | Say) for step in tree.steps) and len(tree.parts) == len(tree.commands)
     return commands and (len(tree.steps) == 1 or all(step.source is None for step in tree.steps))
 
 
 def progress_of(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> MissionProgress:
-    """What of a tree is done by what its nodes said, by path id.
+    """Returns the progress of a tree; `statuses` returns the last status of a node by its path id.
 
-    Another robot can go on before a command that needs nothing in the gripper. A mission that has more than plain
-    commands is done as a whole.
+    Another robot can continue before a command that begins with an empty gripper. A mission with more than plain
+    commands counts as a whole.
     """
     done = 0
     for number, part in enumerate(tree.parts if is_plain(tree) else ()):
@@ -244,14 +246,14 @@ def progress_of(tree: CompiledTree, statuses: Callable[[str], Status | None]) ->
 
 
 def is_lost(tree: CompiledTree, statuses: Callable[[str], Status | None]) -> bool:
-    """Returns whether a mission ended because its robot did not find out where it is."""
+    """Returns whether a mission ended because its robot could not localise."""
     watches = (node for node in tree.root.walk() if node.kind == "interrupt")
     lost = (node.path_id for node in watches if isinstance(node.options["condition"], KnowsPlace))
     return any(statuses(path_id) is Status.FAILURE for path_id in lost)
 
 
 def _changing(node: NodeSpec, over: set[str]) -> list[NodeSpec]:
-    """The skills below a node that change the world, without those of commands that are done."""
+    """Returns the skill nodes below a node that change the world, without those in the `over` parts."""
     if any(node.path_id == path or node.path_id.startswith(f"{path}/") for path in over):
         return []
     own = [node] if node.kind == "skill" and node.options["skill"].changes_world else []
@@ -259,7 +261,7 @@ def _changing(node: NodeSpec, over: set[str]) -> list[NodeSpec]:
 
 
 class ProgressJournal:
-    """Tells how far a mission is whenever that changes."""
+    """Follows the progress of a mission and reports each change of it."""
 
     def __init__(self, tree: CompiledTree, tell: Callable[[MissionProgress], None]) -> None:
         self._tree, self._tell = tree, tell
@@ -267,11 +269,11 @@ class ProgressJournal:
         self.progress = MissionProgress(0)
 
     def note(self, note: TickNote) -> None:
-        """Keeps what a tick brought."""
+        """Takes the changes of a tick."""
         if not note.changes:
             return
         for change in note.changes:
-            if change.after.status is not Status.INVALID:  # a node that is reset was done all the same
+            if change.after.status is not Status.INVALID:  # a reset node keeps its last result
                 self._statuses[change.path_id] = change.after.status
         progress = progress_of(self._tree, self._statuses.get)
         if progress != self.progress:
@@ -281,9 +283,9 @@ class ProgressJournal:
 
 @dataclass
 class FleetRobot:
-    """A robot of the fleet: where it is free next, and from when (s on the robots' clock).
+    """State of a robot of the fleet: its pose and charge when it is free next, at `free_at_s` (s on the robots' clock).
 
-    Its mission to `dock` is None where it cannot charge.
+    `dock` is its charging mission; None if it cannot charge.
     """
 
     placed: PlacedRobot
@@ -297,25 +299,25 @@ class FleetRobot:
     faults: tuple[str, ...] = ()
 
     def ready_s(self, now_s: float, *, busy: bool) -> float:
-        """In how long it is free (s). What is late is expected to be as late again."""
+        """Time until it is free (s); a robot that is late is expected to be as late again."""
         left_s = self.free_at_s - now_s
         return abs(left_s) if busy else max(0.0, left_s)
 
     def routes(self, mission: FleetMission) -> RoutePlanner:
-        """What plans its routes in the world of its missions."""
+        """Returns the robot's route planner in the world of its missions."""
         if self.planner is None:
             world = next(iter(mission.options.values())).world
-            self.planner = route_planner_of(world, self.placed, kept=False)
+            self.planner = route_planner_of(world, self.placed, cached=False)
         return self.planner
 
     @property
     def progress(self) -> MissionProgress:
-        """How far the mission is that it has."""
+        """Progress of its mission."""
         return MissionProgress(0) if self.journal is None else self.journal.progress
 
 
 class Offers:
-    """What robots offer for missions; each route is planned once for each place that it is offered from."""
+    """Bids of the robots, each computed once for each state of mission and robot."""
 
     def __init__(
         self,
@@ -325,22 +327,22 @@ class Offers:
         auction: Auction,
         bid: Callable[[FleetMission, FleetRobot, float], Bid] = bid_for,
     ) -> None:
-        """`now` is the robots' clock (s); `bid` is what a robot offers, but for when it is free."""
+        """`now` returns the robots' clock (s); `bid` computes a bid as if the robot were free now."""
         self._robots, self._battery, self._now, self._auction, self._bid = robots, battery, now, auction, bid
         self._known: dict[tuple[int, str, int, Pose2D, float, bool], Bid] = {}
 
     def known(self, wanted: FleetMission, name: str) -> Bid:
-        """What a robot offers for a mission of the queue."""
+        """Returns a robot's bid for a mission of the queue, computed before if nothing has changed."""
         robot = self._robots[name]
         if (tried := wanted.tried.get(name)) is not None:
             return Bid(wanted.stored.id, name, 0.0, 0.0, problems=(tried,))
-        key = (wanted.stored.id, name, wanted.done, robot.pose, robot.charge, name in self._auction.resting)
+        key = (wanted.stored.id, name, len(wanted.shares), robot.pose, robot.charge, name in self._auction.resting)
         if key not in self._known:
             self._known[key] = self.new(wanted, name)
         return replace(self._known[key], ready_s=self._ready_s(name))
 
     def new(self, wanted: FleetMission, name: str) -> Bid:
-        """What a robot offers from where it is free next; one that charges from its dock."""
+        """Computes a robot's bid from the pose where it is free next; a charging robot bids from its dock."""
         robot = self._robots[name]
         robot.routes(wanted)
         if name in self._auction.resting and robot.dock is not None:
@@ -348,14 +350,14 @@ class Offers:
         return replace(self._bid(wanted, robot, self._battery.low), ready_s=self._ready_s(name))
 
     def _ready_s(self, name: str) -> float:
-        """In how long a robot is free (s); one that charges is as busy as one that has a mission."""
+        """Time until a robot is free (s); a charging robot counts as busy."""
         busy = name in self._auction.resting or name in self._auction.under_way
         return self._robots[name].ready_s(self._now(), busy=busy)
 
     def takes_from(self, name: str, table: SurfaceFacts) -> bool:
-        """Whether a robot that has offered something has a way to where it reaches what another one puts on a table.
+        """Returns whether a robot that has bid before reaches an object that another robot puts on a table.
 
-        That is nearest to the first viewpoint, from which it is put down.
+        The other robot puts the object down at the spot nearest to the table's first viewpoint.
         """
         robot, arm = self._robots[name], robot_kind(self._robots[name].placed.kind).capabilities().arm
         view, planner = table.viewpoints[0], robot.planner
@@ -365,7 +367,7 @@ class Offers:
         x, y = min(there, key=lambda spot: float(np.hypot(*(spot - [view.x, view.y]))))
         yaws = [wrap(2.0 * math.pi * n / _HEADINGS) for n in range(_HEADINGS)]
         return any(
-            is_way(planner, robot.pose, Pose2D(x - d_m * math.cos(yaw), y - d_m * math.sin(yaw), yaw))
+            is_reachable(planner, robot.pose, Pose2D(x - d_m * math.cos(yaw), y - d_m * math.sin(yaw), yaw))
             for d_m in arm.standing_m
             for yaw in yaws
         )
@@ -373,7 +375,7 @@ class Offers:
 
 @dataclass(frozen=True)
 class EndedMission:
-    """A mission's tree as a robot left it; it was under way between two times (s on the robots' clock)."""
+    """Mission that a robot has ended, with its tree; it ran between two times (s on the robots' clock)."""
 
     number: int
     ended: EndedTree
@@ -382,7 +384,7 @@ class EndedMission:
 
 
 def missions_json(store: MissionStore, numbers: Sequence[int]) -> list[dict[str, Any]]:
-    """Missions as JSON values, with their parts and what they are part of: whose each is or was, and how it ended."""
+    """Returns missions, their parts and the missions that they are part of, with robot and outcome, as JSON values."""
     given = GivenMissions(store).all()
     missions = {mission.id: mission for mission in store.missions()}
     wanted = {*numbers, *(whole for number in numbers if (whole := given.get(number, GivenMission()).part_of))}
@@ -406,7 +408,7 @@ def _mission_json(mission: StoredMission, given: Mapping[int, GivenMission]) -> 
 
 
 def missions_message(store: MissionStore, rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Missions as the log has them: what was asked for, whose each is or was, and how it ended."""
+    """Returns the log message on missions: request, robot and outcome of each."""
     requests = {each.id: each.request for each in store.missions()}
     keys = ("id", "robot", "outcome", "reassigned", "message")
     missions = [

@@ -1,4 +1,4 @@
-"""Runs what is queued with several robots in one plant, and writes what is kept of it."""
+"""Runs the queued missions with several robots in one plant; writes log, recording and report."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from plant.worlds.world import World
 from skills.files.errors import InputError, Problems
 
 TIME_LIMIT_S: Final = 1200.0
-"""For each mission of the queue, on the robots' clock."""
+"""Time limit for each mission of the queue, on the robots' clock."""
 _OPEN: Final = frozenset({MissionState.QUEUED.value, MissionState.RUNNING.value})
 
 
@@ -52,9 +52,9 @@ def run_fleet(
     page: PageView | None = None,
     first: Prepared | None = None,
 ) -> None:
-    """Runs until no mission can be given out any more; log, recording and report are written into a folder.
+    """Runs until no mission can be assigned any more; writes log, recording and report into the folder `out`.
 
-    `page` shows it; the log begins with the map that `first` knows. Raises InputError.
+    `page` shows the run; the log begins with the map of the `first` mission. Raises InputError.
     """
     backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
     limit_s = TIME_LIMIT_S * max(1, len(dispatch.missions)) if time_limit_s is None else time_limit_s
@@ -95,13 +95,22 @@ def simulated_fleet(
     tell: Callable[[str], None] = silence,
     record: bool = False,
 ) -> Dispatch:
-    """A fleet in the plant of a world (None: that of the first mission whose world there is). `faults` are by the
-    robots' names; `tell` shows a line; with `record` it leaves a recording and pictures.
+    """Builds a fleet in the plant of a world.
 
-    A mission that is for none of these robots, for another world or that cannot be prepared is left out: it stays in
-    the queue with the cause as its message.
+    A mission that cannot be prepared for these robots in this world stays in the queue, with the reason as its message.
+
+    Args:
+        store: the missions and their state.
+        queued: the missions to run.
+        configs: the robots.
+        world: name or folder; None: the world of the first mission whose world exists.
+        seed: seed of objects and noise.
+        faults: faults in words, by the robots' names.
+        tell: shows a line.
+        record: whether to write a recording and pictures.
+
     Raises:
-        InputError: the robots do not fit into the world, or all missions are left out.
+        InputError: the robots do not fit into the world, or no mission can be run.
     """
     where = _world_of(queued) if world is None else open_world(world)
     knowledge = knowledge_of(where)
@@ -137,7 +146,7 @@ def simulated_fleet(
 
 
 def _world_of(queued: Sequence[StoredMission]) -> World:
-    """The world of the first mission whose world there is. Raises InputError: there is none of them."""
+    """Opens the world of the first mission whose world exists. Raises InputError if none does."""
     problems = Problems()
     for each in queued:
         with problems:
@@ -149,13 +158,13 @@ def _world_of(queued: Sequence[StoredMission]) -> World:
 def _write_report(
     dispatch: Dispatch, out: Path, artifacts: Artifacts, events: Sequence[Event], facts: Sequence[tuple[str, str]]
 ) -> None:
-    """Writes the report of a fleet's run into a folder."""
+    """Writes the report of a fleet's run into the folder `out`."""
     kinds = {name: robot.kind for name, robot in dispatch.robots.items()}
     values = missions_json(dispatch.store, list(dispatch.missions))
     rows: list[MissionRow] = []
-    for row, told in zip(missions_message(dispatch.store, values)["missions"], values, strict=True):
-        seen = None if told["referee"] is None else told["referee"]["success"]
-        word = row["outcome"] if told["referee"] is None else f"{row['outcome']}, {VERDICTS[seen]}"
+    for row, full in zip(missions_message(dispatch.store, values)["missions"], values, strict=True):
+        seen = None if full["referee"] is None else full["referee"]["success"]
+        word = row["outcome"] if full["referee"] is None else f"{row['outcome']}, {VERDICTS[seen]}"
         good = None if row["outcome"] in _OPEN else row["outcome"] == MissionState.SUCCESS.value and seen is not False
         number, robot = row["id"], row["robot"] or ""
         rows.append(MissionRow(number, row["sentence"], robot, good, word, row["reassigned"], row["message"]))

@@ -69,7 +69,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "report": _Command("evaluate_command", "report", "Report the results of an evaluation: rates, causes, failures."),
     "teleop": _Command("robot_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
-    "stack": _Command("stack_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
+    "stack": _Command("plugins_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
     "map": _Command("map_command", "map_group", "Maps that the robot makes itself, by exploring or along a route."),
     "world": _Command("world_command", "world", "Worlds made of any map, and how a world looks."),
     "object": _Command("object_command", "object_group", "Objects of your own: any mesh becomes a model for worlds."),

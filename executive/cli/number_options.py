@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import IO, Annotated, Any
+from typing import IO, Any
 
 import typer
 
 from skills.files.errors import one_line
-from skills.quantities import Quantity, QuantityError, number_in, range_text
-
-LearningRate = Annotated[float, Quantity(ge=1e-6, le=0.1)]
-Minutes = Annotated[float, Quantity(ge=0.01, le=100_000.0, unit="min")]
+from skills.quantities import QuantityError, number_in, range_text
 
 
 class OutOfRangeError(typer.BadParameter):

@@ -1,4 +1,4 @@
-"""`errand plugins`: what other distributions register, and what of it is broken."""
+"""`errand plugins` lists the plug-ins of other distributions; `errand stack show` prints a stack with its options."""
 
 from __future__ import annotations
 
@@ -14,14 +14,18 @@ import typer
 
 from executive.cli.entry import COMMANDS, COMMANDS_GROUP, as_command
 from executive.cli.number_options import quantity_option
+from executive.cli.options import takes_request
 from executive.cli.output import console_for, finish, show_table
+from executive.mission.request import Request
+from executive.mission.stack_file import load_stack
 from executive.store import trigger_source
 from executive.tree import registry
 from plant.robots import robot_kind as kinds
 from skills.files.errors import InputError
 from skills.files.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
+from skills.files.yaml_scalars import yaml_of
 from skills.quantities import Duration
-from skills.stack import SLOTS
+from skills.stack import SLOTS, plain
 
 _WORKERS: Final = 4
 _MORE_S: Final = 30.0
@@ -106,3 +110,20 @@ def _load(key: str, limit_s: float) -> None:
         run_plugin(entry, lambda: as_command(entry.name, entry.load()) if is_command else entry.load(), limit_s=limit_s)
     except PluginDefect as defect:
         raise InputError(f"cannot load {entry.value} ({defect})") from defect
+
+
+stack = typer.Typer(
+    name="stack", help="What a robot uses: localiser, planners, controller, detector.", rich_markup_mode=None
+)
+
+
+@stack.callback()
+def _group() -> None:
+    """Keeps `show` a command of the group, although it is the only one."""
+
+
+@stack.command()
+@takes_request("stack")
+def show(request: Request) -> None:
+    """Prints a stack with all its options as YAML, which --stack takes again."""
+    typer.echo(yaml_of(plain(load_stack(request.stack)), flow_style=False), nl=False)

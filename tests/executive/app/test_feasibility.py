@@ -48,7 +48,7 @@ def test_the_payload_and_the_gripper_are_those_of_the_kind():
 @pytest.mark.parametrize("aside_m", [0.0, 0.02, 0.04, 0.06, 0.08])
 def test_a_fetch_gets_through_the_narrowest_door_of_a_world_wherever_it_begins(aside_m):
     world = load_world("lab")
-    planner = route_planner_of(world, only_robot("Alice", world, kind="fetch"), kept=False)
+    planner = route_planner_of(world, only_robot("Alice", world, kind="fetch"), cached=False)
     route = planner.route(Pose2D(14.38 + aside_m, 10.52, -2.671), Pose2D(15.0, 9.1, 0.0))
     assert 3.0 < route.length_m < 5.0
 

@@ -58,7 +58,7 @@ def test_a_robot_that_can_do_it_offers_its_time_and_what_is_left_of_its_battery(
 
 def test_a_robot_does_not_offer_to_take_something_from_where_it_cannot_come(mission):
     bid = bid_for(mission, robot("Alice", 0.9, Routes(closed=True)), 0.15)
-    assert "there is no way to the kitchen table, where the coke is to be taken" in bid.problems
+    assert "no path leads to the kitchen table, where it must take the coke" in bid.problems
 
 
 def test_a_robot_that_would_be_low_adds_the_time_to_charge(mission, dock):

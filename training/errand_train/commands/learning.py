@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -13,8 +13,21 @@ from errand_train.detector.labels import TrainingDataError, read_split
 from errand_train.detector.schedule import Budget, Report
 from executive.cli.output import print_json
 from skills.files.errors import InputError
+from skills.quantities import Quantity
 
-__all__ = ["LIBRARIES", "budget_of", "check_folders", "check_time", "print_trained", "with_progress"]
+__all__ = [
+    "LIBRARIES",
+    "LearningRate",
+    "Minutes",
+    "budget_of",
+    "check_folders",
+    "check_time",
+    "print_trained",
+    "with_progress",
+]
+
+LearningRate = Annotated[float, Quantity(ge=1e-6, le=0.1)]
+Minutes = Annotated[float, Quantity(ge=0.01, le=100_000.0, unit="min")]
 
 LIBRARIES: Final = ("torch", "onnx", "pycocotools")
 RENDER: Final = "make one: errand dataset render --out DIR --images 8000"

@@ -9,10 +9,19 @@ from typing import Annotated, Final
 import typer
 from rich.console import Console
 
-from errand_train.commands.learning import LIBRARIES, budget_of, check_folders, check_time, print_trained, with_progress
+from errand_train.commands.learning import (
+    LIBRARIES,
+    LearningRate,
+    Minutes,
+    budget_of,
+    check_folders,
+    check_time,
+    print_trained,
+    with_progress,
+)
 from errand_train.detector.schedule import HIGHEST_RATE, REFINING_RATE, Schedule, TrainOptions
 from errand_train.libraries import check_libraries
-from executive.cli.number_options import LearningRate, Minutes, quantity_option
+from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for
 from skills.quantities import Count, Seed
 

@@ -1,4 +1,4 @@
-"""Errand as a library: what a sentence means, what speaks against a mission, and runs in the simulated world.
+"""Errand as a library: understands sentences, checks missions, and runs them in the simulated world.
 
     import executive
 
@@ -38,7 +38,7 @@ def __getattr__(name: str) -> Any:
 
 
 def load_world(name: str = "flat") -> World:
-    """The world of a name that comes with Errand, or of a folder. Raises InputError: there is none."""
+    """Loads a world by the name of a shipped world or by its folder. Raises InputError if there is none."""
     from executive.app.worlds import open_world
 
     return open_world(name)
@@ -47,10 +47,10 @@ def load_world(name: str = "flat") -> World:
 def parse(
     sentence: str, *, knowledge: Knowledge | None = None, require_wake: bool = False, open_words: bool = False
 ) -> Understanding:
-    """What a sentence means: commands, or a refusal that names the words.
+    """Returns the commands that a sentence means, or a refusal that names the words.
 
-    `knowledge` is what the robot knows of its world, by default of `flat`; with `open_words` every name is accepted
-    instead. With `require_wake` the sentence must call the robot by its name.
+    `knowledge` describes the world, by default `flat`; with `open_words` every name is accepted instead. With
+    `require_wake` the sentence must call the robot by its name.
     """
     from executive.app.worlds import knowledge_of
     from executive.language.parser import load_parser
@@ -61,36 +61,33 @@ def parse(
 
 
 def check(request: Request) -> Checked:
-    """What speaks against a request, and how long it takes (s), without running it. It raises nothing for bad input."""
+    """Checks a request without running it: errors, warnings, and an estimate of its duration (s). Never raises."""
     from executive.app.checker import Checker
 
     return Checker().check(request)
 
 
 def run_mission(request: Request, *, control: Control | None = None) -> RunReport:
-    """The report of a request, run to its end in the simulated world; log, pictures and report lie in its folder `out`.
+    """Runs a request in the simulated world and returns its report; writes log and pictures into its folder `out`.
 
-    `control` pauses it, cancels it and so on, from another thread.
+    `control` pauses or cancels the run from another thread.
 
     Raises:
-        InputError: it is not understood, or what `check` finds speaks against it.
+        InputError: the request is not understood, or `check` finds an error in it.
     """
-    from executive.app.feasibility import refuse_impossible
+    from executive.app.checker import prepare_checked
     from executive.app.mission_run import run_request
-    from executive.app.prepare import prepare
 
-    prepared = prepare(request)
-    refuse_impossible(prepared)
-    return run_request(prepared, control=control).report
+    return run_request(prepare_checked(request), control=control).report
 
 
 def evaluate(scenario: Path, *, out: Path, jobs: int = 2) -> Sequence[Case]:
-    """The runs of a scenario file with what came of each, done by `jobs` processes.
+    """Runs an evaluation file in `jobs` processes and returns its runs with their results.
 
-    Results land in `results.sqlite` of the folder `out`; the same call goes on where it stopped.
+    Writes results to `results.sqlite` in the folder `out`; the same call continues an interrupted evaluation.
 
     Raises:
-        InputError: the file, or a mission in it, cannot be used, or the folder holds other results.
+        InputError: the file or a mission in it cannot be used, or the folder holds other results.
     """
     from executive.app.evaluate.evaluation import evaluate_runs, refuse_impossible_runs
     from executive.app.evaluate.evaluation_file import load_evaluation

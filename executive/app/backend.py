@@ -1,4 +1,4 @@
-"""What stands behind a run, simulated or real: nothing else knows which it is."""
+"""Interface of a backend: a simulated or real robot behind a run."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Durable:
-    """What a run needs to be taken up later, or to take up an earlier one.
+    """Stored state of a run, so that a later run can resume it.
 
-    `plant` is the name of the file in which the plant keeps its state for the mission `label`. With `take_up` it
-    begins from what was kept for `take_up_label` (None: for any). `journals` are those of the robots by their names,
-    `poses` where each last believed to be.
+    `plant` is the file in which the plant stores its state for the mission `label`. With `take_up` the run begins from
+    the state stored for `take_up_label` (None: for any mission). `journals` are the robots' journals by name, `poses`
+    their last estimated poses.
     """
 
     plant: Path
@@ -39,54 +39,57 @@ class Durable:
 
     @property
     def troubles(self) -> tuple[str, ...]:
-        """What could not be kept."""
+        """Messages on state that could not be stored."""
         return tuple(dict.fromkeys(trouble for each in self.journals.values() for trouble in each.troubles))
 
 
 class Scene(Protocol):
-    """A live picture of the world, for the page."""
+    """Live 3D picture of the world, for the page."""
 
     @property
     def url(self) -> str:
-        """Where it is served."""
+        """Address of the picture."""
 
     def go_easy(self) -> None:
-        """Refresh it less often."""
+        """Refreshes it less often."""
 
     def follow(self, wanted: bool) -> None:
-        """Lets the camera go along with the robot, or shows the whole world."""
+        """Lets the camera follow the robot, or shows the whole world."""
 
 
 class Backend(Protocol):
-    """A robot and its clock, and what there is besides: a referee, a recording, a live picture."""
+    """Robots and their clock, perhaps with a referee, a recording and a live picture."""
 
     @property
     def clock(self) -> Clock:
-        """The robot's clock."""
+        """The robots' clock."""
 
     def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
-        """The robot of a tree's name with its estimators, its state kept or taken up where `durable` says so.
+        """Returns the robot of a tree with its estimators; with `durable` its state is stored, or resumed.
 
         Raises:
-            InputError: there is no such robot, or something that it needs cannot be read.
+            InputError: there is no such robot, or a file that it needs cannot be read.
         """
 
     def happened(self) -> Sequence[tuple[float, str]]:
-        """What has happened in the world by the run's scenario: times (s) and sentences; none of a real one."""
+        """Returns the scenario's events so far, as times (s) and sentences; empty for a real robot."""
 
     def work(self) -> Mapping[str, int]:
-        """What the backend itself computed, as counters by name; empty for a real robot."""
+        """Returns the backend's work counters by name; empty for a real robot."""
 
     def attach(self, profile: Profile) -> None:
-        """Time the backend's own subsystems."""
+        """Times the backend's subsystems."""
 
     def show_live(self) -> Scene | None:
-        """Begins to show the world, where that can be done."""
+        """Starts the live picture; None if there is none."""
 
     def judge(
         self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
     ) -> RefereeReport | None:
-        """What a referee saw of a mission since it began, of which others did some `before`; None: there is none."""
+        """Returns the referee's report on a mission since `since_s`, with the shares that others did `before`.
+
+        None if there is no referee.
+        """
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
-        """Writes what was recorded into a folder; the recording's path, None where there is none."""
+        """Writes recording and pictures into the folder `out`; returns the recording's path, None if there is none."""

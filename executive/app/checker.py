@@ -1,4 +1,4 @@
-"""Checks missions without running them: all that speaks against them, and what they take."""
+"""Checks missions without running them: errors, warnings, and estimates of time, path and charge."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import Final
 
-from executive.app.feasibility import check_prepared, route_planner_of
+from executive.app.feasibility import check_prepared, refuse_impossible, route_planner_of
 from executive.app.prepare import prepare
 from executive.app.prepared import Prepared
 from executive.app.worlds import refuse_unusable
+from executive.language.questions import Answerer
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, RoutePlanner
@@ -22,9 +23,9 @@ MOST_LETTERS: Final = 300
 
 @dataclass(frozen=True)
 class Checked:
-    """What speaks against a mission, the tree of each of its robots, and what all of them take together.
+    """Result of checking a mission: errors and warnings, the tree of each robot, and one estimate for all robots.
 
-    `file` is its file, where it has one.
+    `file` is the mission's file, if it has one.
     """
 
     file: Path | None
@@ -39,23 +40,28 @@ class Checked:
         return not self.errors
 
 
-class Checker:
-    """Checks missions; the routes planned in each world for each kind of robot are shared among them.
+def prepare_checked(request: Request, *, ask: Answerer | None = None, anyway: bool = False) -> Prepared:
+    """Prepares a request; unless `anyway`, raises InputError with all that `errand check` finds."""
+    prepared = prepare(request, ask=ask)
+    if not anyway:
+        refuse_impossible(prepared)
+    return prepared
 
-    `like` has what the requests of files share: the world in place of the files' own, stack, start, robots and the
-    values of parameters.
-    """
+
+class Checker:
+    """Checker of missions, which plans each route once for each world and kind of robot."""
 
     def __init__(self, like: Request | None = None) -> None:
+        """Takes the options that all files share: world, stack, start, robots and values of parameters."""
         self._like = like or Request()
         self._routes: dict[tuple[Path, str, Path | None], RoutePlanner] = {}
 
     def check_file(self, file: Path) -> Checked:
-        """Checks one file; raises nothing for what stands in it."""
+        """Checks one file. Never raises for its content."""
         return self.check(replace(self._like, file=file))
 
     def check(self, request: Request) -> Checked:
-        """Checks a request; raises nothing for what is asked in it."""
+        """Checks a request. Never raises for its content."""
         trees, file = tuple[CompiledTree, ...](), request.file
         try:
             prepared = prepare(request)
@@ -64,13 +70,13 @@ class Checker:
             checked = {each.mission.robot_name: check_prepared(each, self._planner(each)) for each in prepared.all}
         except InputError as error:
             return Checked(file, _placed(file, (error, *error.others)), trees)
-        except Exception as defect:  # the other files are still to be checked
+        except Exception as defect:  # the other files must be checked as well
             what = f"errand cannot check it ({type(defect).__name__}: {defect})"[:MOST_LETTERS]
             return Checked(file, _placed(file, (InputError(what, hint="report it with this file"),)), trees)
         errors = tuple(error for each in checked.values() for error in each.errors)
         warnings = tuple(warning for each in checked.values() for warning in each.warnings)
         estimates = {name: each.estimate for name, each in checked.items()}
-        return Checked(file, _placed(file, errors), trees, _of_all(prepared, estimates), warnings)
+        return Checked(file, _placed(file, errors), trees, _total(prepared, estimates), warnings)
 
     def _planner(self, prepared: Prepared) -> RoutePlanner:
         world, robot = prepared.world, prepared.robot
@@ -80,8 +86,8 @@ class Checker:
         return self._routes[key]
 
 
-def _of_all(prepared: Prepared, estimates: Mapping[str, Estimate]) -> Estimate:
-    """What several robots take together: until the last is done, all that is driven, the most that one charge gives."""
+def _total(prepared: Prepared, estimates: Mapping[str, Estimate]) -> Estimate:
+    """Combines the estimates of robots: the end of the last one, the sum of distances, the largest charge."""
     after = {each.mission.robot_name: each.after for each in prepared.all}
     done_s: dict[str, float] = {}
     latest_s: dict[str, float] = {}
@@ -97,7 +103,7 @@ def _of_all(prepared: Prepared, estimates: Mapping[str, Estimate]) -> Estimate:
 
 
 def _placed(file: Path | None, errors: Sequence[InputError]) -> tuple[InputError, ...]:
-    """The errors, in the order of their lines; one that names no place stands at the head of the file."""
+    """Sorts errors by file and line; an error without a file gets the first line of `file`."""
     if file is None:
         return tuple(errors)
     placed = [

@@ -1,4 +1,4 @@
-"""The conversations beside a run of the command line: one with each robot, and who of them is meant."""
+"""Conversations during a run: one with each robot, and the choice of the robot that a sentence is for."""
 
 from __future__ import annotations
 
@@ -25,40 +25,40 @@ from executive.words.step import Step
 
 
 def load_ahead() -> None:
-    """Begins to load the parser, in a thread of its own."""
+    """Begins to load the parser in a thread of its own."""
     threading.Thread(target=lambda: load_parser().parse("go"), name="errand-parser", daemon=True).start()
 
 
-class Talk(RunVisitor):
-    """What is said to the robots of a run. All methods may be called from any thread.
+class Conversations(RunVisitor):
+    """Conversations with the robots of a run. All methods may be called from any thread.
 
-    Among several, a sentence is for the robot that it names, else for the first by name; a remark without a name, such
-    as "stop", is for all of them.
+    A sentence is for the robot that it names, else for the first robot by name. A remark without a name, such as
+    "stop", is for all robots.
     """
 
     def __init__(self, prepared: Prepared, control: Control) -> None:
         self._each = {each.mission.robot_name: (each, conversation_of(each, control)) for each in prepared.all}
 
     def listen(self, listener: Callable[[str, Waiting | None], None]) -> None:
-        """Calls `listener` after all that is said to a robot with its name and the question that it then asks."""
+        """Calls `listener` after each sentence with the robot's name and the question that it asks back, if any."""
         for name, (_, conversation) in self._each.items():
             conversation.listen(partial(listener, name))
 
     def set_missions(self) -> None:
-        """The run begins with the missions that were asked for: they can be corrected, and spoken of."""
+        """Tells each conversation its robot's first mission, so that users can correct it and ask about it."""
         for prepared, conversation in self._each.values():
             conversation.set_mission(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
 
     def tick(self, progress: Progress) -> None:
-        """Sees how far the run is."""
+        """Passes the progress to each conversation."""
         for _, conversation in self._each.values():
             conversation.tick(progress)
 
     def hear(self, text: str, robot: str | None = None) -> Reply:
-        """Does what was said, to a robot or to those that it names, and say what became of it. Never raises on text."""
+        """Obeys or answers a sentence, for one robot or for the robots that it names. Never raises on text."""
         if robot is not None and robot not in self._each:
             return Reply(ReplyKind.REFUSED, f"{robot} has nothing to do in this run")
-        names, said = ((robot,), text) if robot is not None else self._meant(text)
+        names, said = ((robot,), text) if robot is not None else self._addressees(text)
         replies = {name: self._each[name][1].hear(said) for name in names}
         if len(replies) == 1:
             return replies[names[0]]
@@ -66,8 +66,8 @@ class Talk(RunVisitor):
         kind = next((each for each in kinds if each is not ReplyKind.REFUSED), ReplyKind.REFUSED)
         return Reply(kind, "; ".join(f"{name}: {reply.text}" for name, reply in replies.items()))
 
-    def _meant(self, text: str) -> tuple[tuple[str, ...], str]:
-        """Whom a sentence is for, and what is said to them."""
+    def _addressees(self, text: str) -> tuple[tuple[str, ...], str]:
+        """Returns the robots that a sentence is for, and the rest of the sentence."""
         names = tuple(self._each)
         if len(names) == 1:
             return names, text
@@ -84,7 +84,7 @@ class Talk(RunVisitor):
 
 
 def conversation_of(prepared: Prepared, control: Control) -> Conversation:
-    """A conversation with the robot of a request, in its world."""
+    """Builds a conversation with the robot of a request."""
     speech = Speech(
         knowledge=prepared.knowledge,
         robot_name=prepared.mission.robot_name,
@@ -96,14 +96,14 @@ def conversation_of(prepared: Prepared, control: Control) -> Conversation:
             robot_name=prepared.mission.robot_name,
             memory=memory,
         ),
-        compile=lambda steps, taken: _compiled(steps, taken, prepared),
+        compile=lambda steps, taken: _compile(steps, taken, prepared),
     )
     robot = prepared.knowledge.robot
     return Conversation(speech, control, require_wake=robot.require_wake, others=robot.others)
 
 
-def _compiled(steps: Sequence[Step], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
-    """The tree of a mission of these steps, under a name that is not taken. Raises InputError, as `check` does."""
+def _compile(steps: Sequence[Step], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
+    """Compiles and checks a mission of these steps, under a name that is not taken. Raises InputError."""
     mission = Mission.from_steps(steps, world=prepared.world.name, robot=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)

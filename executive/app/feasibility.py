@@ -1,4 +1,4 @@
-"""What is known beforehand of whether a mission can be done: the routes in its world, and what the robot is able to."""
+"""Checks whether a mission can be done: routes on the map, and the abilities of the robot."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache, cached_property
@@ -30,9 +29,10 @@ from skills.stack import DEFAULT_FILE, default_component
 
 
 class _RoutesOnMap(RoutePlanner):
-    """Routes on the robot's map of a world for the robot's footprint; the map is read when the first is asked for.
+    """Planner of routes on the robot's map of a world, for the robot's footprint.
 
-    The costmap and the planner of its stack plan them; of the stack that comes with Errand only these are loaded.
+    It reads the map at the first route. The costmap and the planner of the robot's stack plan; of the default stack
+    only these two are loaded.
     """
 
     def __init__(self, world: World, robot: PlacedRobot) -> None:
@@ -52,7 +52,7 @@ class _RoutesOnMap(RoutePlanner):
         return PlannedRoutes(costmap.build(keepout_map), Footprint.of(self._robot.capabilities), planner)
 
     def route(self, start: Pose2D, goal: Pose2D) -> Route:
-        """The route from start to goal. Raises ValueError with one sentence when there is none, InputError."""
+        """Plans a route. Raises ValueError with one sentence if there is none, InputError if the map is broken."""
         return self._routes.route(start, goal)
 
 
@@ -62,7 +62,7 @@ def route_planner_of(world: World, robot: PlacedRobot, *, cached: bool = True) -
     With `cached` the routes are stored for later processes. Without a map the first route raises InputError.
 
     Raises:
-        InputError: with file and line where its stack file cannot be used.
+        InputError: its stack file cannot be used; with file and line.
     """
     facts = robot_kind(robot.kind).facts
     files = (facts,) if robot.stack_file is None else (facts, robot.stack_file)
@@ -71,24 +71,28 @@ def route_planner_of(world: World, robot: PlacedRobot, *, cached: bool = True) -
 
 
 def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> Checked:
-    """What speaks against a request that was understood, and what it takes; `planner` is one that knows routes.
+    """Checks a prepared request: errors, warnings, and an estimate. `planner` may hold routes that are planned already.
 
     Raises:
         InputError: the world's map or the request's stack file cannot be used.
     """
     world, robot = prepared.world, prepared.robot
+    abilities = abilities_in(world, robot.kind)
+    if robot.stack_file is not None and robot.stack.detector != default_component("detector"):
+        seen = abilities.classes & frozenset(shared_detector(robot.stack).class_names)
+        abilities = replace(abilities, classes=seen)
     return check_tree(
         prepared.tree,
         knowledge=prepared.knowledge,
         start=world.start,
-        abilities=_by_sight(abilities_in(world, robot.kind), robot),
+        abilities=abilities,
         planner=planner or route_planner_of(world, robot),
         estimates=load_estimates(),
     )
 
 
 def refuse_impossible(prepared: Prepared) -> None:
-    """Raises InputError for all that `errand check` finds, before anything moves."""
+    """Raises InputError with all that `errand check` finds."""
     refuse_unusable(prepared.world)
     problems = Problems()
     for error in (error for each in prepared.all for error in check_prepared(each).errors):
@@ -97,7 +101,7 @@ def refuse_impossible(prepared: Prepared) -> None:
 
 
 def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
-    """What a kind of robot can lift, and what the lightest object of each class weighs in a world with imports."""
+    """Returns the abilities of a kind of robot in a world: imported models, people who take objects, full surfaces."""
     abilities = abilities_of(kind)
     masses, others = dict(abilities.masses_kg), {rule.model for rule in world.seed_rules.objects}
     for name in sorted(others & set(world.imports)):
@@ -115,16 +119,9 @@ def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
     return replace(abilities, masses_kg=masses, takers=takers, taken_m2=taken_m2, apart_m=rules.rules.clear_m)
 
 
-def _by_sight(abilities: Abilities, robot: PlacedRobot) -> Abilities:
-    """The abilities with only those classes that the detector of the robot's stack knows. Raises InputError."""
-    if robot.stack_file is None or robot.stack.detector == default_component("detector"):
-        return abilities
-    return replace(abilities, classes=abilities.classes & frozenset(shared_detector(robot.stack).class_names))
-
-
 @cache
 def abilities_of(kind: str) -> Abilities:
-    """What a kind of robot can lift and reach, and what the lightest and narrowest of each class are like, else 0.0."""
+    """Returns payload, reach and gripper of a kind of robot, and the least mass and width of each object class."""
     known = {name: form.mass_kg for name, form in class_forms().items() if name in load_catalogue()}
     masses = {name: 0.0 if mass_kg is None else mass_kg[0] for name, mass_kg in known.items()}
     capabilities = robot_kind(kind).capabilities()
@@ -141,8 +138,11 @@ def abilities_of(kind: str) -> Abilities:
 
 
 def reached_heights_m(capabilities: Capabilities) -> tuple[float, float]:
-    """The lowest and the highest surface (m over the floor) that an arm reaches: by its length alone, the body as low
-    and as high as it goes, as near to the surface as it stands. All heights without an arm that we can move."""
+    """Lowest and highest surface that the arm reaches, in metres above the floor.
+
+    Counts the arm's length, the range of body heights, and the nearest standing distance. Unlimited without an arm
+    that can be planned for.
+    """
     try:
         model, arm = arm_model(capabilities), capabilities.arm
     except ValueError:
@@ -159,21 +159,21 @@ _SKILLS: Final = DEFAULT_FILE.parent
 
 
 class RouteCache(RoutePlanner):
-    """Routes kept in a file. It plans those that the file does not have, and adds them for later processes."""
+    """Cache of routes in a file; missing routes are planned and added for later processes."""
 
     def __init__(self, file: Path, planned: RoutePlanner) -> None:
         self._file, self._planned = file, planned
 
     @cached_property
     def _routes(self) -> dict[str, list[float] | str]:
-        """By start and goal: length and progress of a route, or why there is none."""
+        """Length and progress of each route by start and goal, or the reason why there is none."""
         with suppress(OSError, ValueError):
             routes: dict[str, list[float] | str] = json.loads(self._file.read_text(encoding="utf-8"))
             return routes
         return {}
 
     def route(self, start: Pose2D, goal: Pose2D) -> Route:
-        """The route from start to goal. Raises ValueError with one sentence when there is none."""
+        """Returns a route, planned if the file lacks it. Raises ValueError with one sentence if there is none."""
         name = f"{start} {goal}"
         if name not in self._routes:
             try:
@@ -182,31 +182,22 @@ class RouteCache(RoutePlanner):
             except ValueError as error:
                 self._routes[name] = str(error)
             with suppress(OSError):
-                self._write()
+                self._file.parent.mkdir(parents=True, exist_ok=True)
+                partial = self._file.with_suffix(f".{os.getpid()}")
+                partial.write_text(json.dumps(self._routes), encoding="utf-8")
+                partial.replace(self._file)  # another process sees the old file or the new one
         known = self._routes[name]
         if isinstance(known, str):
             raise ValueError(known)
         return Route(*known)
 
-    def _write(self) -> None:
-        """Writes the file; another process sees the old one or the new one."""
-        self._file.parent.mkdir(parents=True, exist_ok=True)
-        draft = self._file.with_suffix(f".{os.getpid()}")
-        draft.write_text(json.dumps(self._routes), encoding="utf-8")
-        draft.replace(self._file)
-
 
 def route_cache_of(world: World, planned: RoutePlanner, *robot_files: Path) -> RouteCache:
-    """The routes kept for a world. They are planned again once its maps, the planner or the robot's files change."""
+    """Returns the route cache of a world; its file name changes with the maps, the planner and the robot's files."""
     planner = (DEFAULT_FILE, *_SKILLS.glob("navigate/*.py"), *_SKILLS.glob("estimate/*.py"), *_SKILLS.glob("*.py"))
-    digest = _digest((*world.keepout_map_path.parent.glob("*"), *planner, *robot_files))
+    files, content = (*world.keepout_map_path.parent.glob("*"), *planner, *robot_files), hashlib.sha256()
+    for file in sorted(path for path in files if path.is_file()):
+        content.update(file.name.encode() + hashlib.sha256(file.read_bytes()).digest())
+    digest = content.hexdigest()[:24]
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return RouteCache(home / "errand" / "routes" / f"{digest}.json", planned)
-
-
-def _digest(files: Iterable[Path]) -> str:
-    """A digest of files' names and contents."""
-    told = hashlib.sha256()
-    for file in sorted(path for path in files if path.is_file()):
-        told.update(file.name.encode() + hashlib.sha256(file.read_bytes()).digest())
-    return told.hexdigest()[:24]

@@ -1,4 +1,4 @@
-"""Compiles the numeric code of drives, scans, arms and maps into numba's cache, by doing a little of each."""
+"""Compiles the numeric code of driving, scans, arms and maps into numba's cache by short runs of each."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _DRIVES: Final = (
     ("spot", "{localiser: {use: scan_matching}, costmap: {use: rolling}, controller: {use: mppi}}"),
     ("fetch", None),
 )
-"""Kinds of robots that drive, and the components in place of their default ones."""
+"""Kinds of robots, and the components in place of their default ones."""
 TICK_S: Final = 0.05
 _DRIVEN_S: Final = 2.5
 _SURVEYED_S: Final = 4.0
 
 
 def newly_compiled() -> int:
-    """How many functions this process compiled that numba's cache did not hold."""
+    """Number of functions that this process has compiled because numba's cache lacked them."""
     modules = [module for name, module in sys.modules.items() if name.startswith(("skills.", "plant."))]
     values = [value for module in modules for value in vars(module).values()]
     compiled: list[Any] = [
@@ -50,20 +50,20 @@ def newly_compiled() -> int:
 
 
 def compile_kernels() -> None:
-    """Drives a little with each kind of robot and each component, bends an arm, and surveys a little.
+    """Drives with each kind of robot and component, moves an arm, and surveys, each for a short time.
 
-    Takes some seconds where the cache already holds all of it.
+    Takes some seconds if the cache holds all code already.
     """
     with TemporaryDirectory() as folder:
         for number, (kind, stack) in enumerate(_DRIVES):
-            _begin(kind, stack, Path(folder) / str(number))
-    _bend_arm()
-    _see_cells()
+            _drive(kind, stack, Path(folder) / str(number))
+    _solve_arm()
+    _map_cells()
     _survey()
 
 
-def _begin(kind: str, components: str | None, folder: Path) -> None:
-    """Drives for some seconds towards a place, as a mission does."""
+def _drive(kind: str, components: str | None, folder: Path) -> None:
+    """Runs a mission that drives for some seconds."""
     folder.mkdir()
     mission, stack = folder / "warm_up.yaml", None
     mission.write_text(_MISSION, encoding="utf-8")
@@ -75,8 +75,8 @@ def _begin(kind: str, components: str | None, folder: Path) -> None:
     run_request(prepared, SimulatedBackend(prepared.world, prepared.robots, seed=1, record=False))
 
 
-def _bend_arm() -> None:
-    """Solves for the joints of an arm that has seven, and checks it against a box."""
+def _solve_arm() -> None:
+    """Solves the inverse kinematics of an arm with seven joints, and checks it for collisions with a box."""
     from pydrake.math import RigidTransform
 
     from plant.robots.robot_kind import robot_kind
@@ -93,8 +93,8 @@ def _bend_arm() -> None:
     gaps_m(box, [box], np.zeros((1, 3)))
 
 
-def _see_cells() -> None:
-    """Takes in a depth picture for the arm."""
+def _map_cells() -> None:
+    """Adds a depth picture to the arm's occupied cells."""
     from pydrake.math import RigidTransform
 
     from skills.manipulation.arm.solid_cells import Outline, with_picture
@@ -107,7 +107,7 @@ def _see_cells() -> None:
 
 
 def _survey() -> None:
-    """Begins to make a map, and looks for a place in it and, by comparing scans, in the map of a world."""
+    """Begins a map, and localises in it and, by scan matching, in the map of a world."""
     from executive.app.simulated import simulate
     from skills.estimate.grid_map import load_grid_map
     from skills.estimate.matching import score_poses

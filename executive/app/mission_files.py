@@ -1,4 +1,4 @@
-"""Mission files by their names: those that come with Errand, and poses saved by hand, each a mission of its own."""
+"""Mission files: the shipped ones by name, and saved poses, each as a mission of its own."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ FOLDER: Final = Path(__file__).resolve().parents[2] / "missions"
 
 
 def shipped_missions() -> dict[str, Path]:
-    """The files of the missions that come with Errand, by name."""
+    """Returns the files of the shipped missions by name."""
     return {file.stem: file for file in sorted(FOLDER.glob("*.yaml"))}
 
 
 def mission_file(named: Path) -> Path:
-    """The file itself where it is there, else the shipped mission of that name.
+    """Returns the file itself if it exists, else the shipped mission of that name.
 
     Raises:
-        InputError: a bare name that is neither.
+        InputError: a name without a folder that is neither.
     """
     if is_there(named) or named.parent not in (Path(), Path(FOLDER.name)):
         return named
@@ -36,7 +36,7 @@ def mission_file(named: Path) -> Path:
     if named.suffix:
         return named
     near = did_you_mean(named.name, known)
-    hint = f"did you mean '{near}'?" if near else "`errand missions` lists those that come with Errand"
+    hint = f"did you mean '{near}'?" if near else "`errand missions` lists the missions that come with Errand"
     raise InputError("there is no such mission", hint=hint, file=named)
 
 
@@ -44,7 +44,7 @@ _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,59}")
 
 
 def pose_text(name: str, pose: SavedPose, *, world: str) -> str:
-    """The mission file of a pose: drive there, take the arm's pose, set the gripper."""
+    """Returns the text of a mission that drives to a pose and sets arm and gripper."""
     base = {"x": pose.base.x_m, "y": pose.base.y_m, "yaw": pose.base.yaw_rad}
     steps: list[dict[str, object]] = [{"skill": "navigate", "with": {key: round(v, 3) for key, v in base.items()}}]
     if pose.joints_rad:
@@ -55,16 +55,17 @@ def pose_text(name: str, pose: SavedPose, *, world: str) -> str:
 
 
 def save_pose(folder: Path, name: str | None, pose: SavedPose, *, world: str) -> Path:
-    """Writes a pose as NAME.yaml, `pose_1` and so on without a name. Raises InputError: there is one, or it cannot be.
+    """Writes a pose as NAME.yaml, without a name as `pose_1` and so on; never overwrites a file.
 
-    A file that is there is never overwritten.
+    Raises:
+        InputError: the name is taken or not allowed, or the file cannot be written.
     """
     name = name or next(free for n in range(1, 10_000) if not (folder / f"{(free := f'pose_{n}')}.yaml").exists())
     path = folder / f"{name}.yaml"
     if not _NAME.fullmatch(name):
         raise InputError(f"'{name[:60]}' is no name for a pose", hint="use letters, digits, '_' and '-'")
     if path.exists():
-        raise InputError("there is a pose of this name", hint="give another name", file=path)
+        raise InputError("a pose of this name exists", hint="give another name", file=path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with path.open("x", encoding="utf-8") as file:

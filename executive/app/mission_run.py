@@ -1,4 +1,4 @@
-"""Runs one request from beginning to end on a backend: tree, log, verdicts, and what is left in the output folder."""
+"""Runs one request on a backend and writes log, tree, report and pictures into its folder."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ _MOST_STARTS: Final = 1000
 
 
 @dataclass(frozen=True)
-class Finished:
-    """A run that has ended: its report, and the tree in its last state."""
+class FinishedRun:
+    """Report of an ended run, and the last state of its tree."""
 
     report: RunReport
     tree: NodeView
@@ -67,16 +67,18 @@ def run_request(
     page: PageView | None = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
-) -> Finished:
-    """Runs a request on a backend and writes log, tree, report and what that has recorded into its folder.
+) -> FinishedRun:
+    """Runs a prepared request and writes log, tree, report and pictures into its folder.
 
-    Without a backend it runs in the plant. The log and the other `visitors` watch it; through `control` the run is
-    held, cancelled, and so on; `page` shows it; with `durable` another process can take it up, or this one takes up
-    another's; `profile` times the subsystems. Raises InputError when the world cannot be used.
+    The `backend` is by default the plant of the request's world. `visitors` and the log watch the run, `control`
+    pauses, steps and cancels it, and `page` shows it. `durable` stores its state so that another process can resume
+    it, or resumes an earlier run. `profile` measures the time of the subsystems.
+
+    Raises InputError if the world or the stored state cannot be used.
     """
     request, scenario, settings = prepared.request, prepared.request.scenario, _settings(prepared.request)
     out, world, kinds = request.out, prepared.world, {name: robot.kind for name, robot in prepared.robots.items()}
-    backend = backend or _in_the_plant(prepared)
+    backend = backend or simulated_backend(prepared)
     entries = [entry_for(each, backend, durable) for each in prepared.all]
     idle = [name for name in kinds if all(name != entry.tree.robot_name for entry in entries)]
     spare = [backend.entry(replace(prepared.tree, robot_name=name), None) for name in idle]
@@ -98,39 +100,33 @@ def run_request(
         control = control or Control(pace=None)
         with ended_by_signals(control.cancel), LockStepWorker(clock) as worker:
             result = run(
-                entries,
-                clock=clock,
-                worker=worker,
-                visitors=watching,
-                settings=settings,
-                control=control,
-                spare=spare,
+                entries, clock=clock, worker=worker, visitors=watching, settings=settings, control=control, spare=spare
             )
-        if durable is not None:  # the next mission begins in the world that this one leaves
+        if durable is not None:  # the next mission of the queue begins in the world that this one leaves
             next(iter(durable.journals.values())).keep_world()
             for trouble in durable.troubles:
                 error = {"node": prepared.tree.robot_name, "what": "keep the mission's state", "traceback": trouble}
                 log(ERROR_TOPIC, error)
         counts = dict(sorted(Counter({**result.work, **backend.work(), "bytes_logged": log.bytes}).items()))
         log(WORK, counts)
-    finished, recording = _concluded(prepared, backend, result, log, artifacts, counts)
+    finished, recording = _conclude(prepared, backend, result, log, artifacts, counts)
     if page is not None:
         page.offer(recording)
     return finished
 
 
-def _concluded(
+def _conclude(
     prepared: Prepared,
     backend: Backend,
     result: RunResult,
     log: EventLog,
     artifacts: Artifacts,
     counts: Mapping[str, int],
-) -> tuple[Finished, Path | None]:
-    """The report of a run, written into its folder with what was recorded; the path of the recording."""
+) -> tuple[FinishedRun, Path | None]:
+    """Judges an ended run and writes report, pictures and recording; returns the recording's path as well."""
     out, events = prepared.request.out, mission_events(log.path)
     artifacts.recall(events)
-    finished, ended = _judged(prepared, backend, result, log)
+    finished, ended = _judge(prepared, backend, result, log)
     report = with_findings(replace(finished.report, work=counts), prepared.knowledge, result, artifacts, events)
     draw_answer(artifacts, out)
     recording = backend.leave(artifacts, out)
@@ -138,8 +134,8 @@ def _concluded(
     return replace(finished, report=report), recording
 
 
-def _in_the_plant(prepared: Prepared) -> Backend:
-    """The plant of a request's world."""
+def simulated_backend(prepared: Prepared) -> Backend:
+    """Builds the plant of a request's world."""
     compile_first()
     request = prepared.request
     return SimulatedBackend(
@@ -148,28 +144,28 @@ def _in_the_plant(prepared: Prepared) -> Backend:
         seed=request.seed,
         record=request.record,
         variation=request.variation,
-        spared=spoken_classes(prepared),
+        spared=mentioned_classes(prepared),
     )
 
 
-def spoken_classes(prepared: Prepared) -> frozenset[str]:
-    """The classes of the objects that a mission speaks of; clutter is of none of them."""
+def mentioned_classes(prepared: Prepared) -> frozenset[str]:
+    """Classes of the objects that a mission mentions; clutter has none of them."""
     named = {each.name for command in prepared.tree.commands for each in (command.item, command.object) if each}
     known = prepared.knowledge
     return frozenset(one for name in named for one in known.classes(known.object_name(name) or name))
 
 
 def log_map(log: EventLog, world: World, knowledge: Knowledge) -> None:
-    """Writes the map into the log, so that the log stands alone."""
+    """Writes the map into the log, so that the log needs no other file."""
     log(MAP, map_message(load_grid_map(world.scan_map_path), knowledge, world=world.name))
 
 
 def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> RunEntry:
-    """The robot of a mission with its faults, and its numeric code warm."""
+    """Returns the robot of a mission with its faults, its numeric code compiled."""
     entry, clock = backend.entry(prepared.tree, durable), backend.clock
     preload(entry)
     every = map(parse_fault, prepared.request.scenario.faults)
-    faults = [each for each in every if not each.over_by(clock.now())]  # some are, in a run that goes on
+    faults = [each for each in every if not each.over_by(clock.now())]  # a resumed run may be past some faults
     return replace(
         entry,
         robot=with_faults(entry.robot, clock, faults, since_s=0.0),
@@ -179,7 +175,7 @@ def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> 
 
 
 def _settings(request: Request) -> RunSettings:
-    """The settings of a run: seed, time of day, and time limit."""
+    """Returns the settings of a run: seed, time of day and time limit."""
     usual = RunSettings(seed=request.seed)
     limit_s = usual.time_limit_s if request.time_limit_s is None else request.time_limit_s
     hours, minutes = map(int, (request.time_of_day or "0:0").split(":"))
@@ -188,18 +184,18 @@ def _settings(request: Request) -> RunSettings:
 
 
 def log_name(start: int) -> str:
-    """The name of the log of a mission's first start, second start, and so on."""
+    """Returns the name of the log of a mission's first start, second start, and so on."""
     return "log.mcap" if start == 1 else f"log-{start}.mcap"
 
 
 def mission_events(log: Path) -> tuple[Event, ...]:
-    """The events of a log, after those of the earlier starts of the mission, as far as their logs can still be read.
+    """Returns the events of all starts of a mission, from this log and the readable logs of earlier starts.
 
-    Raises InputError: the log itself cannot be read.
+    Raises InputError if this log cannot be read.
     """
 
     def facts(events: Sequence[Event]) -> object:
-        """What a log says at its beginning: the commands, the world, the seed."""
+        """Returns the commands, world and seed at the beginning of a log."""
         return next((event.data for event in events if event.topic == RUN), None)
 
     events, before = read_events(log), list[Event]()
@@ -212,12 +208,12 @@ def mission_events(log: Path) -> tuple[Event, ...]:
     return (*before, *events)
 
 
-def _judged(
+def _judge(
     prepared: Prepared, backend: Backend, result: RunResult, log: EventLog
-) -> tuple[Finished, Sequence[EndedTree]]:
-    """The report of a run with what the referee saw, and the tree of each robot as it ended.
+) -> tuple[FinishedRun, Sequence[EndedTree]]:
+    """Builds the report of a run with the referee's verdict, and the last state of each robot's tree.
 
-    What the others moved in the same run was moved by a robot's mission, too.
+    Objects that the other robots moved count as moved by the mission.
     """
     shares = {each.robot_name: Share(each.tree, each, 0) for each in result.robots}
     robots: dict[str, RobotReport] = {}
@@ -239,13 +235,13 @@ def _judged(
         scenario=(*prepared.request.scenario.lines(), *prepared.request.variation.lines()),
         robots=robots if prepared.request.robots else {},
     )
-    return Finished(report, views[worst]), [
+    return FinishedRun(report, views[worst]), [
         EndedTree(shares[name].tree, view, robots[name]) for name, view in views.items()
     ]
 
 
 def robot_report(ended: RobotResult, kind: str, seen: RefereeReport | None) -> RobotReport:
-    """How a robot's mission ended, and what the referee has seen of it."""
+    """Returns a robot's report: outcome, commands, and the referee's verdict."""
     return RobotReport(
         kind=kind,
         outcome=ended.outcome.value,
@@ -257,7 +253,7 @@ def robot_report(ended: RobotResult, kind: str, seen: RefereeReport | None) -> R
 
 
 def preload(entry: RunEntry) -> None:
-    """Takes in the robot's first scan and plans a short way; the first time on a machine this takes some seconds."""
+    """Processes the robot's first scan and plans a short path, so that all code is compiled before the run."""
     robot, localiser, costmap = entry.robot, entry.localiser, entry.costmap
     localiser.update(robot)
     estimate = localiser.estimate()
@@ -266,7 +262,7 @@ def preload(entry: RunEntry) -> None:
     there = Pose2D(here.x_m, here.y_m, here.yaw_rad + 0.5)
     with suppress(PlanningError):
         plan_path(costmap, Footprint.of(robot.capabilities()), here, there)
-    # what lives as long as the run is kept out of garbage collections; what an earlier run left is collected first
+    # objects that live as long as the run are excluded from garbage collection; garbage of an earlier run goes first
     if gc.get_freeze_count():
         gc.unfreeze()
         gc.collect()
@@ -274,12 +270,12 @@ def preload(entry: RunEntry) -> None:
 
 
 class RunProfile(RunVisitor):
-    """Times the parts of a run; what none of them takes is the executive's own."""
+    """Timer of a run's subsystems; the rest of the time counts for the executive."""
 
     def __init__(
         self, profile: Profile, backend: Backend, logs: Iterable[RunVisitor], journals: Iterable[RunVisitor]
     ) -> None:
-        """`logs` are those that write the log, `journals` those that write the store."""
+        """`logs` are the visitors that write the log, `journals` those that write the store."""
         self._profile, self._backend = profile, backend
         self._begun_s = 0.0
         for each in logs:
@@ -288,7 +284,7 @@ class RunProfile(RunVisitor):
             profile.attach("journal", each, "tick")
 
     def begin(self, settings: RunSettings, worker: Worker) -> None:
-        """Time the backend's subsystems and what the worker does."""
+        """Times the backend's subsystems and the worker's jobs."""
         self._backend.attach(self._profile)
         submit, timed = worker.submit, self._profile.timed
 
@@ -300,7 +296,7 @@ class RunProfile(RunVisitor):
         self._begun_s = self._profile.enter()
 
     def mission_begun(self, nodes: Sequence[Behaviour], context: RunContext) -> None:
-        """Time what a robot's estimators, detector and skills do."""
+        """Times a robot's estimators, detector and skills."""
         attach = self._profile.attach
         attach("localiser", context.localiser, "update")
         attach("costmap", context.costmap, "update", "add_points", "clearance_m")
@@ -311,7 +307,7 @@ class RunProfile(RunVisitor):
                 attach("skills", leaf, "initialise", "update", "terminate")
 
     def end(self, result: RunResult) -> None:
-        """The executive has done its part."""
+        """Ends the measurement."""
         self._profile.leave("executive", self._begun_s)
 
 
@@ -321,28 +317,28 @@ EVENT: Final = "event"
 
 
 class DisturbanceLog(RunVisitor):
-    """Logs after each tick which faults begin and end, and what happens in the world whatever the robot does."""
+    """Logger of the faults that begin and end, and of the events in the world."""
 
     def __init__(self, publish: Publish, robot: Robot, happened: Happened) -> None:
-        """`happened` gives all that has happened in the world so far: times (s) and sentences."""
+        """`happened` returns all events in the world so far, as times (s) and sentences."""
         self._publish, self._happened = publish, happened
         self._robot = robot if isinstance(robot, FaultyRobot) else None
-        self._at_work: tuple[str, ...] = ()
-        self._told = len(happened())
+        self._active: tuple[str, ...] = ()
+        self._logged = len(happened())
 
     def tick(self, progress: Progress) -> None:
-        """Logs what has begun, ended or happened since the last tick."""
-        for now_s, sentence in self._happened()[self._told :]:
+        """Logs the faults and events since the last tick."""
+        for now_s, sentence in self._happened()[self._logged :]:
             self._log(now_s, EVENT, sentence)
-        self._told = len(self._happened())
+        self._logged = len(self._happened())
         now = () if self._robot is None else self._robot.faults_at_work()
         for words in now:
-            if words not in self._at_work:
+            if words not in self._active:
                 self._log(progress.now_s, FAULT, f"{words}: begins")
-        for words in self._at_work:
+        for words in self._active:
             if words not in now:
                 self._log(progress.now_s, FAULT, f"{words}: is over")
-        self._at_work = now
+        self._active = now
 
     def _log(self, now_s: float, what: str, message: str) -> None:
         self._publish(CONTROL, {"t": round(now_s, 6), "what": what, "message": message})
@@ -352,10 +348,10 @@ _LIBRARY: Final = ctypes.CDLL(None)
 
 
 def return_memory() -> None:
-    """Returns what no mission needs any more to the system.
+    """Returns freed memory to the system.
 
-    The C library keeps what was freed, in pieces that the next mission hardly fits into; a worker would grow by some
-    hundred megabytes with each mission. It does nothing where the C library has no `malloc_trim`.
+    Otherwise a worker would grow by some hundred megabytes with each mission, because the C library keeps freed memory
+    in small pieces. Does nothing if the C library has no `malloc_trim`.
     """
     gc.collect()
     with suppress(AttributeError):

@@ -1,4 +1,4 @@
-"""`--view`: the live page of one run, which stays as a replay when the run has ended."""
+"""The live page of a run (`--view`), which stays as a replay after the end."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from executive.app.backend import Scene
-from executive.app.conversations import Talk, load_ahead
-from executive.app.feasibility import refuse_impossible
+from executive.app.checker import prepare_checked
+from executive.app.conversations import Conversations, load_ahead
 from executive.app.mission_files import shipped_missions
-from executive.app.prepare import prepare
 from executive.app.prepared import Prepared
 from executive.conversation import ReplyKind
 from executive.mission.parameters import parse_values
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
 
 
 class PageView(RunVisitor):
-    """The page of one run: `serve` before it, `offer` and `stay` after it."""
+    """Live page of one run: call `serve` before the run, `offer` and `stay` after it."""
 
     def __init__(
         self,
@@ -48,49 +47,56 @@ class PageView(RunVisitor):
         port: int = 0,
         later: Callable[[str], str] | None = None,
     ) -> None:
-        """`prepared` is what robots are asked for who can be spoken to; without it the page hears no sentences. `tell`
-        shows a line.
+        """Without a `prepared` request the page takes no sentences.
 
-        `later` queues a sentence and says so; without it the page offers no queue.
+        `tell` shows a line. `later` queues a sentence and returns an answer; without it the page offers no queue.
         """
         self._tell, self._port, self._later = tell, port, later
         self.control = Control(attended=True)
         self._feed = Feed()
         self._progress = ProgressWatch(self._feed)
-        self.talk = None if prepared is None else Talk(prepared, self.control)
-        if self.talk is not None:
-            self.talk.listen(lambda name, waiting: self._feed.tell(f"asked/{name}", asked_json(waiting, name)))
+        self.conversations = None if prepared is None else Conversations(prepared, self.control)
+        if self.conversations is not None:
+            self.conversations.listen(lambda name, waiting: self._feed.tell(f"asked/{name}", asked_json(waiting, name)))
         self._server: PageServer | None = None
         self._watch: ControlWatch | None = None
 
     def serve(self, log: EventLog, scene: Scene | None) -> None:
-        """Serves the page and prints its address. Raises InputError when the port is taken."""
+        """Serves the page and shows its address. Raises InputError if the port is taken."""
         from executive.view.server import PageContent, serve
 
         log.listen(self._feed)
         sentences: dict[str, Action] = {}
-        if self.talk is not None:
+        if self.conversations is not None:
             load_ahead()
-            sentences["say"] = said(self._hear)
+            sentences["say"] = sentence_action(self.hear)
         if (later := self._later) is not None:
-            sentences["queue"] = said(lambda sentence, _: later(sentence))
+            sentences["queue"] = sentence_action(lambda sentence, _: later(sentence))
         actions = {**control_actions(self.control), **sentences, **({} if scene is None else scene_actions(scene))}
         content = PageContent(self._feed, actions, scene_url=None if scene is None else scene.url)
         self._server = serve(content, self._port)
         self._watch = ControlWatch(self.control, self._feed)
         self._tell(f"The page: {self._server.url}")
 
+    def hear(self, sentence: str, robot: str | None) -> str:
+        """Returns the robots' reply to a sentence. Raises InputError with the reason of a refusal."""
+        assert self.conversations is not None
+        reply = self.conversations.hear(sentence, robot)
+        if reply.kind in (ReplyKind.REFUSED, ReplyKind.IGNORED):
+            raise InputError(reply.text)
+        return reply.text
+
     def tick(self, progress: Progress) -> None:
-        """Tells how far the run is."""
+        """Sends the progress to the page."""
         self._progress.tick(progress)
 
     def offer(self, recording: Path | None) -> None:
-        """The run is over; from now on the page shows the recording where there is one."""
+        """Shows the recording of the ended run, if there is one."""
         if self._server is not None and recording is not None and recording.is_file():
             self._server.offer_recording(recording)
 
     def stay(self, limit_s: float | None) -> None:
-        """Keeps serving until Ctrl-C or the limit (s, on the wall's clock), and closes."""
+        """Serves until Ctrl-C or the limit (s, wall time), and closes."""
         from executive.view.server import wait
 
         try:
@@ -101,23 +107,15 @@ class PageView(RunVisitor):
             self.close()
 
     def close(self) -> None:
-        """Serves no more; idempotent."""
+        """Stops serving; idempotent."""
         if self._watch is not None:
             self._watch.close()
         if self._server is not None:
             self._server.close()
 
-    def _hear(self, sentence: str, robot: str | None) -> str:
-        """Has what was typed done, or answered; raises InputError with the reason where it cannot be."""
-        assert self.talk is not None
-        reply = self.talk.hear(sentence, robot)
-        if reply.kind in (ReplyKind.REFUSED, ReplyKind.IGNORED):
-            raise InputError(reply.text)
-        return reply.text
 
-
-def said(do: Callable[[str, str | None], str]) -> Action:
-    """An action that does something with the sentence that was typed, for the robot that it is meant for."""
+def sentence_action(do: Callable[[str, str | None], str]) -> Action:
+    """Returns a page action that calls `do` with the typed sentence and the robot that it is for."""
 
     def say(values: Mapping[str, Any]) -> str:
         sentence = text_of(values, "text")
@@ -129,23 +127,21 @@ def said(do: Callable[[str, str | None], str]) -> Action:
     return say
 
 
-def queueing(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], str]:
-    """Keeps a sentence in a store, as `errand queue add` does, for the world, the seed and the robots of a request.
+def queue_function(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], str]:
+    """Returns a function that queues a sentence, as `errand queue add` does, and returns an answer.
 
-    The name of a mission, as `errand missions` lists it, may stand in its place, with NAME=VALUE for its parameters.
+    World, seed and robots are those of the prepared request. In place of a sentence it takes the name of a shipped
+    mission, with NAME=VALUE for its parameters.
     """
     before = prepared.request
 
     def later(text: str) -> str:
-        """Queue it, and say so."""
         named, *settings = text.split()
         world = before.world or before.world_name
         asked = Request(text, world=world, seed=before.seed, out=out, robots=before.robots)
         if named in shipped_missions():
             asked = replace(asked, sentence=None, file=Path(named), given=parse_values(settings))
-        prepared = prepare(asked)
-        refuse_impossible(prepared)
-        request = prepared.request.from_anywhere()
+        request = prepare_checked(asked).request.from_anywhere()
         with MissionStore(store) as missions:
             number = missions.add(request, queued=True).id
         return f"queued as mission {number}: {'; '.join(request.commands)} (errand queue run --out {out})"
@@ -154,7 +150,7 @@ def queueing(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], s
 
 
 def scene_actions(scene: Scene) -> Mapping[str, Action]:
-    """What a page asks of the scene: fewer pictures for a browser that draws slowly, and where the camera stands."""
+    """Returns the page's actions on the scene: a slower refresh for slow browsers, and the camera."""
 
     def ease(_: Mapping[str, Any]) -> str:
         scene.go_easy()

@@ -1,4 +1,4 @@
-"""Picture files that the user names, the detector that looks at them, and what it found drawn into pictures."""
+"""Reads and writes picture files, loads the detector for them, and draws its detections."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ FOUND_COLOUR: Final = (40, 200, 60)
 _LINE_PER_PX: Final = 1 / 320
 
 
-def detector_of(file: Path | None, options: DetectorOptions) -> OnnxDetector:
-    """The detector of a file, or the one that comes with Errand. Raises InputError when it cannot be used."""
+def open_detector(file: Path | None, options: DetectorOptions) -> OnnxDetector:
+    """Loads the detector of a file, or the shipped one. Raises InputError if it cannot be used."""
     try:
         return load_detector(file or MODEL_FILE, options)
     except ModelFileError as error:
         raise InputError(error.message, hint=error.hint, file=error.file) from error
 
 
-def drawn(picture: Picture, found: Sequence[Detection]) -> Picture:
-    """A copy of a picture (H, W, 3) RGB with the boxes of what was found, the surest on top."""
+def draw_detections(picture: Picture, found: Sequence[Detection]) -> Picture:
+    """Returns a copy of a picture (H, W, 3) RGB with the boxes of detections, the highest score on top."""
     copy = picture.copy()
     for one in reversed(found):
         draw_box(copy, one.box, f"{one.class_name} {one.score:.2f}", FOUND_COLOUR)
@@ -40,7 +40,7 @@ def drawn(picture: Picture, found: Sequence[Detection]) -> Picture:
 
 
 def draw_box(picture: Picture, box: tuple[float, float, float, float], text: str, colour: Colour) -> None:
-    """Draws a box and its name above it, or inside where there is no room, into a picture."""
+    """Draws a box with its name above it, or inside it at the upper edge of the picture."""
     u0, v0, u1, v1 = (round(value) for value in box)
     line = max(1, round(max(picture.shape[:2]) * _LINE_PER_PX))
     size = 0.4 * line
@@ -54,9 +54,9 @@ def draw_box(picture: Picture, box: tuple[float, float, float, float], text: str
 
 
 def read_picture(file: Path) -> Picture:
-    """A picture file as (H, W, 3) RGB uint8: grey, 16 bits and others are converted, transparency is dropped.
+    """Reads a picture file as (H, W, 3) RGB uint8; converts grey and 16-bit pictures, and drops transparency.
 
-    Raises InputError for what cannot be read, is damaged or has too many pixels.
+    Raises InputError if the file cannot be read, is damaged or has too many pixels.
     """
     if file.is_dir():
         raise InputError("it is a folder", hint=f"name the pictures in it, such as {file}/*.png", file=file)
@@ -64,7 +64,7 @@ def read_picture(file: Path) -> Picture:
 
 
 def write_picture(file: Path, picture: Picture) -> None:
-    """Writes (H, W, 3) RGB in the form that the name's ending tells. Raises InputError when that does not work."""
+    """Writes (H, W, 3) RGB in the format of the file's ending. Raises InputError if it cannot be written."""
     encoded, content = cv2.imencode(file.suffix, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
     try:
         file.parent.mkdir(parents=True, exist_ok=True)

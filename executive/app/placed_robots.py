@@ -1,4 +1,4 @@
-"""The robots of a run: where each stands at the beginning and charges, told by the user or found free on the map."""
+"""The robots of a run with their starts and docks, which the user gives or which are found on the map."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ DEFAULT_KIND: Final = "spot"
 TURNING_M: Final = 0.7
 FROM_PEOPLE_M: Final = 1.2
 BETWEEN_M: Final = 0.35
-"""So much room is left between two robots that are told no start."""
+"""Clearance between two robots whose starts are chosen."""
 _START_STREAM: Final = 7
 
 
 @dataclass(frozen=True)
 class PlacedRobot:
-    """One robot of a run: its kind, where it stands at the beginning and charges (world frame), and what it uses.
+    """Robot of a run: its kind, its start and dock in the world frame, and its stack.
 
-    Without a `dock` it charges where the world says. Without an `own_stack` file it uses what its kind does. It is
-    `told` where it stands, or finds that out.
+    Without a `dock` it charges at the world's dock. Without an `own_stack` file it uses the stack of its kind. Unless
+    `start_known` it must localise first.
     """
 
     name: str
@@ -48,38 +48,38 @@ class PlacedRobot:
     start: Pose2D
     dock: Pose2D | None = None
     own_stack: Path | None = None
-    told: bool = True
+    start_known: bool = True
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this kind of robot is and can do."""
+        """Capabilities of this kind of robot."""
         return robot_kind(self.kind).capabilities()
 
     @property
     def stack_file(self) -> Path | None:
-        """The file of its stack; None for the stack that comes with Errand."""
+        """File of its stack; None for the default stack."""
         return self.own_stack or robot_kind(self.kind).stack
 
     @cached_property
     def stack(self) -> RobotStack:
-        """The components that it uses. Raises InputError with file and line: the file cannot be used."""
+        """Components of its stack. Raises InputError with file and line if the file cannot be used."""
         return load_stack(self.stack_file)
 
 
 def placed_robots(world: World, knowledge: Knowledge, configs: Sequence[RobotConfig]) -> Mapping[str, PlacedRobot]:
-    """The robots of a run by their names, in the order in which they are named.
+    """Places the robots of a run in the world; returns them by name, in the order of `configs`.
 
-    The first stands at the world's start and charges at its dock, where nothing else is said; each other one stands at
-    the free pose that is nearest to there, and charges where it stands.
+    By default the first robot stands at the world's start and charges at the world's dock. Each other robot stands at
+    the nearest free pose, and charges there.
 
     Raises:
-        InputError: two overlap, a robot stands in something, a dock is no place, or there is no room.
+        InputError: two robots overlap, a robot stands in an obstacle, a dock is no place, or there is no free pose.
     """
     placed: dict[str, PlacedRobot] = {}
-    told = {each.name: each.start or (world.start if each is configs[0] else None) for each in configs}
-    for each in sorted(configs, key=lambda one: told[one.name] is None):
+    given = {each.name: each.start or (world.start if each is configs[0] else None) for each in configs}
+    for each in sorted(configs, key=lambda one: given[one.name] is None):
         try:
-            start = told[each.name] or _free_start(world, each.kind, placed.values())
+            start = given[each.name] or _free_start(world, each.kind, placed.values())
             if each.start is not None:
                 _refuse_overlap(each, each.start, placed.values(), world)
             dock = _dock(each, knowledge) or (world.dock if each is configs[0] else start)
@@ -98,13 +98,13 @@ def only_robot(
     seed: int = 0,
     kind: str = DEFAULT_KIND,
 ) -> PlacedRobot:
-    """The only robot of a run, at the world's start or another, charging at the world's dock. Raises InputError."""
+    """Places the only robot of a run, by default at the world's start; it charges there. Raises InputError."""
     pose = world.start if start is None else stand_at(world, start, seed)
     return PlacedRobot(name, kind, pose, world.dock, stack, start != "unknown")
 
 
 def _dock(robot: RobotConfig, knowledge: Knowledge) -> Pose2D | None:
-    """The dock that is said. Raises InputError: it is no place."""
+    """Returns the pose of the dock that the user names. Raises InputError if it is no place."""
     if robot.dock is None:
         return None
     place = knowledge.place(robot.dock)
@@ -116,9 +116,9 @@ def _dock(robot: RobotConfig, knowledge: Knowledge) -> Pose2D | None:
 
 
 def _free_start(world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2D:
-    """The free pose nearest to the world's start, clear of the robots that stand already and of where people may be.
+    """Returns the free pose nearest to the world's start, clear of placed robots and of people's places.
 
-    Raises InputError: there is none.
+    Raises InputError if there is none.
     """
     from plant.worlds.seeding import people_stand_W
 
@@ -130,13 +130,14 @@ def _free_start(world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2
     for person_W in people_stand_W(world):
         places = places[np.hypot(*(places - person_W).T) > FROM_PEOPLE_M]
     if not len(places):
-        raise InputError(f"there is no room in {world.name} for one more robot", hint="leave one out, or give starts")
+        what = f"there is no free place in {world.name} for one more robot"
+        raise InputError(what, hint="leave one out, or give starts")
     x, y = places[np.argmin(np.hypot(*(places - [world.start.x_m, world.start.y_m]).T))]
     return Pose2D(float(x), float(y), world.start.yaw_rad)
 
 
 def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRobot], world: World) -> None:
-    """Raises InputError where a robot would stand in another, or in something."""
+    """Raises InputError if a robot would stand in another robot or in an obstacle."""
     own = _discs(robot.kind, start)
     for other in placed:
         theirs = _discs(other.kind, other.start)
@@ -147,23 +148,23 @@ def _refuse_overlap(robot: RobotConfig, start: Pose2D, placed: Iterable[PlacedRo
 
 
 def refuse_blocked(world: World, pose: Pose2D, name: str = "the robot", kind: str = DEFAULT_KIND) -> None:
-    """Raises InputError unless a robot's body is free at a pose on the world's surveyed map, which must be there."""
+    """Raises InputError unless a robot's body is in free space at a pose, by the world's surveyed map."""
     discs = _discs(kind, pose)
     if float(np.min(_free_ground(world).distance_m(discs[:, :2]) - discs[:, 2])) < 0.0:
         there = f"({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g})"
         hint = "give a free pose; `errand world show` draws the world"
-        raise InputError(f"at the start {there} {name} stands in something or outside of {world.name}", hint=hint)
+        raise InputError(f"at the start {there} {name} stands in an obstacle or outside of {world.name}", hint=hint)
 
 
 def _free_ground(world: World) -> GridMap:
-    """The world's surveyed map, in which unknown ground is none to stand on."""
+    """Loads the world's surveyed map, with unknown cells blocked."""
     from skills.estimate.grid_map import load_grid_map
 
     return load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
 
 
 def _discs(kind: str, pose: Pose2D) -> FloatArray:
-    """Discs (N, 3) of x, y and radius (m, world frame) that cover a robot of a kind at a pose."""
+    """Returns discs (N, 3) of x, y and radius (m, world frame) that cover a kind of robot at a pose."""
     discs = Footprint.of(robot_kind(kind).capabilities()).discs
     c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     middles = discs[:, :2] @ np.array([[c, s], [-s, c]]) + [pose.x_m, pose.y_m]
@@ -171,12 +172,12 @@ def _discs(kind: str, pose: Pose2D) -> FloatArray:
 
 
 def _reach_m(kind: str) -> float:
-    """How far the outline of a kind reaches from its middle."""
+    """Largest distance from the middle of a kind of robot to its outline, in metres."""
     return float(np.linalg.norm(np.array(robot_kind(kind).capabilities().footprint_m), axis=1).max())
 
 
 def knowledge_for(robot: PlacedRobot, names: Iterable[str], knowledge: Knowledge) -> Knowledge:
-    """What one robot of several knows: its own name, start and dock, and the names of the others."""
+    """Returns the knowledge of one robot among several: its own name, start and dock, and the others' names."""
     others = tuple(other for other in names if other != robot.name)
     facts = RobotFacts(name=robot.name, others=others, require_wake=knowledge.robot.require_wake)
     dock = None if robot.dock is None else _pose(robot.dock)
@@ -188,9 +189,9 @@ def _pose(pose: Pose2D) -> Pose:
 
 
 def stand_at(world: World, start: Start, seed: int) -> Pose2D:
-    """The pose of a start: its own, or a free one with room to turn, away from people, that the seed chooses.
+    """Returns a given start, or a free pose chosen by the seed, away from people and with space to turn.
 
-    Raises InputError: there is nowhere.
+    Raises InputError if there is none.
     """
     if isinstance(start, Pose2D):
         return start
@@ -208,13 +209,13 @@ def stand_at(world: World, start: Start, seed: int) -> Pose2D:
 
 
 def shared_detector(stack: RobotStack | None = None) -> Detector:
-    """The detector of a stack, or the default one, loaded once in this process. Raises InputError."""
+    """Returns the detector of a stack, or the default one; loads it once in a process. Raises InputError."""
     return _built((stack or default_stack()).detector)
 
 
 @cache
 def _built(component: DetectorComponent) -> Detector:
-    from skills.perception.detector.network_file import ModelFileError  # which loads what runs networks
+    from skills.perception.detector.network_file import ModelFileError  # loads the network runtime
 
     try:
         return component.build()

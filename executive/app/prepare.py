@@ -1,4 +1,4 @@
-"""From what the user asks for to what can be run: the one place where a sentence or a mission file is understood."""
+"""Prepares requests: understands a sentence or a mission file, and compiles it for each robot."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from executive.app.mission_files import mission_file
 from executive.app.placed_robots import PlacedRobot, knowledge_for, only_robot, placed_robots, refuse_blocked
-from executive.app.prepared import Prepared, together
+from executive.app.prepared import Prepared, combine
 from executive.app.worlds import knowledge_of, open_world, with_map
 from executive.language.parser import load_parser
 from executive.language.questions import Answerer, ClarifyingQuestion, answer_by
@@ -40,17 +40,17 @@ if TYPE_CHECKING:
 
 
 def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
-    """Understands a request, and compiles it.
+    """Understands and compiles a request.
 
-    Of several robots the first by name stands for all; `others` are the rest.
+    For several robots it returns the mission of the first, with the missions of the others in `others`.
 
     Args:
-        request: what the user asks for.
-        ask: who is asked what a sentence leaves open, where the request's policy allows it; None: nobody.
+        request: the request.
+        ask: answers the questions that a sentence leaves open, if the request's policy allows it; None: nobody.
 
     Raises:
-        InputError: with file and line where it has a file: it or the world or its knowledge is broken, a sentence is
-            not understood, the robots do not fit into the world, or the mission cannot be carried out.
+        InputError: the mission file, the world or its knowledge is broken, a sentence is not understood, the robots do
+            not fit into the world, or the mission cannot be compiled. Names file and line.
     """
     if not request.only_commands and (request.file is None) == (request.sentence is None):
         raise InputError("a mission file or --say is needed, and not both", hint='try: --say "Hey Alice, ..."')
@@ -59,28 +59,28 @@ def prepare(request: Request, *, ask: Answerer | None = None) -> Prepared:
     request, loaded, world, knowledge = _open(request)
     configs = request.robots or _named_robots(loaded, world, knowledge)
     if not configs:
-        return _for_the_only_robot(_standing(request, world, knowledge, ask), loaded)
+        return _for_only_robot(_at_start(request, world, knowledge, ask), loaded)
     if request.start is not None or request.stack is not None:
         what = "--start and --stack are for a run with one robot"
         raise InputError(what, hint="write alice=spot@X,Y,YAW, or `robots` with `at` and `stack` in a mission file")
     robots = placed_robots(world, knowledge, configs)
     setting = Setting(replace(request, robots=configs), world, knowledge, robots, ask)
     if loaded is None:
-        return _for_whom_it_calls(setting)
+        return _for_called_robots(setting)
     return _in_parts(setting, loaded, loaded.parts) if loaded.parts is not None else _for_one_robot(setting, loaded)
 
 
 def prepare_alone(request: Request) -> Prepared:
-    """A request understood for one robot, whichever robots it names; nobody is asked. Raises InputError."""
+    """Understands and compiles a request for one robot, whatever robots it names. Raises InputError."""
     request, loaded, world, knowledge = _open(replace(request, robots=()))
-    return _for_the_only_robot(_standing(request, world, knowledge, None), loaded)
+    return _for_only_robot(_at_start(request, world, knowledge, None), loaded)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A request in its world, with what is known of that and the robots in it (none: the world's only one).
+    """Request with its world, knowledge and robots (empty: the world's only robot).
 
-    `ask` is who is asked what a sentence leaves open; None: nobody.
+    `ask` answers the questions that a sentence leaves open; None: nobody does.
     """
 
     request: Request
@@ -90,20 +90,20 @@ class Setting:
     ask: Answerer | None = None
 
     def for_robot(self, name: str) -> Setting:
-        """The same as one of the robots knows it, from where it stands."""
+        """Returns the setting with one robot's start, dock and knowledge."""
         robot = self.robots[name]
         world = replace(self.world, start=robot.start, dock=robot.dock)
         return replace(self, world=world, knowledge=knowledge_for(robot, self.robots, self.knowledge))
 
     @property
     def require_wake(self) -> bool:
-        """Returns whether the robot's name must be said: by the request, else by the world."""
+        """Whether a sentence must call the robot by name; the request decides, else the world."""
         asked = self.request.require_wake
         return self.knowledge.robot.require_wake if asked is None else asked
 
     def understand(self) -> Understanding:
-        """What the request's sentence asks of the only robot, or of each. Raises InputError: it is not understood."""
-        from executive.language.several_robots import understand_for_robots  # which a mission file does not need
+        """Understands the request's sentence, for the only robot or for several. Raises InputError."""
+        from executive.language.several_robots import understand_for_robots  # a mission file does not need it
         from executive.language.understand import Status, ask_until_clear, understand
 
         meaning: Callable[..., Understanding] = understand
@@ -117,9 +117,9 @@ class Setting:
         return meant
 
     def answerer(self, policy: QuestionPolicy | None) -> Answerer:
-        """Who answers: first the request's own answers in their order; the policy says how further ones are answered.
+        """Returns an answerer that gives the request's own answers in order, and then follows the policy.
 
-        Raises InputError: an answer that was given is too long or no plain text.
+        Raises InputError if an answer of the request is too long or no plain text.
         """
         left = iter([plain_text(text, what="--answer", longest=LONGEST_ANSWER) for text in self.request.answers])
         further = answer_by(policy or QuestionPolicy.ASK, self.ask)
@@ -130,14 +130,14 @@ class Setting:
         return answer
 
     def part(self, name: str, meanings: Sequence[Understanding]) -> Prepared:
-        """What one robot is to do: all that was meant for it, from where it stands. Raises InputError: it cannot be."""
+        """Compiles all meanings that are for one robot into its mission. Raises InputError."""
         steps = tuple(step for meant in meanings for step in meant.all_steps)
         notes = tuple(note for meant in meanings for note in meant.notes)
         mission = Mission.from_steps(steps, world=self.world.name, robot=name)
         return self.for_robot(name).compile(mission.with_notes(notes))
 
     def mission_of_commands(self) -> Mission:
-        """The mission of the request's commands in their text form, or of steps in YAML."""
+        """Builds a mission from the request's commands in their text form, or from steps in YAML. Raises InputError."""
         request = self.request
         try:
             steps = steps_from_lines(request.commands)
@@ -147,7 +147,7 @@ class Setting:
         return mission.model_copy(update={"name": request.name})
 
     def for_file(self, loaded: Mission) -> Prepared:
-        """What a mission file asks of the robot that stands in this world. Raises InputError."""
+        """Compiles a mission file for the robot of this setting. Raises InputError."""
         knowledge = knowledge_of_mission(loaded, self.knowledge)
         answer = self.answerer(self.request.questions or loaded.questions)
         mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
@@ -158,7 +158,7 @@ class Setting:
         return own.compile(mission)
 
     def compile(self, mission: Mission, meant: Understanding | None = None) -> Prepared:
-        """The request with its mission compiled for this world. Raises InputError: it cannot be."""
+        """Compiles a mission for this world, with the request's scenario and variation. Raises InputError."""
         request, world = self.request, self.world
         if request.scenario or request.scenario_files:
             from executive.app.scenarios import with_events, with_scenario
@@ -166,7 +166,12 @@ class Setting:
             request = with_scenario(request, world, self.knowledge)
             world = with_events(world, request.scenario)
         if request.variation.people:
-            world = _with_passers_by(world, request)
+            from plant.worlds.seeding import with_passers_by
+
+            try:
+                world = with_passers_by(world, request.variation.people, request.seed)
+            except WorldError as error:
+                raise InputError(str(error), hint="take --people out") from error
         tree = compile_mission(mission, knowledge=self.knowledge, registry=installed_skills())
         request = replace(request, world_name=world.name, robot=mission.robot_name)
         name, robots = mission.robot_name, self.robots
@@ -176,7 +181,7 @@ class Setting:
 
 
 def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
-    """A request with its file read where it has one, its world, and what is known of that. Raises InputError."""
+    """Reads the request's mission file, if it has one, its world and the knowledge of it. Raises InputError."""
     loaded = None
     if request.file is not None:
         file = mission_file(request.file)
@@ -193,7 +198,7 @@ def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
 
 
 def _named_robots(loaded: Mission | None, world: World, knowledge: Knowledge) -> tuple[RobotConfig, ...]:
-    """The robots that a mission file names, else its world; none where it is for the world's only robot."""
+    """Returns the robots that a mission file names, else its world; empty if it is for the world's only robot."""
     named = knowledge.robots if loaded is None or loaded.robots is None else loaded.robots
     if named is None:
         return ()
@@ -203,8 +208,8 @@ def _named_robots(loaded: Mission | None, world: World, knowledge: Knowledge) ->
     return robots_of_file(named, robot_kinds(), own)
 
 
-def _standing(request: Request, world: World, knowledge: Knowledge, ask: Answerer | None) -> Setting:
-    """The setting with the only robot where the request has it. Raises InputError: it is not free there."""
+def _at_start(request: Request, world: World, knowledge: Knowledge, ask: Answerer | None) -> Setting:
+    """Returns the setting with the only robot at the request's start. Raises InputError if the start is not free."""
     start = request.start
     if isinstance(start, Pose2D):
         refuse_blocked(world, start)
@@ -214,8 +219,8 @@ def _standing(request: Request, world: World, knowledge: Knowledge, ask: Answere
     return Setting(request, world, knowledge, {}, ask)
 
 
-def _for_the_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
-    """What the world's only robot is to do. Raises InputError."""
+def _for_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
+    """Prepares the mission of the world's only robot. Raises InputError."""
     request, robot = setting.request, setting.knowledge.robot
     if loaded is not None:
         return setting.for_file(loaded)
@@ -227,8 +232,8 @@ def _for_the_only_robot(setting: Setting, loaded: Mission | None) -> Prepared:
     return replace(setting, request=asked).compile(mission, meant)
 
 
-def _for_whom_it_calls(setting: Setting) -> Prepared:
-    """What each robot is to do that a sentence calls, or that commands are for. Raises InputError."""
+def _for_called_robots(setting: Setting) -> Prepared:
+    """Prepares the missions of the robots that a sentence calls, or that commands are for. Raises InputError."""
     request, robots = setting.request, setting.robots
     if request.sentence is None:
         name = find_robot(request.robot, robots) or next(iter(robots))
@@ -237,36 +242,35 @@ def _for_whom_it_calls(setting: Setting) -> Prepared:
     setting = replace(setting, request=replace(request, sentence=meant.text))
     parts = [part for each in meant.parts for part in _part_for_each(each, setting)]
     waits = _waits(meant.parts, robots)
-    every = [
-        replace(
-            setting.part(name, [part.meaning for part in parts if part.robot == name]),
-            after=waits.get(name, ()),
-            speaker_W=next((_speaker_W(part, robots) for part in parts if part.robot == name), None),
-        )
-        for name in robots
-        if any(part.robot == name for part in parts)
-    ]
-    return together(every)
+    every = list[Prepared]()
+    for name in robots:
+        own = [part for part in parts if part.robot == name]
+        if own:
+            by = own[0].speaker_by
+            speaker_W = robots[by].start if by is not None and by in robots and by != name else None
+            prepared = setting.part(name, [part.meaning for part in own])
+            every.append(replace(prepared, after=waits.get(name, ()), speaker_W=speaker_W))
+    return combine(every)
 
 
 def _part_for_each(part: Part, setting: Setting) -> Iterator[Part]:
-    """The part for each robot that it is for. Raises InputError: it is for any of them, and none can do it."""
+    """Yields the part for each robot that it addresses. Raises InputError if any robot may do it and none can."""
     from executive.language.addressees import Whom
 
     if part.robot is Whom.ALL:
         yield from (replace(part, robot=name) for name in setting.robots)
     elif part.robot is Whom.ANY:
-        yield replace(part, robot=_soonest(setting.robots, lambda name: setting.part(name, [part.meaning]))[0])
+        yield replace(part, robot=_fastest(setting.robots, lambda name: setting.part(name, [part.meaning]))[0])
     else:
         yield part
 
 
-def _soonest(names: Collection[str], prepared_for: Callable[[str], Prepared]) -> tuple[str, Prepared]:
-    """The robot that can do a mission and is done first, by the estimate, and its part. Raises InputError: none can."""
-    from executive.app.feasibility import check_prepared  # which loads the check, where more than one may do it
+def _fastest(names: Collection[str], prepare_for: Callable[[str], Prepared]) -> tuple[str, Prepared]:
+    """Returns the robot with the shortest estimate for a mission, and its mission. Raises InputError if none can."""
+    from executive.app.feasibility import check_prepared  # loads the check, which a single robot does not need
 
     able, reasons = dict[str, float](), list[str]()
-    every = {name: prepared_for(name) for name in names}
+    every = {name: prepare_for(name) for name in names}
     for name, prepared in every.items():
         checked = check_prepared(prepared)
         if checked.errors:
@@ -280,18 +284,18 @@ def _soonest(names: Collection[str], prepared_for: Callable[[str], Prepared]) ->
 
 
 def _for_one_robot(setting: Setting, loaded: Mission) -> Prepared:
-    """A mission file, done by the robot that it names, or that can do it and is done first. Raises InputError."""
+    """Prepares a mission file for the robot that it names, else for the fastest robot. Raises InputError."""
     robots = setting.robots
     names = tuple(robots) if loaded.robot is None else (_robot_in(loaded, ("robot",), loaded.robot, robots),)
 
     def for_file(name: str) -> Prepared:
         return setting.for_robot(name).for_file(mission_of_robot(loaded, name))
 
-    return for_file(names[0]) if len(names) == 1 else _soonest(names, for_file)[1]
+    return for_file(names[0]) if len(names) == 1 else _fastest(names, for_file)[1]
 
 
 def _in_parts(setting: Setting, loaded: Mission, parts: Mapping[str, MissionPart]) -> Prepared:
-    """The parts of a mission file, in the order of the robots. Raises InputError: one is for no robot of the run."""
+    """Prepares the parts of a mission file, in the order of the robots. Raises InputError."""
     robots, written = setting.robots, dict[str, str]()
     for part in parts:
         name = _robot_in(loaded, ("parts", part), part, robots)
@@ -303,7 +307,7 @@ def _in_parts(setting: Setting, loaded: Mission, parts: Mapping[str, MissionPart
         at = ("parts", part, "after")
         waits[name] = tuple(_robot_in(loaded, at, first, written) for first in parts[part].first)
         try:
-            _refuse_rings(waits)
+            _refuse_cycles(waits)
         except InputError as error:
             raise loaded.error(at, error.message, "let one of them begin") from error
     problems, made = Problems(), list[Prepared]()
@@ -312,11 +316,11 @@ def _in_parts(setting: Setting, loaded: Mission, parts: Mapping[str, MissionPart
             own = mission_of_robot(loaded, name, written[name])
             made.append(replace(setting.for_robot(name).for_file(own), after=waits[name]))
     problems.raise_any()
-    return together(made)
+    return combine(made)
 
 
 def _robot_in(loaded: Mission, at: KeyPath, said: str, robots: Collection[str]) -> str:
-    """The robot that a file names. Raises InputError: it is none of those that it could be."""
+    """Returns the robot that a file names. Raises InputError if it is none of `robots`."""
     name = find_robot(said, robots)
     if name is None:
         what = "has no part to wait for" if at[-1] == "after" else "is no robot of this run"
@@ -325,34 +329,28 @@ def _robot_in(loaded: Mission, at: KeyPath, said: str, robots: Collection[str]) 
 
 
 def _waits(parts: Sequence[Part], robots: Mapping[str, PlacedRobot]) -> Mapping[str, tuple[str, ...]]:
-    """For each robot those that must be done first. Raises InputError: two wait for each other."""
+    """Maps each robot to the robots that must end first. Raises InputError if robots wait for each other."""
     waits: dict[str, set[str]] = {}
     for part in parts:
         first = {str(parts[number].robot) for number in part.after if parts[number].robot in robots}
         if isinstance(part.robot, str):
             waits.setdefault(part.robot, set()).update(first - {part.robot})
-    _refuse_rings(waits)
+    _refuse_cycles(waits)
     return {name: tuple(sorted(first)) for name, first in waits.items() if first}
 
 
-def _refuse_rings(waits: Mapping[str, Collection[str]]) -> None:
-    """Raises InputError where robots would wait for each other."""
+def _refuse_cycles(waits: Mapping[str, Collection[str]]) -> None:
+    """Raises InputError if robots would wait for each other."""
     try:
         TopologicalSorter(waits).prepare()
     except CycleError as error:
-        ring = sorted(set(error.args[1]))
-        what = f"{ring[0]} would wait for itself" if len(ring) == 1 else f"{listing(ring)} would wait for each other"
+        names = sorted(set(error.args[1]))
+        what = f"{names[0]} would wait for itself" if len(names) == 1 else f"{listing(names)} would wait for each other"
         raise InputError(what, hint="give the last part when the first is done") from error
 
 
-def _speaker_W(part: Part, robots: Mapping[str, PlacedRobot]) -> Pose2D | None:
-    """Where the robot stands by which the speaker stands, when it is another than the one that acts."""
-    by = part.speaker_by
-    return robots[by].start if by is not None and by in robots and by != part.robot else None
-
-
 def _with_people(loaded: Mission, world: World, knowledge: Knowledge) -> World:
-    """The world with the people who walk in a mission's file. Raises InputError."""
+    """Adds the people who walk in a mission file to the world. Raises InputError."""
     routes = routes_of_people(loaded, knowledge)
     try:
         return world.with_routes(routes) if routes else world
@@ -361,7 +359,7 @@ def _with_people(loaded: Mission, world: World, knowledge: Knowledge) -> World:
 
 
 def _with_objects(loaded: Mission, world: World, knowledge: Knowledge) -> World:
-    """The world with the models and objects of a mission's file. Raises InputError."""
+    """Adds the models and objects of a mission file to the world. Raises InputError."""
     problems = Problems()
     for index, folder in enumerate(import_folders(loaded)):
         try:
@@ -377,13 +375,3 @@ def _with_objects(loaded: Mission, world: World, knowledge: Knowledge) -> World:
             problems.add(loaded.error(("objects", name), str(error), ""))
     problems.raise_any()
     return world
-
-
-def _with_passers_by(world: World, request: Request) -> World:
-    """The world with the people of the request's variation. Raises InputError: the world has no place for them."""
-    from plant.worlds.seeding import with_passers_by
-
-    try:
-        return with_passers_by(world, request.variation.people, request.seed)
-    except WorldError as error:
-        raise InputError(str(error), hint="take --people out") from error

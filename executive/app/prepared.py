@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A request that was understood: its mission, compiled, the world that it runs in, and what is known of that.
+    """Request that is understood and compiled, with its mission, world and knowledge.
 
-    `meant` is what its sentence means, where it has one. `robots` are all robots of the run by their names.
+    `meant` is the meaning of its sentence, if it has one. `robots` are all robots of the run by their names.
 
-    In a run with several robots, `others` are what the rest of them do meanwhile; this mission begins when those of
-    the robots `after` are done, and whoever asked for it stands at `speaker_W` (None: by this robot).
+    In a run with several robots, `others` are the missions of the other robots. This mission begins when the missions
+    of the robots `after` have ended; the speaker stands at `speaker_W` (None: beside this robot).
     """
 
     request: Request
@@ -44,7 +44,7 @@ class Prepared:
 
     @property
     def all(self) -> tuple[Prepared, ...]:
-        """This, and what the other robots do."""
+        """The missions of all robots, this one first."""
         return (replace(self, others=()), *self.others)
 
     @property
@@ -53,12 +53,12 @@ class Prepared:
         return self.robots[self.mission.robot_name]
 
     def with_mission(self, mission: Mission) -> Prepared:
-        """Another mission in the place of the robot's own. Raises InputError: it cannot be carried out."""
+        """Compiles another mission in place of this one. Raises InputError if it cannot be compiled."""
         tree = compile_mission(mission, knowledge=self.knowledge, registry=installed_skills())
         return replace(self, mission=mission, meant=None).with_tree(tree)
 
     def with_tree(self, tree: CompiledTree) -> Prepared:
-        """With a tree: the request gets its name and commands, and a fingerprint that trees of equal nodes share."""
+        """Takes a tree; its name, commands and a fingerprint of its nodes go into the request."""
         nodes = "\n".join(f"{node.kind} {node.path_id}" for node in tree.root.walk())
         fingerprint = hashlib.sha256(nodes.encode()).hexdigest()[:16]
         named = replace(
@@ -68,12 +68,12 @@ class Prepared:
 
     @property
     def several(self) -> bool:
-        """Returns whether there are several robots in the run."""
+        """Whether the run has several robots."""
         return len(self.robots) > 1
 
 
-def together(every: Sequence[Prepared]) -> Prepared:
-    """The parts of one request as one, of which the first stands for all."""
+def combine(every: Sequence[Prepared]) -> Prepared:
+    """Combines the missions of several robots into one object: the first mission, with the rest as its `others`."""
     first = every[0].request
     commands = tuple(command for each in every for command in each.request.commands)
     prints = "+".join(each.request.fingerprint for each in every)

@@ -1,6 +1,6 @@
-"""The server of a queue: it runs what is queued, and listens to the clock, HTTP calls and messages of plug-ins.
+"""Server of a queue: runs queued missions, and queues standing missions at times, HTTP calls and messages.
 
-A port is open, and a plug-in started, only while a standing mission waits for it.
+A port is open, and a plug-in runs, only while a standing mission waits for it.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from executive.app.feasibility import refuse_impossible
-from executive.app.prepare import prepare
-from executive.app.runs import Ended, Runner, broken_off, next_queued, run_in_turn
+from executive.app.checker import prepare_checked
+from executive.app.runs import MissionResult, Runner, interrupted_error, next_queued, run_in_turn
 from executive.mission.parameters import parse_json_values
 from executive.mission.request import Request
 from executive.store.database import STORE_FILE
@@ -33,30 +32,27 @@ from skills.files.errors import InputError
 from skills.files.plugins import PluginDefect, run_in_thread
 
 LIMIT_S: Final = 10.0
-"""A plug-in may take so long to start, and to stop."""
+"""Time limit of a plug-in to start, and to stop."""
 _SEE: Final = "see the documentation of that package"
 _HOST: Final = re.compile(r"[A-Za-z0-9.:%_-]{1,253}")
-
-
 MOST_STARTS: Final = 3
-"""A mission that has been started so often is not taken up by itself: what ends the process would end it for ever."""
+"""Starts after which an interrupted mission is set aside, because it may be what ends the process."""
 
 
 class Waiting(Protocol):
-    """Waits for the next thing to do; `executive.store.wakeup.WakeupPipe` is one."""
+    """Wait that another thread or process can end; `executive.store.wakeup.WakeupPipe` implements it."""
 
     def wait(self, until: datetime | None) -> None:
-        """Blocks until somebody calls `wake` or, at the latest, a moment comes."""
+        """Blocks until `wake` is called, or until a time."""
 
     def wake(self) -> None:
         """Ends the wait, from any thread or signal handler."""
 
 
 class QueueServer:
-    """Serves one store, which this process has claimed.
+    """Server of one store, which this process has claimed.
 
-    When it is stopped while a mission runs, that is cancelled, and `errand resume` goes on with it. What is queued
-    stays queued.
+    Stopping it cancels the mission under way, which `errand resume` continues. Queued missions stay queued.
     """
 
     def __init__(
@@ -69,50 +65,50 @@ class QueueServer:
         follow: Callable[[Iterable[Trigger]], None],
         tell: Callable[[str], None],
     ) -> None:
-        """`follow` has the other listeners hear what the standing missions wait for; `tell` shows a line."""
+        """`follow` gives the listeners the triggers of the standing missions; `tell` shows a line."""
         self._missions, self._standing, self._waiting, self._runner = missions, standing, waiting, runner
         self._follow, self._tell = follow, tell
         self._refused = ""
         self.stopped: str | None = None
 
     def stop(self, reason: str) -> None:
-        """Serves no longer; from any thread and from signal handlers."""
+        """Stops serving. Any thread and signal handlers may call it."""
         self.stopped = self.stopped or reason
         self._runner.cancel(reason)
         self._waiting.wake()
 
-    def serve(self, *, end: datetime | None = None, until_idle: bool = False) -> list[Ended]:
-        """Serves until it is stopped, until a moment (no mission begins after it), or until nothing is queued.
+    def serve(self, *, end: datetime | None = None, until_idle: bool = False) -> list[MissionResult]:
+        """Serves until it is stopped, until the time `end`, or with `until_idle` until nothing is queued.
 
         Raises:
             InputError: a listener cannot be opened at the beginning, or the store cannot be used any more.
         """
         serving_since = self._missions.now()
         self._follow(each.trigger for each in self._standing.missions())
-        broken = self._missions.missions(MissionState.RUNNING)
-        left = next((each for each in broken if not each.queued), None)
+        interrupted = self._missions.missions(MissionState.RUNNING)
+        left = next((each for each in interrupted if not each.queued), None)
         if left is not None:
-            raise broken_off(self._missions, left)
+            raise interrupted_error(self._missions, left)
         aside = [
             self._runner.set_aside(each, f"it was started {each.starts} times and broken off")
-            for each in broken
+            for each in interrupted
             if each.starts >= MOST_STARTS
         ]
-        again = [each for each in broken if each.starts < MOST_STARTS]
+        again = [each for each in interrupted if each.starts < MOST_STARTS]
         coming = self._next_missions(again, serving_since, end=end, until_idle=until_idle)
         return [*aside, *run_in_turn(coming, self._runner, until_cancelled=False)]
 
     def _next_missions(
         self, again: Sequence[StoredMission], serving_since: datetime, *, end: datetime | None, until_idle: bool
     ) -> Iterator[StoredMission]:
-        """The missions that go on `again`, and then those that are queued, or that triggers queue."""
+        """Yields the missions that are resumed `again`, and then queued missions as triggers queue them."""
         now = self._missions.now
         for each in again:
             if self.stopped is None:
                 yield each
         waiting_since = now() if again else serving_since
         while self.stopped is None:
-            self._follow_again()
+            self._update_listeners()
             fired = self._standing.fire_due(waiting_since=waiting_since, serving_since=serving_since)
             for each in fired:
                 self._tell(f"Mission {each.id} is queued: {each.request.name} ({each.why})")
@@ -127,8 +123,8 @@ class QueueServer:
             else:
                 self._waiting.wait(min(filter(None, (self._standing.due_next(), end)), default=None))
 
-    def _follow_again(self) -> None:
-        """Standing missions may have come or gone. What cannot be listened to is told once; the rest goes on."""
+    def _update_listeners(self) -> None:
+        """Follows the present triggers; reports once what cannot be listened to."""
         try:
             self._follow(each.trigger for each in self._standing.missions())
         except InputError as error:
@@ -139,10 +135,10 @@ class QueueServer:
 
 @dataclass(frozen=True)
 class CallAddress:
-    """Where HTTP calls are served, and the token that was given for them.
+    """Address at which HTTP calls are served, and the token that the user gave for them.
 
     Raises:
-        InputError: the host is no name and no address.
+        InputError: the host is neither a name nor an address.
     """
 
     host: str = "127.0.0.1"
@@ -152,16 +148,16 @@ class CallAddress:
     def __post_init__(self) -> None:
         if not _HOST.fullmatch(self.host):
             hint = "name this machine or an address of it, as in 127.0.0.1"
-            raise InputError(f"--host '{self.host[:60]}' is no name and no address", hint=hint)
+            raise InputError(f"--host '{self.host[:60]}' is neither a name nor an address", hint=hint)
 
 
 class Listeners:
-    """The port and the plug-ins of a store's standing missions. Use it as a context manager, or call `close`."""
+    """Listeners of a store's standing missions: a port for calls, and plug-ins. Call `close`, or use `with`."""
 
     def __init__(
         self, store: Path, address: CallAddress, tell: Callable[[str], None], *, limit_s: float = LIMIT_S
     ) -> None:
-        """`tell` prints a line, from any thread; a plug-in may take `limit_s` to start, and to stop."""
+        """`tell` prints a line from any thread; `limit_s` is the time for a plug-in to start, and to stop."""
         self._limit_s = limit_s
         self._stuck: dict[str, str] = {}
         self._store, self._address, self._tell = store, address, tell
@@ -177,7 +173,7 @@ class Listeners:
         self.close()
 
     def follow(self, triggers: Iterable[Trigger]) -> None:
-        """Listen to what these wait for, and to nothing else; a plug-in that is missing or does not start is told once.
+        """Listens for these triggers and no others; reports once a plug-in that is missing or does not start.
 
         Raises:
             InputError: the address cannot be served.
@@ -191,7 +187,7 @@ class Listeners:
         self._follow_topics(wanted)
 
     def close(self) -> None:
-        """Listens no more; idempotent."""
+        """Stops listening; idempotent."""
         self._follow_calls(False)
         self._follow_topics({})
 
@@ -200,19 +196,20 @@ class Listeners:
             self._server.close()
             self._server = None
         if self._server is None and wanted:
-            self._server = self._served(call_token(self._address.token, self._store))
+            self._server = self._serve_calls(call_token(self._address.token, self._store))
 
-    def _served(self, token: CallToken) -> CallServer:
+    def _serve_calls(self, token: CallToken) -> CallServer:
+        """Opens the server of calls and shows its address. Raises InputError."""
         host, port = self._address.host, self._address.port
         try:
             server = CallServer(self._calls.called, token=token.text, host=host, port=port)
         except (OSError, UnicodeError) as error:
-            why = error.strerror if isinstance(error, OSError) else "there is no such name"
+            why = error.strerror if isinstance(error, OSError) else "no host has this name"
             what = f"cannot serve calls at {host} port {port} ({why or error})"
             raise InputError(what, hint="name another --host or --port") from error
         self._tell(f"Calls: POST {server.url}NAME")
         if token.new:
-            self._tell(f"The token, which is kept in {token.file}: {token.text}")
+            self._tell(f"The token, which is stored in {token.file}: {token.text}")
         elif token.file is not None:
             self._tell(f"The token is in {token.file}")
         return server
@@ -230,7 +227,7 @@ class Listeners:
             if kind in self._sources:
                 continue
             try:
-                self._sources[kind] = (topics, self._started(kind, topics))
+                self._sources[kind] = (topics, self._start(kind, topics))
             except InputError as error:
                 if self._unheard.get(kind) != str(error):
                     self._tell(f"errand: missions that wait for topics of {kind} are not heard of: {error}")
@@ -238,10 +235,10 @@ class Listeners:
             else:
                 self._unheard.pop(kind, None)
 
-    def _started(self, kind: str, topics: Sequence[str]) -> TriggerSource:
-        """A plug-in that listens. Raises InputError: there is none, or it does not start.
+    def _start(self, kind: str, topics: Sequence[str]) -> TriggerSource:
+        """Starts a plug-in. Raises InputError if there is none, or it does not start.
 
-        One that is not done within the limit is not asked again, and what it hears later is dropped.
+        A plug-in that exceeds the time limit is not started again, and its later messages are dropped.
         """
         if kind in self._stuck:
             raise InputError(self._stuck[kind], hint=_SEE)
@@ -268,25 +265,25 @@ class Listeners:
 
 
 class TriggerCalls:
-    """Queues missions of a store from any thread, one call after another; `tell` prints a line."""
+    """Receiver of calls and messages, which queues standing missions from any thread; `tell` prints a line."""
 
     def __init__(self, store: Path, tell: Callable[[str], None]) -> None:
         self._store, self._tell = store, tell
         self._one_at_a_time = threading.Lock()
 
     def called(self, name: str, body: bytes) -> Mapping[str, Any]:
-        """Queue what waits for an HTTP call; the numbers of the missions. Raises CallError."""
+        """Queues the missions that wait for an HTTP call; returns their numbers. Raises CallError."""
         return {"missions": [mission.id for mission in self._queue(OnCall(name), body)]}
 
     def heard(self, kind: str, topic: str, payload: bytes) -> None:
-        """Queue what waits for a message, or print why it cannot be; raises nothing."""
+        """Queues the missions that wait for a message, or prints why it cannot. Never raises."""
         try:
             self._queue(OnTopic(kind, topic), payload)
         except CallError as refusal:
             self._tell(f"{OnTopic(kind, topic)}: {refusal}")
 
     def _queue(self, trigger: OnCall | OnTopic, body: bytes) -> tuple[StoredMission, ...]:
-        """Queue the standing missions of a trigger, with the values in the body. Raises CallError."""
+        """Queues the standing missions of a trigger, with the values in the body. Raises CallError."""
         try:
             with self._one_at_a_time, MissionStore(self._store, create=False) as store:
                 standing = StandingMissions(store)
@@ -310,13 +307,12 @@ class TriggerCalls:
 
 
 def _request(standing: StandingMission, body: bytes) -> Request:
-    """The request of a standing mission, checked with the values in a body. Raises CallError, InputError."""
+    """Returns the request of a standing mission with the values in a body, checked. Raises CallError."""
     try:
         values = parse_json_values(body)
         if not values:
             return standing.request
-        prepared = prepare(replace(standing.request, given={**standing.request.given, **values}))
-        refuse_impossible(prepared)
+        prepared = prepare_checked(replace(standing.request, given={**standing.request.given, **values}))
     except InputError as error:
         raise CallError(HTTPStatus.BAD_REQUEST, str(error)) from error
     return prepared.request.from_anywhere()
@@ -327,7 +323,7 @@ _FORM: Final = re.compile(r"[A-Za-z0-9._~+/=-]{8,512}")
 
 @dataclass(frozen=True)
 class CallToken:
-    """A token, the file that keeps it (None: it was given), and whether it was made just now."""
+    """Token for calls, the file that holds it (None: the user gave it), and whether it is `new`."""
 
     text: str
     file: Path | None = None
@@ -335,10 +331,10 @@ class CallToken:
 
 
 def call_token(given: str | None, store: Path) -> CallToken:
-    """The token for the calls of a store.
+    """Returns the user's token, or the one stored beside the store; draws it the first time.
 
     Raises:
-        InputError: it is too short or of other characters, or others than its owner can read its file.
+        InputError: the token is too short or has other characters, or other users can read its file.
     """
     if given is not None:
         return CallToken(_checked(given, None))
@@ -349,7 +345,7 @@ def call_token(given: str | None, store: Path) -> CallToken:
         except FileExistsError:
             if stat.S_IMODE(file.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO):
                 hint = f"chmod 600 {file}, or remove it for a new one"
-                raise InputError("others can read the token", hint=hint, file=file) from None
+                raise InputError("other users can read the token", hint=hint, file=file) from None
             return CallToken(_checked(file.read_text(encoding="utf-8", errors="replace").strip(), file), file)
         text = secrets.token_urlsafe(32)
         with os.fdopen(opened, "w", encoding="ascii") as writer:

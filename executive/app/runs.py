@@ -1,4 +1,4 @@
-"""Runs missions of a store one after another: a single run is a queue of one, and a server a queue that waits."""
+"""Runs missions of a store one after another: a single run is a queue of one; a server is a queue that waits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final, Protocol
 
 from executive.app.backend import Durable
-from executive.app.mission_run import Finished, log_name, return_memory, run_request
+from executive.app.mission_run import FinishedRun, log_name, return_memory, run_request
 from executive.app.page_view import PageView
 from executive.app.prepare import Setting, prepare
 from executive.app.prepared import Prepared
@@ -32,8 +32,8 @@ _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCEL
 
 
 @dataclass(frozen=True)
-class Watching:
-    """The control and the watchers of a run, as `run_request` takes them."""
+class RunOptions:
+    """Control and visitors of a run, as `run_request` takes them."""
 
     control: Control
     visitors: Sequence[RunVisitor] = ()
@@ -42,26 +42,26 @@ class Watching:
 
 
 class Screen(Protocol):
-    """What people see of runs, and what they control them by."""
+    """Display of runs, with their control."""
 
     def tell(self, line: str, *, title: bool = False) -> None:
         """Shows a line."""
 
-    def watching(self, prepared: Prepared) -> AbstractContextManager[Watching]:
-        """Shows a run from before its beginning to its end."""
+    def watch(self, prepared: Prepared) -> AbstractContextManager[RunOptions]:
+        """Shows a run from its beginning to its end."""
 
-    def conclude(self, finished: Finished) -> None:
-        """Shows how a run ended."""
+    def conclude(self, finished: FinishedRun) -> None:
+        """Shows the result of a run."""
 
     def name_files(self, out: Path) -> None:
-        """Names what a run has left in its folder."""
+        """Names the files of a run in its folder."""
 
 
 @dataclass(frozen=True)
-class Ended:
-    """How a mission of the store ended. One that was set aside has no report.
+class MissionResult:
+    """Result of a mission of the store. A mission that was set aside has no report.
 
-    `past` tells what was done with its past when it went on after it had been broken off.
+    `past` has a line for each part that was restored when an interrupted mission was resumed.
     """
 
     mission: int
@@ -73,35 +73,37 @@ class Ended:
 
     @property
     def hung_up(self) -> bool:
-        """Returns whether it ended since its terminal was closed."""
+        """Whether it ended because its terminal was closed."""
         return self.message == HUNG_UP
 
     def to_json(self) -> dict[str, Any]:
-        """Its report as JSON values, with the mission's number."""
-        told = {"outcome": self.outcome, "message": self.message} if self.report is None else self.report.to_json()
-        told |= {"mission": self.mission, "achieved": self.achieved}
-        return told if self.past is None else {**told, "resumed": list(self.past)}
+        """Returns its report as JSON values, with the mission's number."""
+        values = {"outcome": self.outcome, "message": self.message} if self.report is None else self.report.to_json()
+        values |= {"mission": self.mission, "achieved": self.achieved}
+        return values if self.past is None else {**values, "resumed": list(self.past)}
 
 
 class Runner(Protocol):
-    """Runs missions of the store."""
+    """Runner of missions of the store."""
 
-    def run(self, mission: StoredMission) -> Ended:
-        """Runs one to its end, or sets it aside. Raises InputError: no further one can be run."""
+    def run(self, mission: StoredMission) -> MissionResult:
+        """Runs a mission to its end, or sets it aside. Raises InputError if no further mission can be run."""
 
-    def set_aside(self, mission: StoredMission, cause: str) -> Ended:
-        """Ends one that cannot be run with its cause."""
+    def set_aside(self, mission: StoredMission, cause: str) -> MissionResult:
+        """Ends a mission that cannot be run, with its cause."""
 
     def cancel(self, reason: str) -> None:
-        """Cancels the one under way, and any that begins later; from signal handlers."""
+        """Cancels the mission under way and all later ones. Signal handlers may call it."""
 
 
-def run_in_turn(missions: Iterable[StoredMission], runner: Runner, *, until_cancelled: bool = True) -> list[Ended]:
-    """Runs missions as they come, the next one when one has ended; `until_cancelled`, none after one was cancelled.
+def run_in_turn(
+    missions: Iterable[StoredMission], runner: Runner, *, until_cancelled: bool = True
+) -> list[MissionResult]:
+    """Runs missions one after another; with `until_cancelled` it stops after a cancelled mission.
 
-    Raises InputError: as the runner.
+    Raises InputError if the runner does.
     """
-    ended = list[Ended]()
+    ended = list[MissionResult]()
     for mission in missions:
         ended.append(runner.run(mission))
         if until_cancelled and ended[-1].outcome == MissionState.CANCELLED.value:
@@ -110,26 +112,26 @@ def run_in_turn(missions: Iterable[StoredMission], runner: Runner, *, until_canc
 
 
 def queued_missions(missions: MissionStore) -> Iterator[StoredMission]:
-    """The missions that are queued, each as it comes to its turn.
+    """Yields the queued missions, each when its turn comes.
 
-    Raises InputError: one was broken off before, and waits to be taken up.
+    Raises InputError if an interrupted mission must be resumed first.
     """
-    broken = missions.missions(MissionState.RUNNING)
-    if broken:
-        raise broken_off(missions, broken[-1])
+    interrupted = missions.missions(MissionState.RUNNING)
+    if interrupted:
+        raise interrupted_error(missions, interrupted[-1])
     while (mission := next_queued(missions)) is not None:
         yield mission
 
 
 def next_queued(missions: MissionStore) -> StoredMission | None:
-    """The mission whose turn it is."""
+    """Returns the queued mission that comes next."""
     return next((each for each in missions.missions(MissionState.QUEUED) if each.queued), None)
 
 
 class MissionRuns:
-    """Runs missions of a store (`Runner`), and notes there that one is under way and how it ended.
+    """Runner of a store's missions, which stores their beginning and their end.
 
-    A mission of a queue begins in the world as the one before has left it, and has a folder of its own.
+    A mission of a queue begins in the world that the mission before it left, and has a folder of its own.
     """
 
     def __init__(
@@ -138,26 +140,27 @@ class MissionRuns:
         screen: Screen,
         *,
         ask: Answerer | None = None,
-        run: Callable[..., Finished] | None = None,
+        run: Callable[..., FinishedRun] | None = None,
     ) -> None:
-        """`ask` is who is asked what a file leaves open; `run` runs what is prepared, in the place of `run_request`."""
+        """`ask` answers open questions of a mission file; `run` replaces `run_request`."""
         self._missions, self._screen, self._ask, self._run_prepared = missions, screen, ask, run or run_request
         self._control: Control | None = None
         self._cancelled: str | None = None
 
-    def run(self, mission: StoredMission, prepared: Prepared | None = None) -> Ended:
-        """Runs a mission from its beginning, or goes on with one that was broken off or cancelled, to its end.
+    def run(self, mission: StoredMission, prepared: Prepared | None = None) -> MissionResult:
+        """Runs a mission from its beginning, or resumes an interrupted or cancelled one, to its end.
 
-        One of a queue that cannot be run is set aside, so that the next one can. `prepared` is the mission where it is
-        understood already.
+        Sets aside a mission of a queue that cannot be run. `prepared` is the mission if it is prepared already.
 
         Raises:
-            StoreError: the store cannot be used, or the disk is full; no other mission can be run either.
-            InputError: it is none of a queue, and its file, its world or the plant's state cannot be used.
+            StoreError: the store cannot be used, or the disk is full, so that no mission can be run.
+            InputError: a mission outside a queue has a file, world or plant state that cannot be used.
         """
         if not mission.queued:
-            if mission.state is MissionState.QUEUED:
-                self._give_up_broken_off(mission)
+            for other in self._missions.missions(MissionState.RUNNING) if mission.state is MissionState.QUEUED else ():
+                what = f"broken off, and given up for mission {mission.id}"  # its world is replaced
+                self._missions.finish(other.id, MissionState.CANCELLED, what)
+                self._screen.tell(f"Mission {other.id} ({other.request.name}) had been broken off; it is given up.")
             return self._run(mission, prepared)
         try:
             return self._run(mission, prepared)
@@ -177,55 +180,47 @@ class MissionRuns:
             return_memory()
         return self.set_aside(mission, cause)
 
-    def _give_up_broken_off(self, mission: StoredMission) -> None:
-        """Gives up missions that were broken off, because the mission that runs now replaces their world."""
-        for broken in self._missions.missions(MissionState.RUNNING):
-            self._missions.finish(
-                broken.id, MissionState.CANCELLED, f"broken off, and given up for mission {mission.id}"
-            )
-            self._screen.tell(f"Mission {broken.id} ({broken.request.name}) had been broken off; it is given up.")
-
-    def set_aside(self, mission: StoredMission, cause: str) -> Ended:
-        """Ends a mission that cannot be run with its cause."""
+    def set_aside(self, mission: StoredMission, cause: str) -> MissionResult:
+        """Ends a mission that cannot be run, with its cause."""
         self._missions.finish(mission.id, MissionState.ERROR, cause)
         self._screen.tell(f"Mission {mission.id} ({mission.request.name}) is set aside: {cause}")
         again = f"errand resume --mission {mission.id} --store {self._missions.path}"
         self._screen.tell(f"  `{again}` tries again")
-        return Ended(mission.id, MissionState.ERROR.value, False, cause)
+        return MissionResult(mission.id, MissionState.ERROR.value, False, cause)
 
     def cancel(self, reason: str) -> None:
-        """Cancels the mission under way, and any that begins later; from signal handlers."""
+        """Cancels the mission under way and all later ones. Signal handlers may call it."""
         self._cancelled = reason
         if self._control is not None:
             self._control.cancel(reason)
 
-    def _run(self, mission: StoredMission, prepared: Prepared | None) -> Ended:
-        name, begun, taken = mission.request.name, mission.state is not MissionState.QUEUED, None
+    def _run(self, mission: StoredMission, prepared: Prepared | None) -> MissionResult:
+        name, begun, resumed = mission.request.name, mission.state is not MissionState.QUEUED, None
         if begun and self._missions.has_steps(mission.id):
-            taken = take_up(self._missions, mission, ask=self._ask)
+            resumed = resume_mission(self._missions, mission, ask=self._ask)
             self._screen.tell(f"Mission {mission.id} ({name}) goes on.")
-            prepared = _in_its_folder(mission, taken.prepared)
+            prepared = _in_its_folder(mission, resumed.prepared)
         elif begun:
             self._screen.tell(f"Mission {mission.id} ({name}) had not begun; it begins now.")
         if prepared is None:
             prepared = _in_its_folder(mission, prepare(mission.request, ask=self._ask))
             self._screen.tell(f"Mission {mission.id}: {name}", title=True)
         with note_run(self._missions, mission) as ended:
-            before = self._before(mission) if mission.queued and taken is None else None
-            durable = new_run(self._missions, mission, prepared, before) if taken is None else taken.durable
-            with self._screen.watching(prepared) as by, self._cancelling(by.control):
-                finished = self._run_prepared(prepared, durable=durable, **vars(by))
+            before = self._before(mission) if mission.queued and resumed is None else None
+            durable = new_run(self._missions, mission, prepared, before) if resumed is None else resumed.durable
+            with self._screen.watch(prepared) as options, self._cancelling(options.control):
+                finished = self._run_prepared(prepared, durable=durable, **vars(options))
             self._screen.conclude(finished)
             ended(finished.report)
-        report, past = finished.report, None if taken is None else taken.told
+        report, past = finished.report, None if resumed is None else resumed.lines
         if past is not None:
             self._screen.tell("\n  ".join(["What became of its past:", *past]))
         self._screen.name_files(prepared.request.out)
-        return Ended(mission.id, report.outcome, report.achieved, report.message, report, past)
+        return MissionResult(mission.id, report.outcome, report.achieved, report.message, report, past)
 
     @contextmanager
     def _cancelling(self, control: Control) -> Iterator[None]:
-        """Lets `cancel` cancel this run, also when `cancel` was called before the run began."""
+        """Connects `cancel` with a run's control, also for a `cancel` before the run began."""
         self._control = control
         if self._cancelled is not None:
             control.cancel(self._cancelled)
@@ -235,7 +230,7 @@ class MissionRuns:
             self._control = None
 
     def _before(self, mission: StoredMission) -> StoredMission | None:
-        """The mission that left the world in which this one begins; None when it begins in a fresh one."""
+        """Returns the mission whose world this one continues; None if it begins in a new world."""
         ended = [each for each in self._missions.missions(*_ENDED) if each.queued and each.starts]
         last = max((each for each in ended if each.id < mission.id), key=lambda each: each.id, default=None)
         if last is None or not same_world(last, mission) or last.clock_s is None:
@@ -246,10 +241,10 @@ class MissionRuns:
 
 @contextmanager
 def note_run(missions: MissionStore, mission: StoredMission) -> Iterator[Callable[[RunReport], None]]:
-    """Note in the store that a mission is under way, and, when told the report, how it ended.
+    """Stores that a mission runs, and its end when the yielded function gets the report.
 
-    A run that could not begin leaves things as they were; of one that is killed, or breaks off since the disk is full,
-    nobody notes anything. Raises InputError, which names the way on: the disk is full.
+    If the run raises InputError before it began, the store is as before. Raises InputError with a hint if the disk is
+    full.
     """
     missions.begin(mission.id)
     over = False
@@ -274,21 +269,21 @@ def note_run(missions: MissionStore, mission: StoredMission) -> Iterator[Callabl
 
 
 def _in_its_folder(mission: StoredMission, prepared: Prepared) -> Prepared:
-    """With the folder for its files: each mission of a queue has its own."""
+    """Sets the folder of a mission's files; each mission of a queue has its own."""
     asked = mission.request
     out = asked.out / f"{mission.id:03d}-{slug(asked.name)}" if mission.queued else asked.out
     return replace(prepared, request=replace(prepared.request, out=out))
 
 
 def plant_file(store: MissionStore) -> Path:
-    """Where the plant of a store's missions keeps its state; nobody but the plant reads it."""
+    """Returns the file in which the plant stores the state of a store's missions."""
     return store.path.with_suffix(".plant")
 
 
 def new_run(
     store: MissionStore, mission: StoredMission, prepared: Prepared, before: StoredMission | None = None
 ) -> Durable:
-    """A mission that begins in a fresh world, or in the one that the mission `before` has left."""
+    """Begins the stored state of a mission in a new world, or in the world that the mission `before` left."""
     journals, label = _journals(store, mission, prepared), str(mission.id)
     starts = {name: robot.start for name, robot in prepared.robots.items()} if before is None else before.poses
     if prepared.request.robots:
@@ -299,7 +294,7 @@ def new_run(
 
 
 def _journals(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Mapping[str, StoreJournal]:
-    """The journals of a mission's robots; what takes the place of one's part by a correction is kept in its stead."""
+    """Returns the journals of a mission's robots; a corrected mission is stored in place of the original."""
     bare = replace(prepared, request=replace(mission.request, sentence=None, file=None, text=None))
     return {
         each.mission.robot_name: store.journal(mission.id, _part_of(each)).replaceable(
@@ -310,36 +305,36 @@ def _journals(store: MissionStore, mission: StoredMission, prepared: Prepared) -
 
 
 def _part_of(prepared: Prepared) -> str | None:
-    """The robot under whose name the store keeps a part of a mission; None for the only robot of a run."""
+    """Name of the robot under which the store holds a part of a mission; None for the only robot of a run."""
     return prepared.mission.robot_name if prepared.request.robots else None
 
 
 def same_world(one: StoredMission, other: StoredMission) -> bool:
-    """Returns whether two missions are to be done by the same robots in one world."""
+    """Returns whether two missions are for the same robots in the same world."""
     a, b = one.request, other.request
     same = (a.world, a.world_name, a.seed, frozenset(a.robots)) == (b.world, b.world_name, b.seed, frozenset(b.robots))
     return same and (a.robots or a.robot == b.robot) and (a.scenario, a.variation) == (b.scenario, b.variation)
 
 
 @dataclass(frozen=True)
-class TakenUp:
-    """A mission that was broken off, ready to go on; a recollection for each robot."""
+class ResumedMission:
+    """Interrupted mission that is ready to continue, with a recollection for each robot."""
 
     prepared: Prepared
     durable: Durable
     recollections: Sequence[Recollection]
 
     @property
-    def told(self) -> tuple[str, ...]:
-        """Lines for the user: what was taken over of the mission's past."""
+    def lines(self) -> tuple[str, ...]:
+        """Lines for the user on the restored parts of the mission."""
         return tuple(line for each in self.recollections for line in each.told)
 
 
-def take_up(store: MissionStore, mission: StoredMission, *, ask: Answerer | None = None) -> TakenUp:
-    """All that is needed to go on with a mission, each robot from where it was; `ask` is that of `prepare`.
+def resume_mission(store: MissionStore, mission: StoredMission, *, ask: Answerer | None = None) -> ResumedMission:
+    """Restores an interrupted mission, each robot at its last pose; `ask` is that of `prepare`.
 
     Raises:
-        InputError: what the store knows of it cannot be read, or its tree is no longer the one that was begun.
+        InputError: the stored state cannot be read, or another version of the code or the world gives another tree.
     """
     prepared = prepare(mission.request, ask=ask)
     if prepared.request.fingerprint != mission.request.fingerprint:
@@ -358,12 +353,12 @@ def take_up(store: MissionStore, mission: StoredMission, *, ask: Answerer | None
     label, log = str(mission.id), log_name(mission.starts + 1)
     durable = Durable(plant_file(store), journals, label, True, label, poses, log)
     first, *others = (replace(each, tree=tree) for each, (tree, _) in zip(every, resumed, strict=True))
-    together = replace(first, request=prepared.request, others=tuple(others))
-    return TakenUp(together, durable, [recollection for _, recollection in resumed])
+    whole = replace(first, request=prepared.request, others=tuple(others))
+    return ResumedMission(whole, durable, [recollection for _, recollection in resumed])
 
 
 def _with_replacement(store: MissionStore, mission: StoredMission, prepared: Prepared) -> Prepared:
-    """What a robot is to do, or what has taken its place by a correction. Raises InputError: its tree is another."""
+    """Returns a robot's mission, or the correction that replaced it. Raises InputError if its tree has changed."""
     name = prepared.mission.robot_name
     other = mission.instead.get(name)
     if other is None:
@@ -382,14 +377,14 @@ def _other_version(store: MissionStore, mission: StoredMission) -> InputError:
     return InputError(what, hint=hint, file=store.path)
 
 
-def broken_off(missions: MissionStore, mission: StoredMission) -> InputError:
-    """Why nothing else is run before a mission that was broken off."""
+def interrupted_error(missions: MissionStore, mission: StoredMission) -> InputError:
+    """Returns the error that an interrupted mission must be resumed first."""
     what = f"mission {mission.id} ({mission.request.name}) was broken off"
     return InputError(what, hint="`errand resume` goes on with it and then with the queue", file=missions.path)
 
 
 def resumable_line(missions: MissionStore) -> str | None:
-    """How to go on with the mission that was begun last, where it was cancelled; None where it was not."""
+    """Returns a line on how to resume the last mission; None unless it was cancelled."""
     begun = [each for each in missions.missions() if each.starts]
     if not begun or begun[-1].state is not MissionState.CANCELLED:
         return None

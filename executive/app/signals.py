@@ -1,4 +1,4 @@
-"""Signals that end a run in order: Ctrl-C, a polite kill, and the terminal's end."""
+"""Signals that end a run in order: Ctrl-C, SIGTERM, and the end of the terminal."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from typing import Final
 _OUTPUTS: Final = (1, 2)
 _REASON: Final = "cancelled by {}"
 HUNG_UP: Final = _REASON.format(signal.SIGHUP.name)
-"""The reason of a run that ended since its terminal was closed."""
+"""Reason of a run that ended because its terminal was closed."""
 
 
 @contextmanager
 def ended_by_signals(end: Callable[[str], None]) -> Iterator[None]:
-    """Has `end` called with the reason at Ctrl-C, a polite kill and closing the terminal; of several, the inner first.
+    """Calls `end` with the reason at Ctrl-C, SIGTERM and the end of the terminal; nested blocks call the inner first.
 
-    A second Ctrl-C breaks in at once. What is printed after the terminal is closed is dropped. Under `nohup` closing it
-    ends nothing.
+    A second Ctrl-C raises KeyboardInterrupt. Output after the end of the terminal is dropped. Under `nohup` the end of
+    the terminal ends nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -40,7 +40,7 @@ def ended_by_signals(end: Callable[[str], None]) -> Iterator[None]:
 
 
 class _Ending:
-    """The handler of these signals."""
+    """Handler of the signals."""
 
     def __init__(self, end: Callable[[str], None], terminals: Sequence[int]) -> None:
         self._end, self._terminals = end, terminals
@@ -48,7 +48,7 @@ class _Ending:
         self.outer: _Ending | None = None
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """A signal has come."""
+        """Handles a signal."""
         if number == signal.SIGHUP:
             _drop_output(self._terminals)
         elif self._asked:
@@ -62,7 +62,7 @@ class _Ending:
 
 @contextmanager
 def interrupted_by_hang_up() -> Iterator[None]:
-    """Closing the terminal is Ctrl-C, where no robot moves; what is printed afterwards is dropped."""
+    """Treats the end of the terminal as Ctrl-C, for commands that move no robot; later output is dropped."""
     terminals = [output for output in _OUTPUTS if os.isatty(output)]
 
     def on_signal(_number: int, _frame: FrameType | None) -> None:
@@ -80,7 +80,7 @@ def interrupted_by_hang_up() -> Iterator[None]:
 
 
 def _drop_output(terminals: Sequence[int]) -> None:
-    """Turns these descriptors to nowhere: every write to a terminal that is gone fails."""
+    """Redirects descriptors to /dev/null, because writing to a closed terminal fails."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for terminal in terminals:
         os.dup2(nowhere, terminal)

@@ -1,4 +1,4 @@
-"""The simulated backend: robots with their estimators in the plant of a world, with its referee and its recorder."""
+"""Simulated backend: robots with their estimators in the plant of a world, with referee and recorder."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class SimulatedBackend:
         variation: Variation = NO_VARIATION,
         spared: Collection[str] = (),
     ) -> None:
-        """Builds the plant, objects set by the seed. Raises InputError when they do not fit into the world."""
+        """Builds the plant; the seed places the objects. Raises InputError if robots or objects do not fit."""
         self._world, self._robots, self._record = world, robots, record
         self._simulation = simulate(world, robots, seed=seed, record=record, variation=variation, spared=spared)
         self._steps = WorkThread("errand-plant")
@@ -66,28 +66,28 @@ class SimulatedBackend:
         return self._settled().referee
 
     def _settled(self) -> Simulation:
-        """The simulation, once no step is under way."""
+        """Returns the simulation after the step under way has ended."""
         self._pipeline.settle()
         return self._simulation
 
     def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
-        """The robot with its estimators; the plant's state is taken up and kept where `durable` says so."""
+        """Returns the robot with its estimators; with `durable` the plant's state is stored, or resumed."""
         robot = self._robots.get(tree.robot_name)
         if robot is None:
             hint = f"known: {', '.join(self._robots)}"
             raise InputError(f"there is no robot '{tree.robot_name}' in {self._world.name}", hint=hint)
-        told, believed = robot.told, None
+        known, believed = robot.start_known, None
         if durable is not None:
-            told, believed = robot.told and not durable.take_up, durable.poses.get(tree.robot_name)
-        entry = run_entry(self._simulation, self._world, tree, robot.stack, believed=believed, told=told)
+            known, believed = robot.start_known and not durable.take_up, durable.poses.get(tree.robot_name)
+        entry = run_entry(self._simulation, self._world, tree, robot.stack, believed=believed, start_known=known)
         if durable is not None:
-            durable.journals[tree.robot_name].keep_world = self._keeping(durable)
+            durable.journals[tree.robot_name].keep_world = self._world_keeper(durable)
         return replace(entry, robot=self._pipeline.robots[tree.robot_name])
 
-    def _keeping(self, durable: Durable) -> Callable[[], None]:
-        """Keeps the plant's state, which the first robot to be had takes up where `durable` says so.
+    def _world_keeper(self, durable: Durable) -> Callable[[], None]:
+        """Returns a function that stores the plant's state; the first call resumes an earlier state with `durable`.
 
-        Raises InputError: it cannot be taken up.
+        Raises InputError if that state cannot be resumed.
         """
         if self._keep is None:
             if durable.take_up:
@@ -105,16 +105,16 @@ class SimulatedBackend:
         return self._keep
 
     def happened(self) -> Sequence[tuple[float, str]]:
-        """What doors did, and what somebody moved."""
+        """Events of doors, people and moved objects, as times (s) and sentences."""
         return self._pipeline.happened
 
     def work(self) -> Mapping[str, int]:
-        """The plant's counters."""
+        """The plant's work counters by name."""
         counts: Mapping[str, int] = self._settled().work()
         return counts
 
     def attach(self, profile: Profile) -> None:
-        """Time the plant's steps, the referee, and each robot's control, sensors and pictures."""
+        """Times the plant's steps, the referee, and each robot's control, sensors and cameras."""
         profile.attach("plant", self._simulation.engine, "step")
         profile.attach("referee", self._simulation.referee, "observe")
         for robot in self._simulation.robots.values():
@@ -123,19 +123,19 @@ class SimulatedBackend:
             profile.attach("rendering", robot, "image")
 
     def show_live(self) -> Scene:
-        """The plant's live scene."""
+        """Starts the plant's live picture."""
         scene: Scene = self._simulation.show_live()
         return scene
 
     def judge(
         self, tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = (), since_s: float = 0.0
     ) -> RefereeReport:
-        """What the plant's referee saw."""
+        """Returns the report of the plant's referee."""
         verdict = verdict_of(tree, result, self._settled().referee.judge, before=before, since_s=since_s)
         return RefereeReport(**asdict(verdict), events=self._simulation.referee.events)
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
-        """Writes recording and pictures, where the run was recorded."""
+        """Writes recording and pictures of a recorded run; returns the recording's path."""
         if not self._record:
             return None
         self._settled().save_recording(out / "recording.html")
@@ -144,12 +144,12 @@ class SimulatedBackend:
 
 
 def compile_first(cache: Path | None = None) -> None:
-    """Has `errand warm-up` compile the numeric code, and warns that it takes a while, where a cache holds none of it.
+    """Runs `errand warm-up` with a warning if the numeric code is not compiled for this machine.
 
-    `cache` is numba's folder for the planner's search unless another is given.
+    `cache` is by default numba's folder for the planner's search.
     """
-    kept = cache or Path(search.machine_code.stats.cache_path)  # type: ignore[attr-defined]
-    if any(kept.glob("lattice.search-*.nbi")):
+    folder = cache or Path(search.machine_code.stats.cache_path)  # type: ignore[attr-defined]
+    if any(folder.glob("lattice.search-*.nbi")):
         return
     _LOG.warning("errand: compiles its numeric code for this machine, once; that takes about half a minute")
     subprocess.run([sys.executable, "-m", "executive.cli", "warm-up"], stdout=subprocess.DEVNULL, check=False)
@@ -164,7 +164,7 @@ def simulate(
     variation: Variation = NO_VARIATION,
     spared: Collection[str] = (),
 ) -> Simulation:
-    """The plant of a world, objects set by the seed. Raises InputError when they do not fit into it."""
+    """Builds the plant of a world; the seed places the objects. Raises InputError if robots or objects do not fit."""
     logging.getLogger("drake").setLevel(logging.WARNING)  # Drake sets its own level when it is imported
     try:
         return Simulation(
@@ -189,12 +189,12 @@ def run_entry(
     stack: RobotStack | None = None,
     *,
     believed: Pose2D | None = None,
-    told: bool = True,
+    start_known: bool = True,
 ) -> RunEntry:
-    """The robot of a tree's name with the components of its stack.
+    """Returns the robot of a tree with the components of its stack.
 
-    `believed` is where the robot believed to be before a restart; it looks for its place in a wide circle then. When it
-    is not `told` where it stands either, it looks everywhere.
+    `believed` is the estimated pose before a restart; the robot then localises in a wide circle around it. Without it
+    and unless `start_known` it localises on the whole map.
 
     Raises:
         InputError: the world's maps or the detector's model cannot be read.
@@ -202,9 +202,9 @@ def run_entry(
     stack = stack or default_stack()
     seen_from_m = simulation.robots[tree.robot_name].capabilities().lidar_height_m
     scan_map, keepout_map = load_grid_map(world.scan_map_seen_from(seen_from_m)), load_grid_map(world.keepout_map_path)
-    start = believed or (simulation.starts[tree.robot_name] if told else None)
+    start = believed or (simulation.starts[tree.robot_name] if start_known else None)
     try:
-        localiser = stack.localiser.build(scan_map, start, surely=told and believed is None)
+        localiser = stack.localiser.build(scan_map, start, surely=start_known and believed is None)
     except InputError as error:
         raise InputError(error.message, hint=error.hint, file=world.scan_map_path) from error
     return RunEntry(

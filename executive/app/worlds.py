@@ -1,4 +1,4 @@
-"""Worlds by name, and what is known of them; imports no plant."""
+"""Opens worlds and their knowledge by name; loads nothing of the simulation."""
 
 from __future__ import annotations
 
@@ -12,23 +12,18 @@ from skills.files.errors import InputError, known_names, suggestion
 
 
 def open_world(name: str) -> World:
-    """A world by its name or folder. Raises InputError."""
+    """Opens a world by its name or folder. Raises InputError."""
     try:
         return load_world(name)
     except (WorldError, OSError) as error:
-        raise _world_error(name, error) from error
-
-
-def _world_error(name: str, error: Exception) -> InputError:
-    """Of a world that is not there its name and what there is; else what its files say."""
-    if not isinstance(error, OSError) and not str(error).startswith("unknown world"):
-        return InputError(str(error))
-    known = f"{known_names(name, known_worlds())}, and folders with a world.dmd.yaml"
-    return InputError(f"unknown world '{name[:60]}'", hint=suggestion(name, known_worlds(), known))
+        if isinstance(error, WorldError) and not str(error).startswith("unknown world"):
+            raise InputError(str(error)) from error
+        known = f"{known_names(name, known_worlds())}, and folders with a world.dmd.yaml"
+        raise InputError(f"unknown world '{name[:60]}'", hint=suggestion(name, known_worlds(), known)) from error
 
 
 def refuse_unusable(world: World) -> None:
-    """Raises InputError unless the simulation can use the geometry of a world of the user's, and what is imported."""
+    """Raises InputError unless the simulation can load a user's world and the imported models."""
     is_ours = world.folder.is_relative_to(WORLDS_FOLDER)
     if is_ours and not world.imports:
         return
@@ -38,14 +33,14 @@ def refuse_unusable(world: World) -> None:
 
 @cache
 def _try(directives: Path | None, models: tuple[Path, ...]) -> None:
-    """Lets the simulation read files that are good, once in a process."""
+    """Loads the files in the simulation; once in a process if they are good."""
     from plant.diagram import try_geometry
 
     try_geometry(directives, models)
 
 
 def with_map(world: World, folder: Path) -> World:
-    """The world with the robot's map from a folder, as `errand map build` leaves it. Raises InputError: it has none."""
+    """Gives the world the map in a folder of `errand map build`. Raises InputError if the folder has no map."""
     chosen = replace(world, maps=folder.resolve())
     for path in (chosen.scan_map_path, chosen.keepout_map_path):
         if not path.is_file():
@@ -55,5 +50,5 @@ def with_map(world: World, folder: Path) -> World:
 
 
 def knowledge_of(world: World) -> Knowledge:
-    """What the robot is told of a world. Raises InputError."""
+    """Loads the knowledge of a world. Raises InputError."""
     return load_knowledge(world.knowledge_path)

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final
 import typer
 from rich.console import Console
 
-from executive.app.picture_files import detector_of, drawn, read_picture, write_picture
+from executive.app.picture_files import draw_detections, open_detector, read_picture, write_picture
 from executive.cli.number_options import quantity_option
 from executive.cli.output import BAD_INPUT, console_for, finish, show_table
 from skills.detection import Detection, Detector
@@ -56,7 +56,7 @@ def detect(
 
     A picture that cannot be read does not keep the others from being looked at; the exit status is 2 then.
     """
-    detector = detector_of(model, DetectorOptions(threshold=threshold))
+    detector = open_detector(model, DetectorOptions(threshold=threshold))
     names: Sequence[Path | None] = [None] * len(images) if draw is None else _drawing_names(images, draw)
     looked = [one for group in _groups(zip(images, names, strict=True)) for one in _look(detector, group)]
     for one in looked:
@@ -97,7 +97,7 @@ def _look(detector: Detector, group: Sequence[PictureResult]) -> Iterator[Pictur
             continue
         seen = next(found)
         if one.drawing is not None:
-            write_picture(one.drawing, drawn(one.picture, seen))
+            write_picture(one.drawing, draw_detections(one.picture, seen))
         yield replace(one, picture=None, found=seen, ms=ms)
 
 

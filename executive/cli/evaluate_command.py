@@ -132,13 +132,11 @@ def _file_of(results: Path | None) -> Iterator[Path]:
 
 def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> Evaluation:
     """A request at many seeds, its questions answered once. Raises InputError: it cannot be done."""
+    from executive.app.checker import prepare_checked
     from executive.app.evaluate.evaluation_file import evaluation_at_seeds, seed_range
-    from executive.app.feasibility import refuse_impossible
-    from executive.app.prepare import prepare
 
-    chosen, prepared = seed_range(seeds), prepare(asked, ask=terminal_answerer())
-    if not anyway:
-        refuse_impossible(prepared)
+    chosen = seed_range(seeds)
+    prepared = prepare_checked(asked, ask=terminal_answerer(), anyway=anyway)
     if asked.file is None:
         asked = replace(asked, sentence=prepared.request.sentence, answers=(), questions=None)
     return evaluation_at_seeds(replace(asked, file=prepared.request.file), chosen, each_fault=each_fault)

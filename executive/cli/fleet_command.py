@@ -118,9 +118,9 @@ def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
         if each.id in wholes:
             continue
         if each.id not in known:
-            from executive.app.runs import broken_off
+            from executive.app.runs import interrupted_error
 
-            raise broken_off(missions, each)
+            raise interrupted_error(missions, each)
         if known[each.id].blocked is not None:
             message = f"the run was broken off, and {known[each.id].robot} had begun it"
             missions.finish(each.id, MissionState.FAILURE, message)

@@ -10,7 +10,6 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from executive.app.prepare import prepare
 from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON, QUIET, STORE, takes_request
@@ -73,14 +72,12 @@ def add(
     as_json: AS_JSON = False,
 ) -> None:
     """Queue a sentence or a mission file, checked; with a trigger, `errand queue serve` queues it each time."""
+    from executive.app.checker import prepare_checked
+
     trigger = _trigger(at, every, on, missed)
     refuse_unaddressed(request)
     load_stack(request.stack)
-    prepared = prepare(request, ask=terminal_answerer())
-    if not anyway:
-        from executive.app.feasibility import refuse_impossible
-
-        refuse_impossible(prepared)
+    prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
     out, request = request.out, prepared.request.from_anywhere()
     with MissionStore(store or out / STORE_NAME) as missions:
         if trigger is None:

@@ -38,9 +38,8 @@ def run(
 ) -> None:
     """Runs a sentence or a mission file in the simulated world."""
     refuse_unaddressed(request)
-    from executive.app.feasibility import refuse_impossible
-    from executive.app.page_view import PageView, queueing
-    from executive.app.prepare import prepare
+    from executive.app.checker import prepare_checked
+    from executive.app.page_view import PageView, queue_function
     from executive.app.runs import MissionRuns
     from executive.cli.listen_command import hear_request
     from executive.cli.screen import ConsoleScreen, voice_for
@@ -54,15 +53,16 @@ def run(
 
     def page_of(prepared: Prepared) -> PageView:
         return PageView(
-            prepared, plain_lines(console), port=view_port, later=queueing(prepared, store=kept_in, out=request.out)
+            prepared,
+            plain_lines(console),
+            port=view_port,
+            later=queue_function(prepared, store=kept_in, out=request.out),
         )
 
     with voice_for(aloud) as voice:
         if listen_to is not None:
             request = replace(request, sentence=hear_request(listen_to, request, console=console))
-        prepared = prepare(request, ask=terminal_answerer())
-        if not anyway:
-            refuse_impossible(prepared)
+        prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
         page = page_of if view or view_for is not None else None
         screen = ConsoleScreen(console, quiet=quiet, whole_tree=whole_tree, voice=voice, page=page, profile=timing)
         with MissionStore(kept_in) as missions, missions.claimed():

@@ -15,11 +15,11 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
-from executive.app.conversations import Talk, load_ahead
-from executive.app.mission_run import Finished
+from executive.app.conversations import Conversations, load_ahead
+from executive.app.mission_run import FinishedRun
 from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
-from executive.app.runs import Watching
+from executive.app.runs import RunOptions
 from executive.cli.run_keys import HELP, Keys, keys_pressed, prompt_lines
 from executive.language.parser import load_parser
 from executive.record.schemas import SPEECH
@@ -88,10 +88,10 @@ class ConsoleScreen:
         self.console.print(line, markup=False, style="bold" if title else None)
 
     @contextmanager
-    def watching(self, prepared: Prepared) -> Iterator[Watching]:
-        """Shows what is run, the tree while it runs and what the robot says; the console controls it, or the page."""
-        for told in dict.fromkeys(note for each in prepared.all for note in each.mission.notes):
-            self.tell(f"{told}.")
+    def watch(self, prepared: Prepared) -> Iterator[RunOptions]:
+        """Shows the commands, then the tree and the robot's speech during the run; console or page control the run."""
+        for note in dict.fromkeys(note for each in prepared.all for note in each.mission.notes):
+            self.tell(f"{note}.")
         for line in (*prepared.request.scenario.lines(), *prepared.request.variation.lines()):
             self.tell(f"Scenario: {line}")
         for each in prepared.all:
@@ -104,18 +104,19 @@ class ConsoleScreen:
         speech = HeardSpeech(self.console, self.voice, self.quiet)
         if self.quiet and page is None:  # nobody speaks to the run
             load_parser().release()
-            yield Watching(control, (speech,), page, self.profile)
+            yield RunOptions(control, (speech,), page, self.profile)
             return
-        talk = Talk(prepared, control) if page is None or page.talk is None else page.talk
-        talk.set_missions()
-        shown = live_view(self.console, control, say=lambda text: talk.hear(text).text)
+        own = None if page is None else page.conversations
+        conversations = own or Conversations(prepared, control)
+        conversations.set_missions()
+        shown = live_view(self.console, control, say=lambda text: conversations.hear(text).text)
         with nullcontext() if self.quiet else shown as view:
             if control.attended and page is None:
                 load_ahead()
-            visitors = (speech, talk) if view is None else (speech, view, talk)
-            yield Watching(control, visitors, page, self.profile)
+            visitors = (speech, conversations) if view is None else (speech, view, conversations)
+            yield RunOptions(control, visitors, page, self.profile)
 
-    def conclude(self, finished: Finished) -> None:
+    def conclude(self, finished: FinishedRun) -> None:
         """Shows the verdicts and the figures, after the whole tree where that is wanted."""
         if self.whole_tree:
             self.console.print(to_rich(finished.tree, collapsed=False))

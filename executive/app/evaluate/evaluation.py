@@ -21,11 +21,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from executive.app.checker import prepare_checked
 from executive.app.evaluate.results import Case, Evaluated, Evaluation, Evidence, ResultsFile, RunSpec, Standing
 from executive.app.evaluate.workers import Pool, installed_code
-from executive.app.feasibility import refuse_impossible
 from executive.app.mission_run import return_memory, run_request
-from executive.app.prepare import prepare
 from executive.app.report import RefereeReport, RunReport
 from executive.mission.request import Request
 from executive.record.history import Event, read_events, timeline
@@ -124,7 +123,7 @@ def refuse_impossible_runs(runs: Sequence[RunSpec]) -> None:
         if plain.to_json() not in seen:
             seen.add(plain.to_json())
             with problems:
-                refuse_impossible(prepare(plain, ask=None))
+                prepare_checked(plain)
     problems.raise_any()
 
 
@@ -143,9 +142,8 @@ def run_one(spec: RunSpec, *, checked: bool = False) -> Case:
 
 def _ran(spec: RunSpec, folder: Path, checked: bool) -> Case:
     try:
-        prepared = prepare(replace(_request(spec, folder), out=folder / "out", record=False), ask=None)
-        if checked:
-            refuse_impossible(prepared)
+        request = replace(_request(spec, folder), out=folder / "out", record=False)
+        prepared = prepare_checked(request, anyway=not checked)
         report = run_request(prepared).report
     except InputError as error:
         return Case(spec, _report(spec, "refused", REFUSED, str(error)))

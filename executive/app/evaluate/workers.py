@@ -44,7 +44,7 @@ Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
-class Finished(Generic[Item, Result]):
+class WorkResult(Generic[Item, Result]):
     """An item and its result; `result` is None where each worker that took it has died, as `lost` says."""
 
     item: Item
@@ -61,7 +61,7 @@ class LocalWorkers:
 
     count: int
 
-    def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:
+    def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[WorkResult[Item, Result]]:
         """Has each item worked on once, and gives each as it ends. What the function raises is raised here.
 
         Closing the iterator ends the processes.
@@ -83,10 +83,10 @@ class LocalWorkers:
                         if deaths + 1 < MOST_DEATHS:
                             waiting.append((item, deaths + 1))
                         else:
-                            yield Finished(item, None, f"{MOST_DEATHS} worker processes have died with it")
+                            yield WorkResult(item, None, f"{MOST_DEATHS} worker processes have died with it")
                     else:
                         idle.append(process)
-                        yield Finished(item, result)
+                        yield WorkResult(item, result)
         finally:
             for process in (*idle, *(process for process, *_ in running.values())):
                 process.end()
@@ -144,7 +144,7 @@ class ClusterWorkers:
         """The number of workers that are connected now."""
         return len(self._client.scheduler_info(n_workers=-1)["workers"])
 
-    def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Finished[Item, Result]]:
+    def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[WorkResult[Item, Result]]:
         """As `LocalWorkers.give_out`.
 
         Raises:
@@ -169,9 +169,9 @@ class ClusterWorkers:
                         error = future.exception()
                         if not isinstance(error, KilledWorker):
                             raise error
-                        yield Finished(item, None, f"{MOST_DEATHS} worker processes have died with it")
+                        yield WorkResult(item, None, f"{MOST_DEATHS} worker processes have died with it")
                     else:
-                        yield Finished(item, self._patiently(future.result))
+                        yield WorkResult(item, self._patiently(future.result))
                     future.release()
         finally:
             if self._client.status == "running":

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.app.conversations import Talk
+from executive.app.conversations import Conversations
 from executive.app.prepare import prepare
 from executive.conversation import ReplyKind
 from executive.mission.request import Request
@@ -30,7 +30,7 @@ def control(prepared):
 
 @pytest.fixture
 def talk(prepared, control):
-    talk = Talk(prepared, control)
+    talk = Conversations(prepared, control)
     talk.set_missions()
     return talk
 

@@ -10,8 +10,7 @@ import pytest
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
-from executive.app.page_view import PageView, queueing
-from executive.app.page_view import said as sentence_action
+from executive.app.page_view import PageView, queue_function, sentence_action
 from executive.app.prepare import prepare
 from executive.mission.request import Request
 from executive.run.control_state import Mode
@@ -29,13 +28,13 @@ def prepared():
 def page(prepared):
     page = PageView(prepared, lambda line: None)
     page.control.begin({"Alice": prepared.tree})
-    page.talk.set_missions()
+    page.conversations.set_missions()
     yield page
     page.close()
 
 
 def test_a_sentence_becomes_a_mission_that_is_done_first(page):
-    say = sentence_action(page._hear)
+    say = sentence_action(page.hear)
     assert "[bathroom]" in say({"text": "go to the bathroom"})
     (tree,) = page.control.poll().preempts
     assert [command.goal for command in tree.commands] == ["bathroom"]
@@ -47,12 +46,12 @@ def test_a_sentence_becomes_a_mission_that_is_done_first(page):
 )
 def test_a_sentence_that_is_not_understood_is_refused_with_the_reason(page, text, words):
     with pytest.raises(RefusedError, match=words):
-        sentence_action(page._hear)({"text": text})
+        sentence_action(page.hear)({"text": text})
     assert page.control.poll().preempts == ()
 
 
 def test_remarks_act_at_once_and_are_answered(page):
-    say = sentence_action(page._hear)
+    say = sentence_action(page.hear)
     assert say({"text": "wait"}).startswith("I wait")
     assert page.control.state.mode is Mode.PAUSED
     assert say({"text": "go on"}) == "I go on"
@@ -61,7 +60,7 @@ def test_remarks_act_at_once_and_are_answered(page):
 
 
 def test_a_question_is_asked_on_the_page_and_answered_there(page):
-    say = sentence_action(page._hear)
+    say = sentence_action(page.hear)
     assert say({"text": "put the cube on the table"}) == "Which table: kitchen table or coffee table?"
     assert "[coffee table]" in say({"text": "the coffee table"})
     (tree,) = page.control.poll().preempts
@@ -69,13 +68,13 @@ def test_a_question_is_asked_on_the_page_and_answered_there(page):
 
 
 def test_a_correction_takes_the_place_of_the_mission(page):
-    assert sentence_action(page._hear)({"text": "no, to the bathroom"}).startswith("instead: ")
+    assert sentence_action(page.hear)({"text": "no, to the bathroom"}).startswith("instead: ")
     (request,) = page.control.poll().instead
     assert (request.tree.commands[0].goal, request.instead_of) == ("bathroom", "go kitchen")
 
 
 def test_a_sentence_is_queued_for_later(prepared, tmp_path):
-    later = queueing(prepared, store=tmp_path / "missions.sqlite", out=tmp_path)
+    later = queue_function(prepared, store=tmp_path / "missions.sqlite", out=tmp_path)
     assert later("go to the bathroom").startswith("queued as mission 1")
     with MissionStore(tmp_path / "missions.sqlite", create=False) as missions:
         (mission,) = missions.missions(MissionState.QUEUED)
@@ -84,7 +83,7 @@ def test_a_sentence_is_queued_for_later(prepared, tmp_path):
 
 
 def test_a_shipped_mission_is_queued_for_later_with_its_parameters(prepared, tmp_path):
-    later = queueing(prepared, store=tmp_path / "missions.sqlite", out=tmp_path)
+    later = queue_function(prepared, store=tmp_path / "missions.sqlite", out=tmp_path)
     assert later("visit_room room=office thing=hammer").startswith("queued as mission 1")
     with pytest.raises(InputError, match="has no parameter 'rom'; did you mean 'room'"):
         later("visit_room rom=office")

@@ -58,7 +58,7 @@ REFUSED = [
         ),
         "overlap",
     ),
-    ((RobotConfig("Alice", "spot", start=Pose2D(50.0, 50.0, 0.0)),), "stands in something"),
+    ((RobotConfig("Alice", "spot", start=Pose2D(50.0, 50.0, 0.0)),), "stands in an obstacle"),
     ((RobotConfig("Alice", "spot", dock="moon"),), "is no place"),
 ]
 
@@ -70,7 +70,7 @@ def test_a_start_or_dock_that_cannot_be_is_refused(setups, words):
 
 
 def test_when_there_is_no_room_for_one_more_robot_that_is_said():
-    with pytest.raises(InputError, match="no room"):
+    with pytest.raises(InputError, match="no free place"):
         placed_robots(WORLD, KNOWN, [RobotConfig(f"Robot {number}", "spot") for number in range(60)])
 
 

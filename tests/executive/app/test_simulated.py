@@ -77,5 +77,5 @@ def test_a_start_in_a_wall_or_outside_is_refused():
     world = load_world("flat")
     refuse_blocked(world, world.start)
     for x, y in ((0.0, 0.0), (-30.0, 4.0)):
-        with pytest.raises(InputError, match="stands in something or outside"):
+        with pytest.raises(InputError, match="stands in an obstacle or outside"):
             refuse_blocked(world, Pose2D(x, y, 0.0))

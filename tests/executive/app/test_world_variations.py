@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from executive.app.mission_run import spoken_classes
+from executive.app.mission_run import mentioned_classes
 from executive.app.prepare import prepare
 from executive.mission.request import Request
 from executive.words.variation import Variation
@@ -18,7 +18,7 @@ def asked(folder: Path, variation: Variation) -> Request:
 
 
 def test_clutter_spares_the_classes_that_are_asked_for(tmp_path: Path) -> None:
-    assert "beer" in spoken_classes(prepare(asked(tmp_path, Variation(clutter=5)), ask=None))
+    assert "beer" in mentioned_classes(prepare(asked(tmp_path, Variation(clutter=5)), ask=None))
 
 
 def test_people_of_a_variation_walk_in_the_world(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ GO = [
     (("--start", "2", "4.5", "0"), ""),
     (("--set", "x=0", "--set", "y=0"), "is blocked"),
     (("--set", "z=1"), "has no parameter 'z'"),
-    (("--start", "0", "0", "0"), "stands in something"),
+    (("--start", "0", "0", "0"), "stands in an obstacle"),
 ]
 
 

@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from executive.app.evaluate import evaluation
-from executive.app.evaluate.workers import Finished as Done
 from executive.app.evaluate.workers import Pool
-from executive.app.mission_run import Finished
+from executive.app.evaluate.workers import WorkResult as Done
+from executive.app.mission_run import FinishedRun
 from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry
 from executive.mission.request import Request
@@ -45,7 +45,7 @@ class Plant:
         EventLog(request.out / "log.mcap", ManualClock()).close()
         outcome, referee = self.ends(request)
         facts = (prepared.world.name, request.seed, 9.0, 1.0, 9.0, 90, "log.mcap")
-        return Finished(RunReport(outcome, None, "done", referee, (), *facts), node_view(prepared.tree.root))
+        return FinishedRun(RunReport(outcome, None, "done", referee, (), *facts), node_view(prepared.tree.root))
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from py_trees.common import Status
 from typer.testing import CliRunner
 
-from executive.app.mission_run import Finished
+from executive.app.mission_run import FinishedRun
 from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry
 from executive.run.visitor import TickNote
@@ -57,7 +57,7 @@ class Plant:
         outcome = self.outcomes.pop(0) if self.outcomes else "success"
         if outcome == "killed":
             raise GoneError
-        return Finished(report(outcome), node_view(tree.root))
+        return FinishedRun(report(outcome), node_view(tree.root))
 
 
 def first_leaf(tree):

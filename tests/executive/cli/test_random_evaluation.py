@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 
 from executive.app.evaluate import evaluation
 from executive.app.evaluate.random_missions import random_missions
-from executive.app.evaluate.workers import Finished as Done
 from executive.app.evaluate.workers import Pool
-from executive.app.mission_run import Finished
+from executive.app.evaluate.workers import WorkResult as Done
+from executive.app.mission_run import FinishedRun
 from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry
 from executive.record.event_log import EventLog
@@ -42,7 +42,7 @@ def ran(monkeypatch):
         held = request.seed != 8002
         referee = RefereeReport(held, "it is so" if held else "the cube is on the floor", 0, 0)
         facts = (prepared.world.name, request.seed, 9.0, 1.0, 9.0, 90, "log.mcap")
-        return Finished(RunReport("success", None, "done", referee, (), *facts), node_view(prepared.tree.root))
+        return FinishedRun(RunReport("success", None, "done", referee, (), *facts), node_view(prepared.tree.root))
 
     @contextmanager
     def opened(_):

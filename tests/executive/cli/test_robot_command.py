@@ -74,7 +74,7 @@ def test_poses_without_a_name_are_numbered(tmp_path):
 def test_a_pose_is_never_overwritten(tmp_path):
     path = save_pose(tmp_path, "look", POSE, world="flat")
     before = path.read_text()
-    with pytest.raises(InputError, match="there is a pose of this name"):
+    with pytest.raises(InputError, match="a pose of this name exists"):
         save_pose(tmp_path, "look", replace(POSE, opening=0.0), world="flat")
     assert path.read_text() == before
 
@@ -96,7 +96,7 @@ def test_a_folder_that_cannot_be_made_is_one_clear_line(tmp_path):
     [
         (["--world", "nowhere"], "unknown world 'nowhere'"),
         (["--robot", ""], "is no name for a robot"),
-        (["--start", "500", "500", "0"], "stands in something or outside"),
+        (["--start", "500", "500", "0"], "stands in an obstacle or outside"),
     ],
 )
 def test_bad_arguments_are_one_clear_line(arguments, said):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from executive.app.mission_run import Finished
+from executive.app.mission_run import FinishedRun
 from executive.app.report import RefereeReport, RunReport
 from executive.cli import entry
 from executive.tree.node_view import node_view
@@ -45,7 +45,7 @@ def no_plant(monkeypatch):
 
     def run_request(prepared, **_):
         prepared.request.out.mkdir(parents=True, exist_ok=True)
-        return Finished(ended["report"], node_view(prepared.tree.root))
+        return FinishedRun(ended["report"], node_view(prepared.tree.root))
 
     monkeypatch.setattr("executive.app.runs.run_request", run_request)
     return ended

@@ -88,7 +88,7 @@ def test_damaged_cylinders_are_refused(tmp_path, text, why):
 def test_a_start_in_a_wall_of_the_flat_is_refused():
     result = invoke("run", "go_to_pose", "--start", 0.0, 0.0, 0.0)
     assert result.exit_code == 2
-    assert "at the start (0, 0, 0) the robot stands in something" in result.stderr
+    assert "at the start (0, 0, 0) the robot stands in an obstacle" in result.stderr
 
 
 @pytest.mark.parametrize(("setting", "why"), [("z=1", "has no parameter 'z'"), ("x", "is not NAME=VALUE")])

@@ -19,7 +19,7 @@ from errand_train.commands.worst_sheet import Shown, contact_sheet
 from errand_train.detector.scoring import BODY, BODY_CLASSES, by_camera, judged, picture_errors, score
 from errand_train.detector.scoring_labels import LabelledPicture, pictures_of_coco
 from errand_train.libraries import check_libraries
-from executive.app.picture_files import detector_of, read_picture, write_picture
+from executive.app.picture_files import open_detector, read_picture, write_picture
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json
 from skills.detection import Detection
@@ -68,7 +68,7 @@ def score_command(
     console = console_for(as_json)
     check_libraries(("pycocotools",), "scoring")
     drawing = _png(sheet)
-    detector = detector_of(model, DetectorOptions(threshold=LEAST_SCORE))
+    detector = open_detector(model, DetectorOptions(threshold=LEAST_SCORE))
     work = _work(data, pictures or data.parent, limit, detector, views)
     found = _all_found(work, console)
     names = work.detector.class_names
